@@ -1,0 +1,130 @@
+"""What each law promises, on the n = 1 model and in batches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wristctl.config.errors import UserError
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.model import one_segment
+from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
+from wristctl.wrist.model import terms
+from wristctl.wrist.segments import segments
+
+WRIST = WristParameters(gravity=(-8.0, 3.0))
+
+
+@compiled
+def _call(law, now, wrist, gains, memory, torque):
+    result = rows_of(torque)
+    result[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
+
+
+@compiled
+def _one_segment(wrist, now, out):
+    row, result = now_of(now), rows_of(out)
+    result[0], result[1] = one_segment(wrist_of(wrist), row.theta, row.rate)
+
+
+def torque(name: str, gains: tuple[float, ...], memory: np.ndarray | None = None, **now: float) -> float:
+    chosen = controller(name)
+    given_now = {"torque_low": -1e9, "torque_high": 1e9, "period": 1e-3} | now
+    row = np.array([[given_now.get(field, 0.0) for field in NOW]])
+    kept = np.zeros((max(1, chosen.memory), 8)) if memory is None else memory
+    wrist = to_blocks(segments(WRIST, 1)[None])[0]
+    out = np.zeros((1, 8))
+    _call(chosen.compiled, to_blocks(row)[0], wrist, to_blocks(np.array([[*gains, 0.0]]))[0], kept, out)
+    return float(out[0, 0])
+
+
+def inertia_and_load(theta: float, rate: float) -> tuple[float, float]:
+    at = terms(segments(WRIST, 1), [theta], [rate])
+    return float(at.mass[0, 0]), float(at.bias[0] + WRIST.damping * rate + WRIST.stiffness * theta)
+
+
+state = st.tuples(st.floats(-0.87, 0.87), st.floats(-5.0, 5.0), st.floats(-0.87, 0.87))
+
+
+@settings(max_examples=80, deadline=None)
+@given(state)
+def test_one_segment_model_of_the_laws_is_the_wrists(at: tuple[float, float, float]) -> None:
+    theta, rate, _ = at
+    row = np.zeros((1, len(NOW)))
+    row[0, :2] = theta, rate
+    out = np.zeros((2, 8))
+    _one_segment(to_blocks(segments(WRIST, 1)[None])[0], to_blocks(row)[0], out)
+    assert to_rows(out[None], 1)[0] == pytest.approx(inertia_and_load(theta, rate), rel=1e-12, abs=1e-14)
+
+
+@settings(max_examples=80, deadline=None)
+@given(state, st.sampled_from(["printed", "exchanged", "initial"]))
+def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float], preset: str) -> None:
+    """With an exact model sigma' = P1 rate + P2 theta'' = -P3 tanh(sigma) (E19-E21)."""
+    theta, rate, theta_ref = at
+    p1, p2, p3 = controller("smc").presets[preset]
+    u = torque("smc", (p1, p2, p3), theta=theta, rate=rate, theta_ref=theta_ref)
+    inertia, load = inertia_and_load(theta, rate)
+    sigma = p1 * (theta - theta_ref) + p2 * rate
+    assert p1 * rate + p2 * (u - load) / inertia == pytest.approx(-p3 * np.tanh(sigma), rel=1e-9, abs=1e-8 * p3)
+
+
+@settings(max_examples=80, deadline=None)
+@given(state)
+def test_computed_torque_gives_the_linear_error_equation(at: tuple[float, float, float]) -> None:
+    theta, rate, theta_ref = at
+    u = torque("computed-torque", (40.0, 0.7), theta=theta, rate=rate, theta_ref=theta_ref, acceleration_ref=3.0)
+    inertia, load = inertia_and_load(theta, rate)
+    expected = 3.0 - 2 * 0.7 * 40.0 * rate - 40.0**2 * (theta - theta_ref)
+    assert (u - load) / inertia == pytest.approx(expected, rel=1e-10, abs=1e-9)
+
+
+def test_feedforward_holds_the_model_at_the_reference() -> None:
+    assert torque("feedforward", (), theta=0.1, rate=2.0, theta_ref=0.5) == pytest.approx(inertia_and_load(0.5, 0.0)[1])
+
+
+def test_pid_opposes_the_error_and_integrates_it() -> None:
+    memory = np.zeros((1, 8))
+    first = torque("pid", (10.0, 5.0, 2.0), memory, theta=0.2, rate=0.5)
+    assert first == pytest.approx(-(10.0 * 0.2 + 5.0 * 0.2e-3 + 2.0 * 0.5))
+    second = torque("pid", (10.0, 5.0, 2.0), memory, theta=0.2, rate=0.5)
+    assert second - first == pytest.approx(-5.0 * 0.2e-3)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_pid_holds_its_integral_in_saturation_and_lets_it_unwind(side: float) -> None:
+    memory = np.full((1, 8), -0.3 * side)
+    reach = {"torque_low": -0.1, "torque_high": 0.1}
+    torque("pid", (10.0, 5.0, 2.0), memory, theta=-0.2 * side, **reach)
+    assert (memory == -0.3 * side).all()
+    torque("pid", (1.0, 5.0, 2.0), memory, theta=0.2 * side, **reach)
+    assert (np.abs(memory) < 0.3).all()
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_states_units_boxes_and_presets_of_all_its_gains(name: str) -> None:
+    chosen = controller(name)
+    assert chosen.presets and chosen.law.__doc__
+    for gain in chosen.gains.values():
+        assert 0.0 < gain.low < gain.high and gain.meaning
+    for preset in chosen.presets.values():
+        assert len(preset) == len(chosen.gains)
+
+
+def test_unknown_names_get_the_nearest_one() -> None:
+    with pytest.raises(UserError, match="did you mean 'smc'"):
+        controller("scm")
+    with pytest.raises(UserError, match="did you mean 'printed'"):
+        gains_of(controller("smc"), "prnted")
+    with pytest.raises(UserError, match="unknown gain 'P4'"):
+        gains_of(controller("smc"), {"P1": 1.0, "P2": 1.0, "P4": 1.0})
+    with pytest.raises(UserError, match="missing gain P3"):
+        gains_of(controller("smc"), {"P1": 1.0, "P2": 1.0})
+    with pytest.raises(UserError, match="no tuned gains of smc"):
+        gains_of(controller("smc"), "tuned", {"pid": {}})

@@ -1,0 +1,83 @@
+"""Metrics on signals whose metrics are known in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wristctl.simulation.metrics import METRICS, metrics_of
+
+PERIOD, HORIZON = 1e-4, 5.0
+TIME = np.arange(round(HORIZON / PERIOD)) * PERIOD
+STILL = np.full((len(TIME), 2), 3.0)
+
+
+def test_first_order_response_has_its_closed_form_metrics() -> None:
+    tau, final = 0.2, 0.5
+    theta = final * (1 - np.exp(-TIME / tau))
+    found = metrics_of(PERIOD, theta, np.full_like(TIME, final), STILL, final, 0.0)
+    assert found["rmse"] == pytest.approx(final * math.sqrt(tau / 2 / HORIZON), rel=1e-3)
+    assert found["settling"] == pytest.approx(tau * math.log(50), abs=2 * PERIOD)
+    assert found["settling_5"] == pytest.approx(tau * math.log(20), abs=2 * PERIOD)
+    assert found["iae"] == pytest.approx(final * tau, rel=1e-3)
+    assert found["overshoot"] == 0.0
+    after = HORIZON - found["settling"]
+    assert found["rmse_settled"] == pytest.approx(0.02 * final * math.sqrt(tau / 2 / after), rel=1e-2)
+    assert found["rmse_move"] == found["rmse"]
+
+
+def test_underdamped_response_has_its_closed_form_overshoot() -> None:
+    zeta, w = 0.3, 8.0
+    wd = w * math.sqrt(1 - zeta**2)
+    for final in (0.4, -0.4):
+        shape = 1 - np.exp(-zeta * w * TIME) * (np.cos(wd * TIME) + zeta * w / wd * np.sin(wd * TIME))
+        found = metrics_of(PERIOD, final * shape, np.full_like(TIME, final), STILL, final, 0.0)
+        assert found["overshoot"] == pytest.approx(100 * math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), rel=1e-4)
+
+
+def test_constant_error_is_its_own_rmse_and_steady_state() -> None:
+    found = metrics_of(PERIOD, np.full_like(TIME, 0.492), np.full_like(TIME, 0.5), STILL, 0.5, 0.0)
+    assert found["rmse"] == pytest.approx(0.008)
+    assert found["steady_state"] == pytest.approx(0.008)
+    assert found["settling"] == 0.0 and found["rmse_settled"] == pytest.approx(0.008, rel=1e-4)
+
+
+def test_what_never_enters_the_band_never_settles() -> None:
+    found = metrics_of(PERIOD, np.full_like(TIME, 0.48), np.full_like(TIME, 0.5), STILL, 0.5, 0.0)
+    assert math.isnan(found["settling"]) and math.isnan(found["rmse_settled"])
+    assert found["settling_5"] == 0.0
+
+
+def test_leaving_the_band_at_the_end_means_never_settled() -> None:
+    theta = np.full_like(TIME, 0.5)
+    theta[-1] = 0.6
+    assert math.isnan(metrics_of(PERIOD, theta, np.full_like(TIME, 0.5), STILL, 0.5, 0.0)["settling"])
+
+
+def test_move_window_ends_where_the_reference_rests() -> None:
+    reference = np.minimum(TIME, 1.0)
+    theta = np.where(TIME <= 1.0, reference - 0.02, reference)
+    found = metrics_of(PERIOD, theta, reference, STILL, 1.0, 1.0)
+    assert found["rmse_move"] == pytest.approx(0.02)
+    assert found["rmse"] == pytest.approx(0.02 * math.sqrt(1 / 5), rel=1e-3)
+
+
+def test_tension_metrics_count_both_sides() -> None:
+    plus = 10.0 + 5.0 * np.sign(np.sin(2 * np.pi * 10 * (TIME + PERIOD / 2)))
+    tension = np.stack([plus, np.full_like(TIME, 2.0)], axis=1)
+    saturated = (TIME < 0.5).astype(float)
+    found = metrics_of(PERIOD, TIME, TIME, tension, 5.0, 0.0, saturated)
+    assert found["peak_tension"] == 15.0
+    assert found["rms_tension"] == pytest.approx(math.sqrt((125.0 + 4.0) / 2), rel=1e-6)
+    assert found["chattering"] == pytest.approx(10.0 * 20, rel=0.02)
+    assert found["saturation"] == pytest.approx(0.1)
+    assert found["slack"] == 0.0
+    assert metrics_of(PERIOD, TIME, TIME, 0 * tension, 5.0, 0.0)["slack"] == 1.0
+
+
+def test_every_metric_states_unit_and_formula() -> None:
+    found = metrics_of(PERIOD, TIME, TIME, STILL, 5.0, 0.0)
+    assert set(found) == set(METRICS)
+    assert all(metric.formula for metric in METRICS.values())

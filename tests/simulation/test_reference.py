@@ -1,0 +1,66 @@
+"""References: angles, tip paths, and their derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from wristctl.config.errors import UserError
+from wristctl.config.loop import Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.simulate import chain_tip
+from wristctl.wrist.kinematics import arc_tip, exact_arc
+from wristctl.wrist.model import terms
+from wristctl.wrist.segments import segments
+
+WRIST = WristParameters()
+
+
+def evaluated(**reference: object) -> Motion:
+    return motion(Reference.model_validate(reference), WRIST, 3.0, 1e-3)
+
+
+def test_minimum_jerk_starts_and_ends_at_rest_and_derivatives_agree() -> None:
+    m = evaluated(duration=2.0)
+    assert m.theta_ref[0] == 0.0 and m.final == pytest.approx(np.deg2rad(30.0))
+    assert m.rate_ref[[0, 2000]].tolist() == [0.0, 0.0] and m.acceleration_ref[[0, 2000]].tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(np.gradient(m.theta_ref, m.time)[1:-1], m.rate_ref[1:-1], atol=1e-5)
+    np.testing.assert_allclose(np.gradient(m.rate_ref, m.time)[1:-1], m.acceleration_ref[1:-1], atol=2e-3)
+
+
+def test_exact_inverse_of_the_tip_path_is_the_wanted_angle() -> None:
+    direct, through_tip = evaluated(), evaluated(inverse="exact")
+    np.testing.assert_allclose(through_tip.theta_ref, direct.theta_ref, atol=1e-15)
+    np.testing.assert_allclose(through_tip.rate_ref, direct.rate_ref, atol=1e-13)
+    np.testing.assert_allclose(through_tip.acceleration_ref, direct.acceleration_ref, atol=1e-11)
+
+
+def test_a_tip_target_is_reached_whatever_its_stretch() -> None:
+    tip = arc_tip(np.array(0.4), 0.084)
+    m = evaluated(tip=tuple(float(v) for v in tip), inverse="exact")
+    assert m.final == pytest.approx(0.4, abs=1e-14)
+    np.testing.assert_allclose(m.tip_desired[-1], tip, atol=1e-16)
+    np.testing.assert_allclose(m.tip_desired[0], [WRIST.length, 0.0], atol=1e-16)
+    np.testing.assert_allclose(exact_arc(m.tip_desired[-1]), [0.4, 0.084], rtol=1e-13)
+
+
+def test_impossible_references_are_refused() -> None:
+    with pytest.raises(UserError, match="beyond the wrist's range"):
+        evaluated(angle_deg=51.0)
+    with pytest.raises(UserError, match="beyond the range"):
+        evaluated(tip=(0.0, 0.08), inverse="exact")
+    with pytest.raises(UserError, match="network"):
+        evaluated(inverse="network")
+    with pytest.raises(ValidationError, match="not both"):
+        Reference(angle_deg=10.0, tip=(0.08, 0.0), inverse="exact")
+    with pytest.raises(ValidationError, match="needs inverse"):
+        Reference(tip=(0.08, 0.0))
+
+
+def test_chain_tip_equals_the_compiled_kinematics() -> None:
+    angles = np.random.default_rng(0).uniform(-0.5, 0.5, (20, 4))
+    np.testing.assert_allclose(
+        chain_tip(angles, WRIST.length), terms(segments(WRIST, 4), angles, 0 * angles).tip[:, :2], atol=1e-15
+    )

@@ -1,0 +1,81 @@
+"""What is tuned, compared and simulated: controllers with their gains."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from wristctl.config.loop import LOOPS, Loop, Reference, Scenario
+from wristctl.config.section import Section, choice, quantity
+
+Gains = str | dict[str, float]
+
+
+class Row(Section):
+    """One controller with one set of gains."""
+
+    controller: str = choice("smc", "name in the table of controllers")
+    gains: Gains = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
+
+
+class Objective(Section):
+    """Weights of the tuning objective; each term is averaged over the tuning scenarios."""
+
+    rmse: float = quantity(1.0, "1/rad", "weight of the RMSE", ge=0)
+    settling: float = quantity(0.01, "1/s", "weight of the settling time (the horizon where it never settles)", ge=0)
+    chattering: float = quantity(1e-6, "s/N", "weight of the total variation of tension per second", "paper: output error and chattering", ge=0)
+    saturation: float = quantity(0.0, "", "weight of the share of time in saturation", ge=0)
+
+
+class TuneSettings(Section):
+    """A search for gains: the same budget, optimiser, objective and start for every controller."""
+
+    controllers: tuple[str, ...] = choice(("smc",), "controllers to tune", min_length=1)
+    optimiser: Literal["pso", "differential-evolution", "random"] = choice("pso", "ask/tell optimiser", "paper")
+    candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
+    iterations: int = choice(60, "iterations", "assumed", ge=1, le=100_000)
+    objective: Objective = Objective()
+    scenarios: tuple[Scenario, ...] = choice(
+        (
+            Scenario(reference=Reference(kind="step", angle_deg=20.0)),
+            Scenario(reference=Reference(kind="minimum-jerk", angle_deg=20.0, duration=1.5)),
+        ),
+        "tuning scenarios; compare refuses to judge on any of them",
+        min_length=1,
+    )
+    loops: dict[str, Loop] = choice(LOOPS, "named loops")
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+    network: str | None = choice(None, "train run behind references with inverse: network")
+
+
+class CompareSettings(Section):
+    """Controllers x loops x references x inverses, beside the paper's T2."""
+
+    rows: tuple[Row, ...] = choice((Row(controller="smc", gains="printed"),), "controllers and gains", min_length=1)
+    loops: dict[str, Loop] = choice(LOOPS, "named loops, each one a block of the table")
+    references: tuple[Reference, ...] = choice(
+        (
+            Reference(kind="step"),
+            Reference(kind="minimum-jerk", duration=1.0),
+            Reference(kind="minimum-jerk", duration=2.0),
+        ),
+        "references, each followed from rest",
+        min_length=1,
+    )
+    inverses: tuple[Literal["none", "exact", "network"], ...] = choice(
+        ("network", "exact"), "how tip targets become angles; overrides the references' own", min_length=1
+    )
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
+    network: str | None = choice(None, "train run: path, id or latest:train")
+    tuned: str | None = choice(None, "tune run: path, id or latest:tune")
+
+
+class SimulateSettings(Section):
+    """One closed loop."""
+
+    controller: str = choice("smc", "name in the table of controllers")
+    gains: Gains = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    loop: Loop = Loop()
+    reference: Reference = Reference()
+    horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
+    network: str | None = choice(None, "train run behind a reference with inverse: network")
+    tuned: str | None = choice(None, "tune run behind gains: tuned")

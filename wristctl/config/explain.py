@@ -1,0 +1,52 @@
+"""One line about what is wrong in a study: what, where (file and line, key path), how to fix it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from wristctl.config.errors import UserError, meant
+from wristctl.config.keys import field_at, keys_of, unit_of
+from wristctl.config.strict_yaml import KeyPath
+
+
+def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserError:
+    """The most telling of the errors found; `origins` says the file and line (or override) of each key."""
+    details = error.errors(include_url=False)
+    unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
+    detail: Any = unknown[0] if unknown else max(details, key=lambda each: len(each["loc"]))
+    path: KeyPath = detail["loc"]
+    what, fix = _what(detail), _fix(detail)
+    while path and path not in origins:
+        path = path[:-1]
+    return UserError(what, f"{origins[path]}: {'.'.join(map(str, path))}" if path else "", fix)
+
+
+def _what(detail: Any) -> str:
+    if detail["type"] == "extra_forbidden":
+        return f"unknown key {detail['loc'][-1]!r}"
+    if detail["type"] == "value_error":
+        return str(detail["ctx"]["error"])
+    value = repr(detail["input"])
+    value = value if len(value) <= 60 else f"{value[:57]}..."
+    if detail["type"] in ("model_type", "dict_type"):
+        return f"{value} should be a group of keys and values"
+    message: str = detail["msg"]
+    return message.replace("Input", value, 1) if message.startswith("Input") else f"{value}: {message}"
+
+
+def _fix(detail: Any) -> str:
+    path: KeyPath = detail["loc"]
+    if detail["type"] == "extra_forbidden":
+        return meant(str(path[-1]), keys_of(field_at(path[:-1])[0]))
+    if detail["type"] == "literal_error":
+        return meant(str(detail["input"]), re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
+    _, field = field_at(path)
+    if field is None or not field.description or detail["type"] == "value_error":
+        return ""
+    unit, default = unit_of(field), repr(field.default)
+    expected = f"{field.description} [{unit}]" if unit else field.description
+    return f"{expected}, default {default}" if len(default) <= 40 and field.default is not None else expected

@@ -1,0 +1,52 @@
+"""Which keys a study file may hold, and what stands behind each."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+from pydantic.fields import FieldInfo
+
+from wristctl.config.section import Section
+from wristctl.config.strict_yaml import KeyPath
+from wristctl.config.study import Study
+
+
+def keys_of(kind: Any) -> dict[str, FieldInfo]:
+    """The fields of a section by the keys they have in a file; empty where `kind` is no section."""
+    if not (isinstance(kind, type) and issubclass(kind, Section)):
+        return {}
+    return {field.alias or name: field for name, field in kind.model_fields.items()}
+
+
+def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
+    """The annotation at a key path (None where the schema has none), and the last field passed on the way."""
+    kind: Any = Study
+    field: FieldInfo | None = None
+    for key in path:
+        if known := keys_of(kind):
+            field = known.get(str(key))
+            kind = field.annotation if field else None
+        else:
+            items = [item for item in get_args(kind) if item is not ...]
+            kind = items[-1] if items else None
+    return kind, field
+
+
+def section_keys(command: str | None) -> dict[str, FieldInfo]:
+    """The keys of a command's own section; empty where it has none."""
+    return keys_of(field_at((command,))[0]) if command else {}
+
+
+def unit_of(field: FieldInfo) -> str:
+    """The unit a leaf was declared with, empty where it has none."""
+    return _declared(field, "unit")
+
+
+def source_of(field: FieldInfo) -> str:
+    """Where a leaf's default comes from, empty where that is not said."""
+    return _declared(field, "source")
+
+
+def _declared(field: FieldInfo, what: str) -> str:
+    extra = field.json_schema_extra
+    return str(extra.get(what, "")) if isinstance(extra, dict) else ""

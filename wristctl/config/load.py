@@ -1,0 +1,88 @@
+"""Read a study from files and overrides; every error says where it stands and how to mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from wristctl.config.errors import UserError, meant
+from wristctl.config.explain import explained
+from wristctl.config.keys import keys_of, section_keys
+from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
+from wristctl.config.study import Study
+
+
+def load_study(
+    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None
+) -> Study:
+    """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
+
+    A sequence is one leaf. An override's key is first looked for in the section of `command`: for train, `epochs=5` is
+    `train.epochs=5`. Raises UserError with file and line (or override), key path, and nearest key or what is
+    expected.
+    """
+    data: dict[str, Any] = {}
+    origins: dict[KeyPath, str] = {}
+    for file in files:
+        _merge(data, _read(file), str(file), origins)
+    for override in overrides:
+        _merge(data, _override(override, command), f"--set {override}", origins)
+    try:
+        return Study.model_validate(data, by_alias=True, by_name=False)
+    except ValidationError as error:
+        raise explained(error, origins) from error
+
+
+def _read(file: Path) -> Document:
+    try:
+        text = file.read_bytes()
+    except OSError as error:
+        raise UserError(
+            f"cannot read the configuration: {error.strerror}", str(file), "check the path"
+        ) from error
+    document = parse_yaml(text, str(file))
+    if document.data is not None and not isinstance(document.data, dict):
+        raise UserError(
+            "a study file holds keys and values",
+            f"{file}:1",
+            f"one of {', '.join(keys_of(Study))} at the top",
+        )
+    return document
+
+
+def _override(text: str, command: str | None) -> Document:
+    dotted, equals, value = text.partition("=")
+    where = f"--set {text}"
+    if not equals or not dotted:
+        raise UserError("an override is key=value", where, "for example --set wrist.length=0.09")
+    keys = dotted.split(".")
+    own, top = section_keys(command), keys_of(Study)
+    if command and keys[0] in own:
+        keys.insert(0, command)
+    elif keys[0] not in top:
+        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], [*own, *top]))
+    data = parse_yaml(value, where).data
+    for key in reversed(keys):
+        data = {key: data}
+    return Document(data, {})
+
+
+def _merge(data: dict[str, Any], document: Document, source: str, origins: dict[KeyPath, str]) -> None:
+    def into(target: dict[str, Any], mapping: Mapping[str, Any], path: KeyPath) -> None:
+        for key, value in mapping.items():
+            at = (*path, key)
+            origins[at] = source
+            if isinstance(value, dict):
+                if not isinstance(target.get(key), dict):
+                    target[key] = {}
+                into(target[key], value, at)
+            else:
+                target[key] = value
+                for beneath in [old for old in origins if old[: len(at)] == at != old]:
+                    del origins[beneath]
+
+    into(data, document.data or {}, ())
+    origins.update({path: f"{source}:{line}" for path, line in document.lines.items()})

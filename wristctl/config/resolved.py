@@ -1,0 +1,81 @@
+"""A study written out in full: every leaf, in the schema's order, with unit, meaning and source."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import yaml
+
+from wristctl.config.keys import keys_of, source_of, unit_of
+from wristctl.config.section import Section
+from wristctl.config.strict_yaml import parse_yaml
+from wristctl.config.study import Study
+
+_WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
+
+Entry = tuple[str, Any, str]
+
+
+def resolved_yaml(study: Study, command: str) -> str:
+    """What `command` reads of the study (seed, wrist, its own section) as YAML that gives the same study."""
+    entries = [entry for entry in _entries(study) if entry[0] in ("seed", "wrist", command)]
+    return "\n".join(_mapping(entries, "")) + "\n"
+
+
+def config_hash(study: Study, command: str) -> str:
+    """SHA-256 of what `command` reads, as canonical JSON."""
+    part = study.model_dump(mode="json", by_alias=True, include=_names(command))
+    return hashlib.sha256(json.dumps(part, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _names(command: str) -> set[str]:
+    return {"seed", "wrist", command.replace("-", "_")}
+
+
+def _entries(section: Section) -> Iterator[Entry]:
+    for (key, field), name in zip(keys_of(type(section)).items(), type(section).model_fields, strict=True):
+        value = getattr(section, name)
+        unit, source = unit_of(field), source_of(field) if value == field.default else ""
+        parts = (unit and f"[{unit}]", field.description, source and f"({source})")
+        yield key, value, " ".join(part for part in parts if part)
+
+
+def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
+    for key, value, comment in entries:
+        remark = f"  # {comment}" if comment else ""
+        if isinstance(value, Section):
+            yield f"{pad}{_scalar(key)}:{remark}"
+            yield from _mapping(_entries(value), pad + "  ")
+        elif isinstance(value, dict) and value:
+            yield f"{pad}{_scalar(key)}:{remark}"
+            yield from _mapping(((name, item, "") for name, item in value.items()), pad + "  ")
+        elif isinstance(value, tuple) and any(isinstance(item, Section) for item in value):
+            yield f"{pad}{_scalar(key)}:{remark}"
+            for item in value:
+                first, *others = _mapping(_entries(item), pad + "    ")
+                yield f"{pad}  - {first.lstrip()}"
+                yield from others
+        else:
+            yield f"{pad}{_scalar(key)}: {_flow(value)}{remark}"
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_flow, value))}]"
+    return "{}" if isinstance(value, dict) else _scalar(value)
+
+
+def _scalar(value: Any) -> str:
+    if isinstance(value, str):
+        if _WORD.fullmatch(value) and parse_yaml(value, "").data == value:
+            return value
+        return yaml.safe_dump(value, default_style='"', width=10**9, allow_unicode=True).strip()
+    return (
+        {None: "null", True: "true", False: "false"}[value]
+        if value is None or isinstance(value, bool)
+        else repr(value)
+    )

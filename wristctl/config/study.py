@@ -1,0 +1,22 @@
+"""A study: the wrist and what each command does with it. One file may hold one section or all of them."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.section import Section
+from wristctl.config.wrist import WristParameters
+
+
+class Study(Section):
+    """The whole file. Every section is validated, whichever command reads it."""
+
+    seed: int = Field(0, ge=0, description="root of every random stream")
+    wrist: WristParameters = WristParameters()
+    gen_data: DataSettings = Field(DataSettings(), alias="gen-data")
+    train: TrainSettings = TrainSettings()
+    tune: TuneSettings = TuneSettings()
+    compare: CompareSettings = CompareSettings()
+    simulate: SimulateSettings = SimulateSettings()

@@ -1,0 +1,40 @@
+"""The wrist's parameters; every default carries its source (DESIGN: the paper gives few of them, C10)."""
+
+from __future__ import annotations
+
+import math
+from typing import Self
+
+from pydantic import model_validator
+
+from wristctl.config.section import Section, choice, quantity
+
+
+class WristParameters(Section):
+    """A tendon-driven wrist of rigid discs and springs, bending in one plane; SI units."""
+
+    discs: int = choice(5, "rigid discs, the first clamped, the last carrying the hand", "paper", ge=2, le=33)
+    length: float = quantity(0.080, "m", "arc length from the first to the last disc", "assumed", gt=0)
+    mass: float = quantity(0.050, "kg", "moving mass of the wrist itself", "assumed", gt=0)
+    hand_mass: float = quantity(0.30, "kg", "mass of the hand", "assumed", ge=0)
+    hand_offset: float = quantity(0.060, "m", "hand's centre of mass beyond the last disc", "assumed", ge=0)
+    stiffness: float = quantity(0.615, "N m/rad", "bending stiffness of the whole wrist", "paper, C1", gt=0)
+    damping: float = quantity(0.105, "N m s/rad", "bending damping of the whole wrist", "paper, C1", ge=0)
+    tendon_radius: float = quantity(0.020, "m", "radius of the circle of tendons", "assumed", gt=0)
+    pretension: float = quantity(2.0, "N", "least tension of each tendon", "assumed", ge=0)
+    tension_limit: float = quantity(60.0, "N", "largest tension of each tendon", "assumed", gt=0)
+    range_deg: float = quantity(50.0, "deg", "bending range to either side", "paper", gt=0, le=180)
+    gravity: tuple[float, float] = quantity(
+        (-9.81, 0.0), "m/s^2", "gravity in the bending plane; upright is (-9.81, 0)", "assumed (the pose of the test)"
+    )
+
+    @model_validator(mode="after")
+    def _tensions_in_order(self) -> Self:
+        if self.tension_limit <= self.pretension:
+            raise ValueError(f"tension_limit ({self.tension_limit} N) must exceed pretension ({self.pretension} N)")
+        return self
+
+    @property
+    def tendon_offset(self) -> float:
+        """Distance c of a pair's tendons from the neutral line, r / sqrt(2) [m]."""
+        return self.tendon_radius / math.sqrt(2.0)

@@ -1,0 +1,1 @@
+"""Controllers: one file each, one line in the table of `wristctl.control.table`."""

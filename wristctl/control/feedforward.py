@@ -1,0 +1,17 @@
+"""Stiffness and gravity feedforward: the baseline that every feedback law has to beat."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.control.law import Controller
+from wristctl.control.model import one_segment
+
+
+def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """The torque that holds the one-segment wrist at rest at the reference: K theta_ref + G(theta_ref)."""
+    _, load = one_segment(wrist, now.theta_ref, 0.0 * now.theta_ref)
+    return load
+
+
+FEEDFORWARD = Controller(name="feedforward", law=law, source="baseline", gains={}, presets={"default": ()})

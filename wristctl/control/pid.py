@@ -1,0 +1,34 @@
+"""The paper's rival: a PID controller, E22 read as a torque (C12) with the sign that stabilises (C7)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.control.law import Controller, Gain
+from wristctl.lanes.lane import where
+
+
+def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """-(Kp e + Ki int(e) + Kd de/dt) (E22, sign C7); the integral holds while it would drive a saturated tendon on."""
+    kp, ki, kd = gains[0], gains[1], gains[2]
+    error = now.theta - now.theta_ref
+    integral = memory[0] + now.period * error
+    torque = -(kp * error + ki * integral + kd * (now.rate - now.rate_ref))
+    held = ((torque > now.torque_high) & (error < 0.0)) | ((torque < now.torque_low) & (error > 0.0))
+    memory[0] = where(held, memory[0], integral)
+    return torque
+
+
+PID = Controller(
+    name="pid",
+    law=law,
+    source="the paper, E22",
+    gains={
+        "Kp": Gain("N m/rad", "proportional gain", 1e-2, 1e4),
+        "Ki": Gain("N m/(rad s)", "integral gain", 1e-2, 1e4),
+        "Kd": Gain("N m s/rad", "derivative gain", 1e-4, 1e2),
+    },
+    presets={"printed": (1e4, 5e3, 2e3)},
+    memory=1,
+    notes={"printed": "the paper's \"crude tuning\", read as torque (C12) with the sign turned (C7)"},
+)

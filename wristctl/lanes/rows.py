@@ -1,0 +1,162 @@
+"""Rows: sequences of lanes or planar vectors, indexed like a list or, where they form a matrix, by [i, j].
+
+Rows are views of an array [row, lane] or scratch memory on the stack. Their length is part of their type where it is
+the number of segments, so that loops over segments unroll. Scratch lives as long as the function that asks for it.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.imputils import lower_builtin, lower_getattr_generic
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
+from numba.extending import intrinsic
+
+from wristctl.lanes.types import LaneType, PlaneType, RowsType, lane, plane
+
+_PAIR_OF_INDICES = numba.types.UniTuple(numba.types.intp, 2)
+
+
+def _index_type(index: types.Type) -> types.Type:
+    return _PAIR_OF_INDICES if isinstance(index, numba.types.BaseTuple) else types.intp
+
+
+@infer_global(operator.getitem)
+class _Get(AbstractTemplate):
+    def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
+        rows, index = args
+        return signature(rows.element, rows, _index_type(index)) if isinstance(rows, RowsType) else None
+
+
+@infer_global(operator.setitem)
+class _Set(AbstractTemplate):
+    def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
+        rows, index, _ = args
+        if not isinstance(rows, RowsType):
+            return None
+        return signature(types.none, rows, _index_type(index), rows.element)
+
+
+@infer_global(len)
+class _Length(AbstractTemplate):
+    def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
+        return signature(types.intp, args[0]) if isinstance(args[0], RowsType) else None
+
+
+def _address(builder: Any, rows: RowsType, pointer: Any, index: Any) -> Any:
+    if isinstance(index.type, ir.ArrayType):
+        row, column = cgutils.unpack_tuple(builder, index)
+        index = builder.add(builder.mul(row, ir.Constant(row.type, rows.columns)), column)
+    return builder.gep(pointer, [index], inbounds=True)
+
+
+def _load(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+    return builder.load(_address(builder, sig.args[0], *args), align=8)
+
+
+def _store(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+    builder.store(args[2], _address(builder, sig.args[0], *args[:2]), align=8)
+    return context.get_dummy_value()
+
+
+for _index in (types.intp, _PAIR_OF_INDICES):
+    lower_builtin(operator.getitem, RowsType, _index)(_load)
+    for _element in (LaneType, PlaneType):
+        lower_builtin(operator.setitem, RowsType, _index, _element)(_store)
+
+
+@lower_builtin(len, RowsType)
+def _length(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+    return context.get_constant(types.intp, sig.args[0].size)
+
+
+@infer_getattr
+class _Field(AttributeTemplate):
+    key = RowsType
+
+    def generic_resolve(self, rows: RowsType, name: str) -> types.Type | None:
+        return rows.element if name in rows.fields else None
+
+
+@lower_getattr_generic(RowsType)
+def _field(context: Any, builder: Any, rows: RowsType, pointer: Any, name: str) -> Any:
+    index = context.get_constant(types.intp, rows.fields.index(name))
+    return builder.load(_address(builder, rows, pointer, index), align=8)
+
+
+def rows_named(fields: tuple[str, ...]) -> Any:
+    """An intrinsic that views an array [row, lane] as rows whose first entries have these names."""
+
+    @intrinsic
+    def view(typingctx: Any, array: types.Array) -> Any:
+        return _view(RowsType(lane, None, fields=fields), array)
+
+    return view
+
+
+def _view(result: RowsType, array: types.Array) -> Any:
+    if array.dtype != types.float64 or array.layout != "C":
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        struct = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0])
+        return builder.bitcast(struct.data, sig.return_type.llvm)
+
+    return signature(result, array), codegen
+
+
+@intrinsic
+def rows_of(typingctx: Any, array: types.Array) -> Any:
+    """View a contiguous float64 array [..., row, lane] as rows of lanes."""
+    return _view(RowsType(lane, None), array)
+
+
+@intrinsic
+def part(typingctx: Any, rows: RowsType, start: types.Integer, segments: Any) -> Any:
+    """The rows from `start` on, as many as the tuple `segments` has entries."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        return builder.gep(args[0], [args[1]], inbounds=True)
+
+    return signature(RowsType(rows.element, len(segments)), rows, types.intp, segments), codegen
+
+
+@intrinsic
+def beyond(typingctx: Any, rows: RowsType, start: types.Integer) -> Any:
+    """The rows from `start` on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        return builder.gep(args[0], [args[1]], inbounds=True)
+
+    return signature(RowsType(rows.element, None), rows, types.intp), codegen
+
+
+def _scratch(result: RowsType, rows: RowsType) -> Any:
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        memory = ir.ArrayType(result.element.llvm, result.entries)
+        return builder.bitcast(cgutils.alloca_once(builder, memory), result.llvm)
+
+    return signature(result, rows), codegen
+
+
+@intrinsic
+def lanes_like(typingctx: Any, rows: RowsType) -> Any:
+    """Scratch lanes, uninitialised, as many as `rows`."""
+    return _scratch(RowsType(lane, rows.size), rows)
+
+
+@intrinsic
+def planes_like(typingctx: Any, rows: RowsType) -> Any:
+    """Scratch planar vectors, uninitialised, as many as `rows`."""
+    return _scratch(RowsType(plane, rows.size), rows)
+
+
+@intrinsic
+def square_like(typingctx: Any, rows: RowsType) -> Any:
+    """A scratch matrix of lanes, uninitialised, with a row and a column for each of `rows`."""
+    return _scratch(RowsType(lane, rows.size, columns=rows.size or 1), rows)
+

@@ -1,0 +1,1 @@
+"""Closed loops: references, the compiled rollout, trajectories and metrics."""

@@ -1,0 +1,90 @@
+"""The compiled closed loop of one block of lanes: reference -> law -> allocation -> tendons -> plant -> metrics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.functions import ARC_LIMIT
+from wristctl.lanes.lane import where
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.metrics import SUMS, gather, goals_of
+from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate, reach, torque_of
+from wristctl.wrist.integrator import step
+from wristctl.wrist.segments import load_segments
+
+RECORDED = ("theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus")
+"""Columns of a recorded sample, followed by the angle of each segment."""
+
+_ALIVE = SUMS.index("alive")
+_FIELDS = len(NOW)
+_COLUMNS = len(RECORDED)
+_SIDE = float(TENDONS_PER_SIDE)
+
+
+@compiled
+def run_block(
+    law: Any, plant: Any, model: Any, limits: Any, gains: Any, goals: Any, reference: Any, now: Any, memory: Any,
+    state: Any, sums: Any, record: Any, period: float, substeps: int, ticks: int, first: int, last: int, segments: Any,
+) -> None:  # fmt: skip
+    """Advance one block from sample `first` to `last`, `ticks` control periods each.
+
+    `reference` is [sample, (angle, rate, acceleration), lane], continued between samples by its own derivatives;
+    `state`, `memory` and `sums` carry the loop on, so that a long run may be done in pieces. `record` takes each
+    sample's values, or has no samples. A lane leaves the game when a segment bends beyond a full turn.
+    """
+    wrist = load_segments(rows_of(plant))
+    known, seen, view = load_segments(rows_of(model)), wrist_of(model), now_of(now)
+    bound, gain, goal, kept, sum_ = rows_of(limits), rows_of(gains), goals_of(goals), rows_of(memory), rows_of(sums)
+    low, high = _SIDE * bound[0], _SIDE * bound[1]
+    signals = rows_of(now)
+    n = len(segments)
+    theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
+    old_theta, old_omega = lanes_like(theta), lanes_like(theta)
+    zero = 0.0 * low
+    h = period / substeps + zero
+    for sample in range(first, last):
+        target = rows_of(reference[sample])
+        for tick in range(ticks):
+            since = tick * period
+            angle, rate = zero, zero
+            for i in range(n):
+                angle = angle + theta[i]
+                rate = rate + omega[i]
+            torque_low, torque_high = reach(angle, known, low, high)
+            signals[0] = angle
+            signals[1] = rate
+            signals[2] = target[0] + since * (target[1] + 0.5 * since * target[2])
+            signals[3] = target[1] + since * target[2]
+            signals[4] = target[2]
+            signals[5] = torque_low
+            signals[6] = torque_high
+            signals[7] = period + zero
+            wanted = law(view, seen, gain, kept)
+            plus, minus = allocate(angle, known, wanted, low, high)
+            saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
+            time = (sample * ticks + tick) * period + zero
+            gather(sum_, goal, time, angle, signals[2], plus / _SIDE, minus / _SIDE, saturated)
+            if tick == 0 and sample < record.shape[0]:
+                row = rows_of(record[sample])
+                row[0] = angle
+                row[1] = rate
+                row[2] = wanted
+                row[3] = torque_of(angle, known, plus, minus)
+                row[4] = plus / _SIDE
+                row[5] = minus / _SIDE
+                for i in range(n):
+                    row[_COLUMNS + i] = theta[i]
+            for _ in range(substeps):
+                for i in range(n):
+                    old_theta[i] = theta[i]
+                    old_omega[i] = omega[i]
+                step(wrist, theta, omega, plus, minus, h)
+                alive = sum_[_ALIVE]
+                for i in range(n):
+                    alive = where(abs(theta[i]) < ARC_LIMIT, alive, zero)
+                for i in range(n):
+                    theta[i] = where(alive > zero, theta[i], old_theta[i])
+                    omega[i] = where(alive > zero, omega[i], zero)
+                sum_[_ALIVE] = alive

@@ -1,0 +1,114 @@
+"""Rollouts: many closed loops of one controller at once, as blocks of lanes over threads."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, Controller
+from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.types import LANES
+from wristctl.simulation.kernel import RECORDED, run_block
+from wristctl.simulation.metrics import SUMS, summary
+from wristctl.simulation.reference import Motion
+from wristctl.wrist.segments import segments
+
+Array = NDArray[np.float64]
+
+_SLICE_TICKS = 200_000
+"""Control ticks between two looks at whether the user has asked to stop."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Metrics of each rollout, shape (count,), and, where recorded, its samples (count, T, columns)."""
+
+    metrics: dict[str, Array]
+    failed: NDArray[np.bool_]
+    """Rollouts whose wrist bent beyond a full turn, or not to any number at all."""
+    samples: Array | None
+
+    def column(self, name: str, rollout: int) -> Array:
+        """One recorded column of one rollout, (T,)."""
+        assert self.samples is not None
+        return self.samples[rollout, :, RECORDED.index(name)]
+
+    def segment_theta(self, rollout: int) -> Array:
+        """Angles of the plant's segments, (T, n) [rad]."""
+        assert self.samples is not None
+        return self.samples[rollout, :, len(RECORDED) :]
+
+
+def sample_period(loop: Loop) -> float:
+    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
+    return max(loop.control_period, round(1e-3 / loop.control_period) * loop.control_period)
+
+
+def rollout(
+    controller: Controller,
+    gains: Array,
+    motions: Sequence[Motion],
+    which: NDArray[np.int64],
+    loop: Loop,
+    wrist: WristParameters,
+    record: bool = False,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome:
+    """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
+
+    The plant and the controller's one-segment model both come from `wrist`; the loop says how finely the plant is cut.
+    """
+    count, n = len(gains), loop.plant_segments
+    ticks = max(1, round(sample_period(loop) / loop.control_period))
+    samples = len(motions[0].theta_ref)
+    limit = wrist.tension_limit if loop.limits else np.inf
+    fixed = [segments(wrist, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
+    plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
+    goal_rows = np.array([[m.final, abs(m.final), m.rest, m.horizon] for m in motions])[which]
+    start = np.zeros((count, len(SUMS)))
+    start[:, SUMS.index("alive")] = 1.0
+    blocks = {"gains": to_blocks(gains.reshape(count, -1)), "goals": to_blocks(goal_rows), "sums": to_blocks(start)}
+    lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
+    table = np.stack([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions], axis=-1)
+    total = len(lanes)
+    recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
+    stop, done = threading.Event(), [0] * total
+
+    def run(block: int) -> None:
+        reference = np.ascontiguousarray(table[..., lanes[block]])
+        state, memory = np.zeros((2 * n, LANES)), np.zeros((max(1, controller.memory), LANES))
+        now = np.zeros((len(NOW), LANES))
+        piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
+        for first in range(0, samples, piece):
+            if stop.is_set():
+                return
+            run_block(
+                controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block], reference,
+                now, memory, state, blocks["sums"][block], recorded[block], loop.control_period, loop.substeps, ticks,
+                first, min(first + piece, samples), (0,) * n,
+            )  # fmt: skip
+            done[block] = min(first + piece, samples)
+
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        try:
+            for future in [pool.submit(run, block) for block in range(total)]:
+                future.result()
+                if progress is not None:
+                    progress(sum(done) / (total * samples))
+        except BaseException:
+            stop.set()
+            raise
+
+    sums = to_rows(blocks["sums"], count)
+    kept = recorded.transpose(0, 3, 1, 2).reshape(total * LANES, -1, len(RECORDED) + n)[:count] if record else None
+    metrics = summary(sums, goal_rows, loop.control_period)
+    return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)

@@ -1,0 +1,82 @@
+"""Trajectories out of rollouts, and `simulate`: one closed loop from a configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.rollout import Outcome, rollout, sample_period
+from wristctl.simulation.trajectory import Trajectory, desired_errors
+from wristctl.wrist.kinematics import Inverse, arc_tip
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A trajectory with its metrics; `failed` where the wrist bent beyond a full turn."""
+
+    trajectory: Trajectory
+    metrics: dict[str, float]
+    failed: bool
+
+
+def chain_tip(segment_theta: Array, length: float) -> Array:
+    """Tip (T, 2) [m] of a chain of arcs with angles (T, n) [rad] and a total length [m] (E1)."""
+    n = segment_theta.shape[1]
+    before = np.cumsum(segment_theta, axis=1) - segment_theta
+    arcs = arc_tip(segment_theta, length / n)
+    place = (arcs[..., 0] + 1j * arcs[..., 1]) * np.exp(1j * before)
+    end = place.sum(axis=1)
+    return np.stack([end.real, end.imag], axis=-1)
+
+
+def trajectory(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Trajectory:
+    """The recorded rollout `index` as a Trajectory."""
+    angles = outcome.segment_theta(index)
+    return Trajectory(
+        label=label,
+        time=followed.time,
+        theta=outcome.column("theta", index),
+        segment_theta=angles,
+        rate=outcome.column("rate", index),
+        theta_ref=followed.theta_ref,
+        theta_desired=followed.theta_desired,
+        tip=chain_tip(angles, wrist.length),
+        tip_desired=followed.tip_desired,
+        torque_wanted=outcome.column("torque_wanted", index),
+        torque=outcome.column("torque", index),
+        tension=np.stack([outcome.column("tension_plus", index), outcome.column("tension_minus", index)], axis=-1),
+    )
+
+
+def simulation(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Simulation:
+    """The recorded rollout `index` with all its metrics."""
+    course = trajectory(outcome, index, followed, wrist, label)
+    metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
+    failed = bool(outcome.failed[index])
+    return Simulation(course, metrics | desired_errors(course) | {"outside_domain": followed.outside}, failed)
+
+
+def simulate(
+    study: Study, network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None
+) -> Simulation:
+    """Run the study's `simulate` section: one closed loop.
+
+    `network` is needed where the reference has `inverse: network`, `tuned` (gains by controller and name) where the
+    gains are `tuned`. Raises UserError for an unknown controller, preset or unreachable reference.
+    """
+    chosen = study.simulate
+    law = controller(chosen.controller)
+    gains = np.array([gains_of(law, chosen.gains, tuned)])
+    followed = motion(chosen.reference, study.wrist, chosen.horizon, sample_period(chosen.loop), network)
+    outcome = rollout(law, gains, [followed], np.zeros(1, np.int64), chosen.loop, study.wrist, record=True)
+    name = chosen.gains if isinstance(chosen.gains, str) else "given"
+    return simulation(outcome, 0, followed, study.wrist, f"{law.name}/{name}")

@@ -1,0 +1,97 @@
+"""What one rollout leaves behind, sampled on a grid of about a millisecond."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+COLUMNS: dict[str, tuple[str, str]] = {
+    "time": ("s", "time from the start of the move"),
+    "theta": ("rad", "bending angle of the last disc"),
+    "rate": ("rad/s", "its rate"),
+    "theta_ref": ("rad", "reference angle that the controller follows"),
+    "theta_desired": ("rad", "true wanted angle"),
+    "error": ("rad", "theta - theta_ref (E12)"),
+    "tip_x": ("m", "last disc's centre along the base tangent"),
+    "tip_y": ("m", "last disc's centre across"),
+    "tip_desired_x": ("m", "wanted tip position"),
+    "tip_desired_y": ("m", "wanted tip position"),
+    "torque_wanted": ("N m", "the law's torque"),
+    "torque": ("N m", "torque of the tensions on the one-segment model"),
+    "tension_plus": ("N", "tension of each tendon of the + side"),
+    "tension_minus": ("N", "tension of each tendon of the - side"),
+}
+"""Columns of a trajectory's table with unit and meaning; the segments' angles theta_1 ... theta_n [rad] follow."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One closed loop over time: T samples, n plant segments; SI units."""
+
+    label: str
+    """controller/gains, for example smc/exchanged"""
+    time: Array
+    theta: Array
+    """Bending angle of the last disc, the sum of the segments' angles, (T,)."""
+    segment_theta: Array
+    """(T, n)"""
+    rate: Array
+    theta_ref: Array
+    theta_desired: Array
+    """True wanted angle, (T,); differs from theta_ref by the network's own error."""
+    tip: Array
+    """(T, 2)"""
+    tip_desired: Array
+    """(T, 2)"""
+    torque_wanted: Array
+    torque: Array
+    """Torque of the commanded tensions on the controller's one-segment model, (T,)."""
+    tension: Array
+    """Per tendon of the + and the - side, (T, 2)."""
+
+    @property
+    def error(self) -> Array:
+        """e = theta - theta_ref (E12), (T,)."""
+        return self.theta - self.theta_ref
+
+    def frame(self) -> pd.DataFrame:
+        """Everything as a table with the columns of COLUMNS."""
+        import pandas as pd
+
+        columns = {
+            "time": self.time,
+            "theta": self.theta,
+            "rate": self.rate,
+            "theta_ref": self.theta_ref,
+            "theta_desired": self.theta_desired,
+            "error": self.error,
+            "tip_x": self.tip[:, 0],
+            "tip_y": self.tip[:, 1],
+            "tip_desired_x": self.tip_desired[:, 0],
+            "tip_desired_y": self.tip_desired[:, 1],
+            "torque_wanted": self.torque_wanted,
+            "torque": self.torque,
+            "tension_plus": self.tension[:, 0],
+            "tension_minus": self.tension[:, 1],
+        }
+        columns |= {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
+        return pd.DataFrame(columns)
+
+
+def desired_errors(trajectory: Trajectory) -> dict[str, float]:
+    """RMSE against the true wanted angle [rad]; RMSE and last-10 % mean of the tip's distance from its goal [mm]."""
+    distance = np.linalg.norm(trajectory.tip - trajectory.tip_desired, axis=1)
+    late = distance[-max(1, len(distance) // 10) :]
+    return {
+        "rmse_desired": float(np.sqrt(np.mean((trajectory.theta - trajectory.theta_desired) ** 2))),
+        "tip_rmse_mm": 1e3 * float(np.sqrt(np.mean(distance**2))),
+        "tip_steady_mm": 1e3 * float(late.mean()),
+    }

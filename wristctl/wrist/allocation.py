@@ -1,0 +1,40 @@
+"""From a wanted torque to tensions of an antagonistic pair ("force" and "f2" of E10).
+
+One side pulls, the other keeps its pretension. Both sides' pulls compress the arc, so both arms count.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.functions import clip
+from wristctl.lanes.lane import where
+from wristctl.wrist.tendons import moment_arms
+
+TENDONS_PER_SIDE = 2
+"""Each of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5)."""
+
+
+@compiled
+def reach(theta: Any, wrist: Any, low: Any, high: Any) -> Any:
+    """Least and largest torque [N m] at theta with both sides' pulls between low and high [N]."""
+    plus, minus = moment_arms(theta, wrist)
+    return plus * low + minus * high, plus * high + minus * low
+
+
+@compiled
+def allocate(theta: Any, wrist: Any, torque: Any, low: Any, high: Any) -> Any:
+    """Pulls of the + and the - side [N] that give the torque nearest to the wanted one, with one side at `low`."""
+    plus, minus = moment_arms(theta, wrist)
+    forward = torque > (plus + minus) * low
+    pull_plus = where(forward, (torque - minus * low) / plus, low)
+    pull_minus = where(forward, low, (torque - plus * low) / minus)
+    return clip(pull_plus, low, high), clip(pull_minus, low, high)
+
+
+@compiled
+def torque_of(theta: Any, wrist: Any, plus: Any, minus: Any) -> Any:
+    """Torque [N m] of both sides' pulls [N] on the one-segment wrist ("force": A_b F_t)."""
+    arm_plus, arm_minus = moment_arms(theta, wrist)
+    return arm_plus * plus + arm_minus * minus

@@ -1,0 +1,89 @@
+"""The fast form of the dynamics (E6): point masses at chord middles and a hand on the last tangent.
+
+With p_k the place of mass k and J_ki its derivative by theta_i, the motion obeys
+
+    r_i = sum_k J_ki . (m_k (p_k'' - g)) - J_tip,i . F + D theta_i' + K theta_i - tau_i = 0.
+
+Planar vectors are complex numbers: i v turns v by 90 degrees. Beyond segment i everything turns rigidly about
+Q_i = P_i + i z_i' (P_i the segment's end, z_i' its chord's derivative), so J_ki = i (p_k - Q_i), and sums over the
+masses beyond a segment give M and both Jacobians of r in O(n^2).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import dot, planar, turn
+from wristctl.lanes.rows import planes_like
+from wristctl.wrist.arcs import chords
+from wristctl.wrist.tendons import tendon_torque
+
+
+@compiled
+def mass_matrix(segment: Any, z: Any, dz: Any, tangent: Any, mass: Any) -> None:
+    """M = sum m J^T J (E7) into `mass`, from the chords and the last tangent."""
+    end = planes_like(z)
+    end[0] = z[0]
+    for k in range(1, len(z)):
+        end[k] = end[k - 1] + z[k]
+    # zeroth, first and second moment of the masses beyond segment j
+    m0 = segment.hand_mass
+    place = end[len(z) - 1] + segment.hand_offset * tangent
+    m1 = m0 * place
+    m2 = m0 * dot(place, place)
+    for j in range(len(z) - 1, -1, -1):
+        q_j = end[j] + turn(dz[j])
+        middle = end[j] + -0.5 * z[j]
+        own = 0.5 * segment.mass * dz[j]
+        mass[j, j] = m2 - 2.0 * dot(q_j, m1) + m0 * dot(q_j, q_j) + 0.5 * dot(own, dz[j])
+        for i in range(j):
+            q_i = end[i] + turn(dz[i])
+            beyond = m2 - dot(q_i + q_j, m1) + m0 * dot(q_i, q_j)
+            mass[i, j] = beyond + dot(own, turn(middle - q_i))
+            mass[j, i] = mass[i, j]
+        m0 = m0 + segment.mass
+        m1 = m1 + segment.mass * middle
+        m2 = m2 + segment.mass * dot(middle, middle)
+
+
+@compiled
+def residual(
+    segment: Any, omega: Any, acceleration: Any, z: Any, dz: Any, d2z: Any, tangent: Any, plus: Any, minus: Any,
+    theta: Any, r: Any,
+) -> None:
+    """r of the module's equation, by Newton and Euler: forces outward to tip, torques back to base."""
+    force = planes_like(z)
+    weight = planar(segment.gravity_x, segment.gravity_y)
+    spin = 0.0 * segment.length
+    spin_rate = spin
+    a = planar(spin, spin)
+    for k in range(len(z)):
+        w = omega[k]
+        turning = planar(-spin * spin, spin_rate) * z[k] + planar(acceleration[k], 2.0 * spin * w) * dz[k]
+        bent = turning + w * w * d2z[k]
+        force[k] = segment.mass * (a + 0.5 * bent - weight)
+        a = a + bent
+        spin = spin + w
+        spin_rate = spin_rate + acceleration[k]
+    hand = segment.hand_offset * tangent
+    beyond = segment.hand_mass * (a + planar(-spin * spin, spin_rate) * hand - weight)
+    torque = dot(turn(hand), beyond)
+    beyond = beyond - planar(segment.force_x, segment.force_y)
+    for k in range(len(z) - 1, -1, -1):
+        pull, _ = tendon_torque(theta[k], segment, plus, minus)
+        passive = segment.stiffness * theta[k] + segment.damping * omega[k] - pull
+        r[k] = torque + dot(dz[k], beyond + 0.5 * force[k]) + passive
+        torque = torque + dot(turn(z[k]), beyond + 0.5 * force[k])
+        beyond = beyond + force[k]
+
+
+@compiled
+def equation_of_motion(
+    segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, zero: Any, mass: Any, bias: Any
+) -> None:
+    """M and the remaining terms of E6, so that M theta'' + bias = 0; `zero` holds n zeros."""
+    z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+    tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    mass_matrix(segment, z, dz, tangent, mass)
+    residual(segment, omega, zero, z, dz, d2z, tangent, plus, minus, theta, bias)

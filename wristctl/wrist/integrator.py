@@ -1,0 +1,94 @@
+"""One step of RODAS3 on the wrist, with the exact Jacobian.
+
+RODAS3 (Sandu et al., Atmospheric Environment 31 (1997) 3459): Rosenbrock, four stages, third order, stiffly
+accurate, L-stable, so that the fast modes of the light chord masses (1e4-1e5 1/s) need no small step. For a second
+order system the 2n equations of each stage reduce to n:
+
+    (M/(h gamma) + dr/d(rate) + h gamma dr/d(theta)) k_rate = M R_rate - h gamma dr/d(theta) R_theta,
+    k_theta = h gamma (R_theta + k_rate).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import lanes_like, planes_like, square_like
+from wristctl.wrist.arcs import chords
+from wristctl.wrist.dynamics import equation_of_motion, mass_matrix, residual
+from wristctl.wrist.jacobian import residual_jacobians
+from wristctl.wrist.linear import factorise, solve
+
+
+@compiled
+def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any, k_theta: Any, k_rate: Any) -> None:
+    n = len(r_theta)
+    for i in range(n):
+        total = 0.0 * hg
+        for j in range(n):
+            total = total + mass[i, j] * r_rate[j] - hg * by_theta[i, j] * r_theta[j]
+        k_rate[i] = total
+    solve(lu, n, k_rate)
+    for i in range(n):
+        k_theta[i] = hg * (r_theta[i] + k_rate[i])
+
+
+@compiled
+def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) -> None:
+    """Advance angles and rates by h [s] with the tendons' pulls [N] held."""
+    n = len(theta)
+    hg = 0.5 * h
+    z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+    mass, other_mass, lu, by_theta = square_like(theta), square_like(theta), square_like(theta), square_like(theta)
+    zero, a0, a = lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    k1, l1, k2, l2 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    k3, l3, k4, l4 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    for i in range(n):
+        zero[i] = 0.0 * h
+
+    tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    mass_matrix(segment, z, dz, tangent, mass)
+    residual(segment, omega, zero, z, dz, d2z, tangent, plus, minus, theta, a0)
+    for i in range(n):
+        a0[i] = -a0[i]
+        for j in range(n):
+            other_mass[i, j] = mass[i, j]
+    factorise(other_mass, n)
+    solve(other_mass, n, a0)
+    residual_jacobians(segment, theta, omega, a0, z, dz, d2z, d3z, tangent, plus, minus, by_theta, lu)
+    for i in range(n):
+        for j in range(n):
+            lu[i, j] = mass[i, j] / hg + lu[i, j] + hg * by_theta[i, j]
+    factorise(lu, n)
+
+    _stage(mass, by_theta, lu, hg, omega, a0, k1, l1)
+    for i in range(n):
+        r_theta[i] = omega[i] + 4.0 / h * k1[i]
+        r_rate[i] = a0[i] + 4.0 / h * l1[i]
+    _stage(mass, by_theta, lu, hg, r_theta, r_rate, k2, l2)
+
+    for i in range(n):
+        at[i] = theta[i] + 2.0 * k1[i]
+        rate[i] = omega[i] + 2.0 * l1[i]
+    equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
+    factorise(other_mass, n)
+    solve(other_mass, n, a)
+    for i in range(n):
+        r_theta[i] = rate[i] + (k1[i] - k2[i]) / h
+        r_rate[i] = -a[i] + (l1[i] - l2[i]) / h
+    _stage(mass, by_theta, lu, hg, r_theta, r_rate, k3, l3)
+
+    for i in range(n):
+        at[i] = at[i] + k3[i]
+        rate[i] = rate[i] + l3[i]
+    equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
+    factorise(other_mass, n)
+    solve(other_mass, n, a)
+    for i in range(n):
+        r_theta[i] = rate[i] + (k1[i] - k2[i] - 8.0 / 3.0 * k3[i]) / h
+        r_rate[i] = -a[i] + (l1[i] - l2[i] - 8.0 / 3.0 * l3[i]) / h
+    _stage(mass, by_theta, lu, hg, r_theta, r_rate, k4, l4)
+    for i in range(n):
+        theta[i] = at[i] + k4[i]
+        omega[i] = rate[i] + l4[i]

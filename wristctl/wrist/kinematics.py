@@ -1,0 +1,95 @@
+"""One constant-curvature arc in the plane (E1), its inverse, and both along paths; NumPy, any batch shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TipPath:
+    """Wanted tip positions on a time grid of T samples."""
+
+    position: Array
+    """(T, 2) [m]"""
+    velocity: Array
+    """(T, 2) [m/s]"""
+    acceleration: Array
+    """(T, 2) [m/s^2]"""
+
+
+@dataclass(frozen=True)
+class AnglePath:
+    """The bending angles that an inverse gives for a tip path."""
+
+    theta: Array
+    """(T,) [rad]"""
+    rate: Array
+    """(T,) [rad/s]"""
+    acceleration: Array
+    """(T,) [rad/s^2]"""
+    outside: NDArray[np.bool_]
+    """(T,) true where the tip lies outside the inverse's domain, so that its angle means nothing"""
+
+
+Inverse = Callable[[TipPath], AnglePath]
+"""From tip positions to bending angles: the exact inverse or a network."""
+
+
+def arc_tip(theta: Array, length: Array | float) -> Array:
+    """Tip of an arc of angle theta [rad] and length [m], (..., 2) [m]: l sin(x)/x (cos x, sin x) with x = theta/2."""
+    chord = length * np.sinc(theta / (2.0 * np.pi))
+    return np.stack([chord * np.cos(0.5 * theta), chord * np.sin(0.5 * theta)], axis=-1)
+
+
+def exact_angle(tip: Array) -> Array:
+    """Bending angle [rad] of the arc from the base to each tip (..., 2) [m]; shape (...), in (-2 pi, 2 pi]."""
+    angle: Array = 2.0 * np.arctan2(tip[..., 1], tip[..., 0])
+    return angle
+
+
+def exact_arc(tip: Array) -> tuple[Array, Array]:
+    """Bending angle [rad] and arc length [m] of the arc from the base to each tip (..., 2) [m]; shapes (...)."""
+    theta = exact_angle(tip)
+    with np.errstate(divide="ignore", invalid="ignore"):  # straight back: a full circle has no chord
+        length = np.hypot(tip[..., 0], tip[..., 1]) / np.sinc(theta / (2.0 * np.pi))
+    return theta, length
+
+
+def exact_inverse(path: TipPath) -> AnglePath:
+    """Angles of a tip path with their exact derivatives; the base itself (0, 0) has none and is flagged."""
+    (x, y), (dx, dy), (ddx, ddy) = path.position.T, path.velocity.T, path.acceleration.T
+    square = x * x + y * y
+    with np.errstate(divide="ignore", invalid="ignore"):
+        half_rate = (x * dy - y * dx) / square
+        half_acceleration = (x * ddy - y * ddx - 2.0 * half_rate * (x * dx + y * dy)) / square
+    return AnglePath(exact_angle(path.position), 2.0 * half_rate, 2.0 * half_acceleration, square == 0.0)
+
+
+def arc_path(theta: Array, length: Array) -> TipPath:
+    """Tips of an arc whose angle and length move; rows of both are value, rate and acceleration, (3, T)."""
+    (q, dq, ddq), (r, dr, ddr) = theta, length[..., None]
+    f, df, ddf = _unit_arc(q)
+    dq, ddq = dq[:, None], ddq[:, None]
+    return TipPath(
+        position=r * f,
+        velocity=dr * f + r * dq * df,
+        acceleration=ddr * f + 2.0 * dr * dq * df + r * (ddq * df + dq**2 * ddf),
+    )
+
+
+def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
+    """Tip of the unit arc, the integral of exp(i theta s) over s in [0, 1], and two derivatives, each (T, 2).
+
+    By Gauss-Legendre quadrature: to rounding for |theta| <= 2 pi, and nothing special at 0.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    s, w = 0.5 * (nodes + 1.0), 0.5 * weights
+    wave = np.exp(1j * theta[:, None] * s)
+    f, df, ddf = (wave @ (w * (1j * s) ** k) for k in range(3))
+    return tuple(np.stack([v.real, v.imag], axis=-1) for v in (f, df, ddf))  # type: ignore[return-value]

@@ -1,0 +1,157 @@
+"""The compiled model for arrays: states in, terms of E6 out; shapes (..., n), SI units.
+
+`parameters` is one value per field of Segments, shape (12,) or (..., 12), as `segments` makes it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import dot, planar
+from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
+from wristctl.wrist import tendons
+from wristctl.wrist.arcs import chords, tip
+from wristctl.wrist.dynamics import equation_of_motion, residual
+from wristctl.wrist.integrator import step
+from wristctl.wrist.jacobian import residual_jacobians
+from wristctl.wrist.segments import load_segments
+
+Array = NDArray[np.float64]
+
+
+class Terms(NamedTuple):
+    """Terms of E6 at a state, and the tendons of each segment; batch shape (...) before the shapes given here."""
+
+    tip: Array
+    """x, y [m] of the last disc and its angle [rad]: (..., 3)."""
+    mass: Array
+    """M, (..., n, n) [kg m^2]."""
+    bias: Array
+    """Coriolis, centrifugal and gravity terms less external force's, without springs, dampers, tendons: (..., n)."""
+    tendon_lengths: Array
+    """+ and - side, (..., n, 2) [m]."""
+    moment_arms: Array
+    """+ and - side, minus the derivative of the length, (..., n, 2) [m]."""
+
+
+@compiled
+def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
+    for block in range(states.shape[0]):
+        segment = load_segments(rows_of(parameters[block]))
+        state, result = rows_of(states[block]), rows_of(out[block])
+        n = len(segments)
+        theta, omega = part(state, 0, segments), part(state, n, segments)
+        zero, bias, mass = lanes_like(theta), lanes_like(theta), square_like(theta)
+        for i in range(n):
+            zero[i] = 0.0 * theta[i]
+        equation_of_motion(segment, theta, omega, zero[0], zero[0], zero, mass, bias)
+        position, _ = tip(theta, segment.length)
+        result[0] = dot(position, planar(1.0 + zero[0], zero[0]))
+        result[1] = dot(position, planar(zero[0], 1.0 + zero[0]))
+        angle = zero[0]
+        for i in range(n):
+            angle = angle + theta[i]
+            result[3 + i] = bias[i] - segment.stiffness * theta[i] - segment.damping * omega[i]
+            length_plus, length_minus = tendons.lengths(theta[i], segment)
+            arm_plus, arm_minus = tendons.moment_arms(theta[i], segment)
+            result[3 + n + 4 * i] = length_plus
+            result[4 + n + 4 * i] = length_minus
+            result[5 + n + 4 * i] = arm_plus
+            result[6 + n + 4 * i] = arm_minus
+            for j in range(n):
+                result[3 + 5 * n + n * i + j] = mass[i, j]
+        result[2] = angle
+
+
+def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
+    """Terms of E6 at angles and rates of shape (..., n)."""
+    theta, omega = np.broadcast_arrays(np.asarray(theta, float), np.asarray(omega, float))
+    *batch, n = theta.shape
+    states = np.concatenate([theta, omega], axis=-1).reshape(-1, 2 * n)
+    blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
+    out = np.empty((len(blocks), 3 + 5 * n + n * n, blocks.shape[-1]))
+    _terms(each, blocks, out, (0,) * n)
+    rows = to_rows(out, len(states)).reshape(*batch, -1)
+    tendon = rows[..., 3 + n : 3 + 5 * n].reshape(*batch, n, 2, 2)
+    mass = rows[..., 3 + 5 * n :].reshape(*batch, n, n)
+    return Terms(rows[..., :3], mass, rows[..., 3 : 3 + n], tendon[..., 0, :], tendon[..., 1, :])
+
+
+@compiled
+def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
+    for block in range(states.shape[0]):
+        segment = load_segments(rows_of(parameters[block]))
+        state, result = rows_of(states[block]), rows_of(out[block])
+        n = len(segments)
+        theta, omega = part(state, 0, segments), part(state, n, segments)
+        acceleration, pulls = part(state, 2 * n, segments), beyond(state, 3 * n)
+        z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+        by_theta, by_rate, r = square_like(theta), square_like(theta), lanes_like(theta)
+        tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+        plus, minus = pulls[0], pulls[1]
+        residual(segment, omega, acceleration, z, dz, d2z, tangent, plus, minus, theta, r)
+        residual_jacobians(
+            segment, theta, omega, acceleration, z, dz, d2z, d3z, tangent, plus, minus, by_theta, by_rate
+        )
+        for i in range(n):
+            result[i] = r[i]
+            for j in range(n):
+                result[n + n * i + j] = by_theta[i, j]
+                result[n + n * n + n * i + j] = by_rate[i, j]
+
+
+def linearised(
+    parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike, acceleration: ArrayLike, pulls: ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Residual r of the equation of motion (..., n) and its derivatives by theta and by rate (..., n, n).
+
+    `pulls` are the two sides' total tensions [N], shape (..., 2).
+    """
+    theta, omega, acceleration = np.broadcast_arrays(theta, omega, acceleration)
+    *batch, n = theta.shape
+    pulls = np.broadcast_to(pulls, (*batch, 2))
+    states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
+    blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
+    out = np.empty((len(blocks), n + 2 * n * n, blocks.shape[-1]))
+    _linearised(each, blocks, out, (0,) * n)
+    rows = to_rows(out, len(states)).reshape(*batch, -1)
+    r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
+    return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
+
+
+@compiled
+def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segments: Any) -> None:
+    segment, pull = load_segments(rows_of(parameters)), rows_of(pulls)
+    n = len(segments)
+    for sample in range(steps.shape[0]):
+        state = rows_of(out[sample + 1])
+        before = rows_of(out[sample])
+        for i in range(2 * n):
+            state[i] = before[i]
+        theta, omega = part(state, 0, segments), part(state, n, segments)
+        for _ in range(steps[sample]):
+            step(segment, theta, omega, pull[0], pull[1], h + 0.0 * pull[0])
+
+
+def integrate(
+    parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike, pulls: ArrayLike, times: ArrayLike, h: float = 1e-3
+) -> tuple[Array, Array]:
+    """Motion from one state under held pulls [N] of the two sides: angles and rates (T, n) at the given times [s].
+
+    Steps of h; every time must be a whole number of steps.
+    """
+    counts = np.rint(np.asarray(times, float) / h).astype(np.int64)
+    if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
+        raise ValueError(f"times must be whole numbers of steps of {h} s")
+    n = len(np.atleast_1d(theta))
+    state = to_blocks(np.concatenate([np.atleast_1d(theta), np.atleast_1d(omega)]).astype(float)[None])
+    out = np.empty((len(counts) + 1, 2 * n, state.shape[-1]))
+    out[0] = state[0]
+    each = to_blocks(np.asarray(parameters, float)[None])[0]
+    _integrate(each, to_blocks(np.asarray(pulls, float)[None])[0], h, np.diff(counts, prepend=0), out, (0,) * n)
+    return out[1:, :n, 0], out[1:, n:, 0]

@@ -1,0 +1,60 @@
+"""The n-segment wrist as the compiled model sees it: one row of lanes per parameter."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.compiled import compiled
+
+
+class Segments(NamedTuple):
+    """Parameters of a wrist of n equal segments, in this order in memory; SI units."""
+
+    length: Any
+    mass: Any
+    hand_mass: Any
+    hand_offset: Any
+    gravity_x: Any
+    gravity_y: Any
+    tendon_offset: Any
+    spans: Any
+    stiffness: Any
+    damping: Any
+    force_x: Any
+    force_y: Any
+
+
+@compiled
+def load_segments(rows: Any) -> Any:
+    """Segments of lanes from rows of lanes."""
+    return Segments(
+        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10], rows[11]
+    )
+
+
+def segments(wrist: WristParameters, n: int, force: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float64]:
+    """The wrist cut into n equal segments: springs in series, so each has n times the stiffness and damping.
+
+    `force` is an external force at the tip [N] in base axes. Returns one value for each field of Segments.
+    """
+    return np.array(
+        Segments(
+            length=wrist.length / n,
+            mass=wrist.mass / n,
+            hand_mass=wrist.hand_mass,
+            hand_offset=wrist.hand_offset,
+            gravity_x=wrist.gravity[0],
+            gravity_y=wrist.gravity[1],
+            tendon_offset=wrist.tendon_offset,
+            spans=(wrist.discs - 1) / n,
+            stiffness=wrist.stiffness * n,
+            damping=wrist.damping * n,
+            force_x=force[0],
+            force_y=force[1],
+        ),
+        dtype=np.float64,
+    )
