@@ -11,10 +11,19 @@ from wristctl.config.section import Section, choice, quantity
 Inverse = Literal["none", "exact", "network"]
 
 
+class Plant(Section):
+    """How the simulated wrist differs from the one that its controller knows."""
+
+    stiffness_scale: float = quantity(1.0, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
+    damping_scale: float = quantity(1.0, "", "damping over the controller's", gt=0)
+    payload: float = quantity(0.0, "kg", "mass added to the hand, which the controller does not know", ge=0)
+
+
 class Loop(Section):
     """The plant and the timing. Controllers always see one segment (E13: a scalar input)."""
 
     plant_segments: int = choice(4, "constant-curvature segments of the simulated wrist", "assumed", ge=1, le=8)
+    plant: Plant = Plant()
     control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
     substeps: int = choice(1, "integration steps within one control period", ge=1, le=1000)
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")

@@ -10,8 +10,10 @@ from wristctl.control.feedforward import FEEDFORWARD
 from wristctl.control.law import Controller
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
+from wristctl.control.smc_tracking import SMC_TRACKING
+from wristctl.control.super_twisting import SUPER_TWISTING
 
-CONTROLLERS: dict[str, Controller] = {c.name: c for c in (SMC, PID, FEEDFORWARD, COMPUTED_TORQUE)}
+CONTROLLERS: dict[str, Controller] = {c.name: c for c in (SMC, PID, SMC_TRACKING, SUPER_TWISTING, FEEDFORWARD, COMPUTED_TORQUE)}
 
 
 def controller(name: str) -> Controller:

@@ -18,6 +18,7 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.types import LANES
 from wristctl.simulation.kernel import RECORDED, run_block
 from wristctl.simulation.metrics import SUMS, summary
+from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion
 from wristctl.wrist.segments import segments
 
@@ -65,13 +66,13 @@ def rollout(
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
-    The plant and the controller's one-segment model both come from `wrist`; the loop says how finely the plant is cut.
+    The controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut and how it differs.
     """
     count, n = len(gains), loop.plant_segments
     ticks = max(1, round(sample_period(loop) / loop.control_period))
     samples = len(motions[0].theta_ref)
     limit = wrist.tension_limit if loop.limits else np.inf
-    fixed = [segments(wrist, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
+    fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
     goal_rows = np.array([[m.final, abs(m.final), m.rest, m.horizon] for m in motions])[which]
     start = np.zeros((count, len(SUMS)))
