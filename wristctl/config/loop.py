@@ -33,7 +33,7 @@ class Reference(Section):
     """The wanted motion, from rest and straight: a step or a minimum-jerk move to an angle or a tip position."""
 
     kind: Literal["step", "minimum-jerk"] = choice("minimum-jerk", "shape of the move")
-    angle_deg: float | None = quantity(None, "deg", "wanted bending angle at the end; 30 deg where no target is given", "paper")
+    angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
     duration: float = quantity(1.0, "s", "duration of a minimum-jerk move", "assumed", gt=0)
     inverse: Inverse = choice(

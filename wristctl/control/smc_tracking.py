@@ -1,4 +1,4 @@
-"""A sliding mode controller that tracks: integral sliding surface on the error, reference fed forward, boundary layer."""
+"""Sliding mode control that tracks: integral surface on the error, reference fed forward, boundary layer."""
 
 from __future__ import annotations
 
