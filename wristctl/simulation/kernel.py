@@ -15,12 +15,13 @@ from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments
 
 RECORDED = ("theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus")
-"""Columns of a recorded sample, followed by the angle of each segment."""
+"""Columns of a recorded sample, followed by the angle of each segment. theta is nan where the lane has failed."""
 
 _ALIVE = SUMS.index("alive")
 _FIELDS = len(NOW)
 _COLUMNS = len(RECORDED)
 _SIDE = float(TENDONS_PER_SIDE)
+_NAN = float("nan")
 
 
 @compiled
@@ -68,7 +69,7 @@ def run_block(
             gather(sum_, goal, time, angle, signals[2], plus / _SIDE, minus / _SIDE, saturated)
             if tick == 0 and sample < record.shape[0]:
                 row = rows_of(record[sample])
-                row[0] = angle
+                row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
                 row[1] = rate
                 row[2] = wanted
                 row[3] = torque_of(angle, known, plus, minus)

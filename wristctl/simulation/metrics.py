@@ -23,11 +23,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metric:
-    """What a number means: unit, formula, and whether less is better."""
+    """What a number means; of all of them less is better."""
 
     unit: str
     formula: str
-    better: str = "lower"
 
 
 METRICS: dict[str, Metric] = {

@@ -60,13 +60,15 @@ def rollout(
     which: NDArray[np.int64],
     loop: Loop,
     wrist: WristParameters,
+    start: Array | None = None,
     record: bool = False,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
-    The controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut and how it differs.
+    They begin at rest with the segments' angles `start` (n,), straight where none is given. The controller's
+    one-segment model comes from `wrist`; the loop says how finely the plant is cut and how it differs.
     """
     count, n = len(gains), loop.plant_segments
     ticks = max(1, round(sample_period(loop) / loop.control_period))
@@ -75,9 +77,11 @@ def rollout(
     fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
     goal_rows = np.array([[m.final, abs(m.final), m.rest, m.horizon] for m in motions])[which]
-    start = np.zeros((count, len(SUMS)))
-    start[:, SUMS.index("alive")] = 1.0
-    blocks = {"gains": to_blocks(gains.reshape(count, -1)), "goals": to_blocks(goal_rows), "sums": to_blocks(start)}
+    sums_at_start = np.zeros((count, len(SUMS)))
+    sums_at_start[:, SUMS.index("alive")] = 1.0
+    still = np.concatenate([np.zeros(n) if start is None else start, np.zeros(n)])
+    rows = {"gains": gains.reshape(count, -1), "goals": goal_rows, "sums": sums_at_start}
+    blocks = {name: to_blocks(values) for name, values in rows.items()}
     lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
     table = np.stack([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions], axis=-1)
     total = len(lanes)
@@ -86,7 +90,7 @@ def rollout(
 
     def run(block: int) -> None:
         reference = np.ascontiguousarray(table[..., lanes[block]])
-        state, memory = np.zeros((2 * n, LANES)), np.zeros((max(1, controller.memory), LANES))
+        state, memory = np.repeat(still[:, None], LANES, axis=1), np.zeros((max(1, controller.memory), LANES))
         now = np.zeros((len(NOW), LANES))
         piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
         for first in range(0, samples, piece):
