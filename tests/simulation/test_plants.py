@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.loop import Loop, Plant, Reference
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Plant, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.simulation.reference import motion
@@ -55,9 +56,13 @@ def test_a_plant_rests_where_the_wrist_of_its_own_parameters_rests(plant: Plant)
     assert outcome.column("theta", 0)[-1] == pytest.approx(equilibrium(its_own, 4, tensions).sum(), abs=1e-4)
 
 
+WORST = Loop(plant=UNKNOWN["softer"], sensor=Sensor(level="camera"), actuator=Actuator(level="tendon"))
+
+
+@pytest.mark.parametrize("loop", [Loop(plant=UNKNOWN["loaded"]), WORST], ids=["loaded", "camera and tendons"])
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-def test_tensions_stay_finite_and_within_limits_for_any_gains_in_the_box(name: str) -> None:
-    chosen, loop = controller(name), Loop(plant=UNKNOWN["loaded"])
+def test_commands_stay_finite_and_within_limits_for_any_gains_in_the_box(name: str, loop: Loop) -> None:
+    chosen = controller(name)
     rng = np.random.default_rng(1)
     box = np.log10([[g.low, g.high] for g in chosen.gains.values()]).reshape(-1, 2)
     gains = 10.0 ** rng.uniform(box[:, 0], box[:, 1], (80, len(box)))

@@ -27,7 +27,7 @@ class Push(Section):
 class Drift(Section):
     """Stiffness that changes linearly in time, then stays."""
 
-    scale: float = quantity(0.8, "", "stiffness at the end over that at the start", "paper: springs lose stiffness", gt=0)
+    scale: float = quantity(0.8, "", "final stiffness over the first", "paper: springs lose stiffness", gt=0)
     start: float = quantity(0.0, "s", "time at which it begins", "assumed", ge=0)
     duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
 
@@ -41,7 +41,7 @@ class Disturbances(Section):
 
 
 class Actuator(Section):
-    """Motors and tendons. ideal: tension = command; lagged: first-order lag in steps; tendon: stepper and elastic tendon."""
+    """Motors and tendons. ideal: tension = command; lagged: first-order lag, in steps; tendon: stepper, elastic."""
 
     level: Literal["ideal", "lagged", "tendon"] = choice("ideal", "how much of motors and tendons is simulated")
     lag: float = quantity(5e-3, "s", "time constant of the motor's force (lagged)", "assumed", gt=0)
@@ -68,5 +68,5 @@ class Sensor(Section):
     noise_deg: float = quantity(0.1, "deg", "standard deviation of the angle", "measured on rendered markers", ge=0)
     dropped: float = quantity(0.05, "", "share of frames without a result", "assumed", ge=0, lt=1)
     seed: int = choice(0, "stream of noise and dropped frames", ge=0)
-    torque_noise: float = quantity(0.02, "N m s^0.5", "observer: white torque that its model does not know", gt=0)
-    load_drift: float = quantity(0.5, "N m/s^0.5", "observer: random walk of the load that it estimates", gt=0)
+    torque_noise: float = quantity(5e-4, "N m s^0.5", "observer: white torque that its model does not know", gt=0)
+    load_drift: float = quantity(0.03, "N m/s^0.5", "observer: random walk of the load that it estimates", gt=0)

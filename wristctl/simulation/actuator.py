@@ -80,10 +80,11 @@ def _lag(drive: Any, state: Any, side: int, command: Any, h: float) -> Any:
 def _reel(drive: Any, state: Any, side: int, target: Any, h: float) -> Any:
     """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps."""
     gap = target - state[side]
-    most = minimum(sqrt(2.0 * drive.acceleration * abs(gap)), drive.speed + 0.0 * gap)
-    wanted = minimum(most, abs(gap) / h)
-    wanted = where(gap < 0.0, -wanted, wanted)
     change = drive.acceleration * h
+    # the speed v from which one more period and then braking stay within the gap: v^2/(2 a) + h v = |gap|
+    stopping = sqrt(change * change + 2.0 * drive.acceleration * abs(gap)) - change
+    wanted = minimum(stopping, drive.speed + 0.0 * gap)
+    wanted = where(gap < 0.0, -wanted, wanted)
     speed = clip(wanted, state[side + 1] - change, state[side + 1] + change)
     state[side + 1] = speed
     state[side] = state[side] + h * speed

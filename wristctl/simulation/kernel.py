@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.law import now_of, wrist_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
@@ -20,11 +20,13 @@ from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate, reach, torque_
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments
 
-RECORDED = ("theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus")
-"""Columns of a recorded sample, followed by the angle of each segment. theta is nan where the lane has failed."""
+RECORDED = (
+    "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
+)  # fmt: skip
+"""Columns of a recorded sample, followed by the angle of each segment: tensions as commanded and as they act, and the
+angle that the law sees. theta is nan where the lane has failed."""
 
 _ALIVE = SUMS.index("alive")
-_FIELDS = len(NOW)
 _COLUMNS = len(RECORDED)
 _SIDE = float(TENDONS_PER_SIDE)
 _NAN = float("nan")

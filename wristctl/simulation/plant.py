@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wristctl.config.loop import Plant
+from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
 
 

@@ -82,7 +82,7 @@ def rollout(
     limit = wrist.tension_limit if loop.limits else np.inf
     fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
-    goal_rows = np.array([[m.final, abs(m.final), m.rest, m.horizon] for m in motions])[which]
+    goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
     sums_at_start = np.zeros((count, len(SUMS)))
     sums_at_start[:, SUMS.index("alive")] = 1.0
     rows = {"gains": gains.reshape(count, -1), "goals": goal_rows, "sums": sums_at_start}
