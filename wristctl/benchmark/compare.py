@@ -45,10 +45,19 @@ class Result:
 
 def reference_name(reference: Reference) -> str:
     """A short name: kind, duration and target."""
+    if reference.kind == "tip-path":
+        return f"tip path {reference.duration:g} s {' '.join(_millimetres(tip) for tip in reference.tips)}"
+    if reference.kind == "multi-step":
+        return f"steps {reference.duration:g} s {' '.join(f'{angle:g}' for angle in reference.angles_deg)} deg"
     target = f"{30.0 if reference.angle_deg is None else reference.angle_deg:g} deg"
     if reference.tip is not None:
-        target = f"tip {1e3 * reference.tip[0]:.3g}, {1e3 * reference.tip[1]:.3g} mm"
-    return f"step {target}" if reference.kind == "step" else f"minimum jerk {reference.duration:g} s {target}"
+        target = f"tip {_millimetres(reference.tip)} mm"
+    how = {"step": "step", "sine": f"sine {reference.frequency:g} Hz"}
+    return f"{how.get(reference.kind, f'minimum jerk {reference.duration:g} s')} {target}"
+
+
+def _millimetres(tip: tuple[float, float]) -> str:
+    return f"{1e3 * tip[0]:.3g}, {1e3 * tip[1]:.3g}"
 
 
 def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
 from wristctl.simulation.trajectory import Trajectory, desired_errors
@@ -81,7 +82,8 @@ def simulate(
     followed = motion(chosen.reference, study.wrist, chosen.horizon, sample_period(chosen.loop), network)
     start = None
     if chosen.start == "equilibrium":
-        start = equilibrium(study.wrist, chosen.loop.plant_segments, (study.wrist.pretension, study.wrist.pretension))
+        plant = plant_of(study.wrist, chosen.loop.plant)
+        start = equilibrium(plant, chosen.loop.plant_segments, (plant.pretension, plant.pretension))
     which = np.zeros(1, np.int64)
     outcome = rollout(law, gains, [followed], which, chosen.loop, study.wrist, start, record=True)
     name = chosen.gains if isinstance(chosen.gains, str) else "given"
