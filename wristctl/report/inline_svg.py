@@ -7,7 +7,8 @@ import html
 import re
 from pathlib import Path
 
-_HEAD = re.compile(r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>", re.DOTALL)
+_HEAD = re.compile(r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>", re.DOTALL)
+"""What does not belong inside a page; matplotlib's style would rule all of it, page.css has it for figures alone."""
 _DIGITS = re.compile(r"(\d+\.\d{2})\d+")
 _PATH = re.compile(r'(?<= d=")[^"]*')
 LARGEST = 300_000

@@ -8,7 +8,7 @@ import re
 import tempfile
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from operator import eq, ge, gt, le, lt, ne
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError, meant
-from wristctl.runs.find import RESULTS, list_runs
+from wristctl.runs.find import RESULTS, run_names
 from wristctl.runs.manifest import MANIFEST, SUMS
 from wristctl.runs.run import Run
 from wristctl.runs.tags import read_tags
@@ -56,13 +56,15 @@ def entries(results: Path = RESULTS) -> list[Entry]:
     known = _read_index(results)
     kept: dict[str, Any] = {}
     found, tags = [], read_tags(results)
-    for run in list_runs(results):
-        stamp = _stamp(run.path)
-        old = known.get(run.path.name)
-        entry = Entry(**old[1]) if stamp and old and old[0] == stamp else _entry(run)
-        if stamp and entry.state not in ("running", "broken", "crashed"):
-            kept[entry.id] = old if old and old[0] == stamp else [stamp, asdict(entry)]
-        found.append(entry if entry.id not in tags else Entry(**asdict(entry) | {"tags": tags[entry.id]}))
+    for name in run_names(results):
+        stamp, old = _stamp(f"{results}/{name}"), known.get(name)
+        if stamp and old and old[0] == stamp:
+            entry, kept[name] = Entry(**old[1]), old
+        else:
+            entry = _entry(Run(results / name))
+            if stamp and entry.state not in ("running", "broken", "crashed"):
+                kept[name] = [stamp, asdict(entry)]
+        found.append(replace(entry, tags=tags[name]) if name in tags else entry)
     if kept != known:
         _write_index(results, kept)
     return found
@@ -147,10 +149,10 @@ def _entry(run: Run) -> Entry:
     return Entry(run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs)
 
 
-def _stamp(path: Path) -> list[int] | None:
+def _stamp(path: str) -> list[int] | None:
     """What tells a sealed run from any other under its name; None where it is not sealed."""
     try:
-        manifest, sums = os.stat(path / MANIFEST), os.stat(path / SUMS)
+        manifest, sums = os.stat(f"{path}/{MANIFEST}"), os.stat(f"{path}/{SUMS}")
     except OSError:
         return None
     return [manifest.st_mtime_ns, manifest.st_size, sums.st_mtime_ns, sums.st_size]

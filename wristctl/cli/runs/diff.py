@@ -45,8 +45,8 @@ def _tables(found: Difference) -> Iterator[Table]:
             rows = [(each.name, each.before, each.after, *_change(each.before, each.after)) for each in found.metrics]
             yield Table("Metrics", ("metric", "before", "after", "change", "change [%]"), rows)
         if changes := getattr(found, name):
-            rows = [(each.name, _said(each.before), _said(each.after)) for each in changes]
-            yield Table(title, ("what", "before", "after"), rows)
+            said = [(each.name, _said(each.before), _said(each.after)) for each in changes]
+            yield Table(title, ("what", "before", "after"), said)
 
 
 def _change(before: Any, after: Any) -> tuple[float | None, float | None]:
