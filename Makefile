@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench clean venv
+.PHONY: run test lint bench test-trust clean venv
 
 run: .venv/run
 	@set -e; \
@@ -25,6 +25,10 @@ lint: .venv/dev
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
+
+# Runs killed at 50 random moments, 10,000 runs listed.
+test-trust: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/runs/test_query.py
 
 venv: .venv/dev
 

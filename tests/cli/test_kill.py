@@ -19,7 +19,10 @@ MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
 COMMANDS = {
     "gen-data": ("--samples", "1000"),
     "train": ("--data", "latest:gen-data", "--epochs", "5"),
-    "tune": (*FAST, "--set", "candidates=4", "--iterations", "3", "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]"),
+    "tune": (
+        *FAST, "--candidates", "4", "--iterations", "3",
+        "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]",
+    ),
     "simulate": ("--set", "horizon=0.5"),
     "compare": (*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),
 }

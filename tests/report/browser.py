@@ -27,8 +27,9 @@ class Browser:
             [str(DRIVER), f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         self._url = f"http://127.0.0.1:{port}/session"
-        arguments = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--user-data-dir={profile}"]
-        arguments += ["--disable-background-networking", "--disable-component-update", "--no-first-run"]
+        arguments = [f"--user-data-dir={profile}", "--headless=new", "--no-sandbox", "--disable-gpu"]
+        arguments += ["--hide-scrollbars", "--no-first-run"]
+        arguments += ["--disable-background-networking", "--disable-component-update"]
         wanted = {
             "goog:chromeOptions": {"binary": CHROMIUM, "args": arguments},
             "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
@@ -64,9 +65,10 @@ class Browser:
 
     def requests(self) -> list[str]:
         """Addresses that the page asked for so far, but for data within it."""
-        entries = [json.loads(entry["message"])["message"] for entry in self._post("/se/log", {"type": "performance"})]
-        sent = [entry["params"]["request"]["url"] for entry in entries if entry["method"] == "Network.requestWillBeSent"]
-        return [url for url in sent if not url.startswith("data:")]
+        log = self._post("/se/log", {"type": "performance"})
+        events = [json.loads(entry["message"])["message"] for entry in log]
+        sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+        return [each["request"]["url"] for each in sent if not each["request"]["url"].startswith("data:")]
 
     def screenshot(self, file: Path) -> None:
         """A picture of the whole page."""
@@ -86,6 +88,7 @@ class Browser:
         return self._post("/goog/cdp/execute", {"cmd": command, "params": parameters})
 
     def _post(self, path: str, body: dict[str, Any]) -> Any:
-        request = urllib.request.Request(self._url + path, json.dumps(body).encode(), {"Content-Type": "application/json"})
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(self._url + path, json.dumps(body).encode(), headers)
         with urllib.request.urlopen(request, timeout=60) as answer:
             return json.load(answer)["value"]

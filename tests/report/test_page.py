@@ -121,7 +121,7 @@ def test_a_browser_shows_the_page_without_an_error_or_a_request(
 def test_a_table_sorts_by_number_and_back(browser: Any, compared: Run) -> None:
     browser.open(compared.file("report.html"), 1280, False)
     press = "document.querySelectorAll('table.sortable')[0].querySelectorAll('th button')[2].click();"
-    read = "return [...document.querySelectorAll('table.sortable')[0].tBodies[0].rows].map(row => row.cells[2].textContent)"
+    read = "return [...document.querySelector('table.sortable').tBodies[0].rows].map(row => row.cells[2].textContent)"
     rising, falling = browser.run(press + read), browser.run(press + read)
     numbers = [float(text) for text in rising if text != "-"]
     assert numbers == sorted(numbers) and len(numbers) == 17 and falling == rising[::-1]
@@ -130,7 +130,8 @@ def test_a_table_sorts_by_number_and_back(browser: Any, compared: Run) -> None:
 def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, compared: Run) -> None:
     browser.open(compared.file("report.html"), 1280, False)
     groups = browser.run("return [...document.getElementById('group').options].map(option => option.value)")
-    assert groups == [f"default, {name}" for name in ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")]
+    references = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
+    assert groups == [f"default, {name}" for name in references]
     read = "return [...document.querySelectorAll('#wrists > div')].map(panel => panel.lastChild.textContent)"
     seek = "const s = document.getElementById('instant'); s.value = 1000; s.dispatchEvent(new Event('input'));"
     panels = browser.run(seek + read)

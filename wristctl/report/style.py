@@ -21,7 +21,20 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 WIDTH = 7.0
 """Width of a figure [in]; text is 9 to 10 points."""
 
-_CONTROLLERS = {"smc": BLUE, "pid": VERMILLION, "computed-torque": GREEN, "feedforward": GREY}
+INDIGO, WINE = "#332288", "#882255"
+"""Two of Tol's muted colours, for more controllers than Okabe and Ito have colours."""
+
+_CONTROLLERS = {
+    "smc": BLUE,
+    "pid": VERMILLION,
+    "computed-torque": GREEN,
+    "feedforward": GREY,
+    "mrac": ORANGE,
+    "gvsc": SKY,
+    "nc": PURPLE,
+    "smc-tracking": INDIGO,
+    "super-twisting": WINE,
+}
 _OTHERS = (ORANGE, SKY, PURPLE)
 _DASHES: dict[str, Any] = {
     "tuned": "-",
