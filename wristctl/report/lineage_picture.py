@@ -6,7 +6,7 @@ from html import escape
 
 from wristctl.runs.lineage import Ancestor
 
-_WIDTH, _HEIGHT, _GAP, _ROW = 168, 44, 44, 60
+_WIDTH, _HEIGHT, _GAP, _ROW = 192, 44, 44, 60
 _WORDS = {"gen-data": "data", "train": "network", "tune": "gains", "compare": "comparison", "hw-run": "trial"}
 
 
