@@ -27,6 +27,7 @@ COMMANDS = {
     "tune": ("wristctl.cli.tune", _REPRODUCE, "Search the gains of controllers."),
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
+    "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
     "runs": ("wristctl.cli.runs", _RESULTS, "List and show run directories."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""
