@@ -33,7 +33,7 @@ def tune(session: Session) -> Table:
     from wristctl.control.table import controller
     from wristctl.tuning.search import search
 
-    warn_if_it_buckles(session, max(loop.plant_segments for loop in session.settings.loops.values()))
+    warn_if_it_buckles(session, session.settings.loops.values())
     network, found = network_of(session), {}
     try:
         for name in session.settings.controllers:
