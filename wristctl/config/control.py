@@ -69,6 +69,7 @@ class CompareSettings(Section):
     horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
+    tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
 
 
 class SimulateSettings(Section):
