@@ -55,7 +55,7 @@ def test_a_wrist_that_has_drifted_rests_where_a_softer_one_does() -> None:
 
 def test_a_push_leaves_every_lane_of_a_batch_and_the_next_rollout_as_they_were() -> None:
     calm = run(Disturbances()).column("theta", 0)
-    pushed = run(Disturbances(push=Push())).column("theta", 0)
+    pushed = run(Disturbances(push=Push(force=2.0))).column("theta", 0)
     again = run(Disturbances()).column("theta", 0)
     assert (calm[:2500] == pushed[:2500]).all() and (calm == again).all()
     assert np.abs(pushed - calm).max() > 0.1

@@ -44,7 +44,7 @@ def compare(session: Session) -> list[Table]:
     from wristctl.control.table import controller, gains_of
 
     run, settings = session.run, session.settings
-    warn_if_it_buckles(session, max(loop.plant_segments for loop in settings.loops.values()))
+    warn_if_it_buckles(session, settings.loops.values())
     earlier, tuned = tuned_study(session), tuned_of(session)
     scenarios = earlier.tune if earlier is not None else settings.tuning
     if scenarios is not None:

@@ -30,7 +30,7 @@ def tune(session: Session) -> Table:
     """Search for gains by rollouts, a whole swarm as one batch."""
     from wristctl.cli.loops import warn_if_it_buckles
 
-    warn_if_it_buckles(session, max(loop.plant_segments for loop in session.settings.loops.values()))
+    warn_if_it_buckles(session, session.settings.loops.values())
     found = search_all(session, session.settings)
     rows = [
         (name, result.objective, result.evaluations, "  ".join(f"{k} = {v:.4g}" for k, v in result.gains.items()))

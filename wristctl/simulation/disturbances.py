@@ -16,14 +16,12 @@ Array = NDArray[np.float64]
 
 def course(disturbances: Disturbances, time: Array) -> Array | None:
     """Tip force across the straight wrist [N] and stiffness over the plant's own, (T, 2); None if nothing acts."""
-    if disturbances == Disturbances():
+    push, load, drift = disturbances.push, disturbances.load, disturbances.drift
+    if push.force == load == 0.0 and drift.scale == 1.0:
         return None
-    force, scale = np.full_like(time, disturbances.load), np.ones_like(time)
-    if (push := disturbances.push) is not None:
-        phase = (time - push.start) / push.duration
-        force += np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
-    if (drift := disturbances.drift) is not None:
-        scale += (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
+    phase = (time - push.start) / push.duration
+    force = load + np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
+    scale = 1.0 + (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
     return np.stack([force, scale], axis=1)
 
 
