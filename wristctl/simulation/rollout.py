@@ -90,16 +90,15 @@ def rollout(
     drive, period = drive_of(loop.actuator), loop.control_period
     motors_at_rest = np.repeat(at_rest(drive, plant_of(wrist, loop.plant), rest)[:, None], LANES, axis=1)
     disturbed = course(loop.disturbances, motions[0].time)
-    lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
-    table = np.stack([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions], axis=-1)
-    total = len(lanes)
+    references = _References(motions, which)
+    total = len(blocks["gains"])
     streams = np.zeros(count, np.int64) if seeds is None else seeds
     observers = observers_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest)
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
     stop, done = threading.Event(), [0] * total
 
     def run(block: int) -> None:
-        reference = np.ascontiguousarray(table[..., lanes[block]])
+        reference = references.of(block)
         state = np.repeat(np.concatenate([rest, 0.0 * rest])[:, None], LANES, axis=1)
         memory, now = np.zeros((max(1, controller.memory), LANES)), np.zeros((len(NOW), LANES))
         motors = motors_at_rest.copy()
@@ -128,3 +127,23 @@ def rollout(
     kept = recorded.transpose(0, 3, 1, 2).reshape(total * LANES, -1, len(RECORDED) + n)[:count] if record else None
     metrics = summary(sums, goal_rows, loop.control_period)
     return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)
+
+
+class _References:
+    """The references of each block, [sample, (angle, rate, acceleration), lane]; alike blocks share one."""
+
+    def __init__(self, motions: Sequence[Motion], which: NDArray[np.int64]) -> None:
+        courses = [np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions]
+        self._table = np.stack(courses, axis=-1)
+        lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
+        self._patterns, self._pattern, self._uses = np.unique(lanes, axis=0, return_inverse=True, return_counts=True)
+        self._shared: dict[int, Array] = {}
+
+    def of(self, block: int) -> Array:
+        pattern = int(self._pattern[block])
+        if pattern in self._shared:
+            return self._shared[pattern]
+        made = np.ascontiguousarray(self._table[..., self._patterns[pattern]])
+        if self._uses[pattern] > 1:
+            self._shared[pattern] = made
+        return made
