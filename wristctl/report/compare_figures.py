@@ -31,7 +31,7 @@ _FAILED = "///"
 
 
 def angle_grid(results: Sequence[Result], heading: str = "", across: Across = "reference") -> Figure:
-    """Desired and obtained angle [deg] over time [s]: rows of controllers with their gains, columns as `across` says."""
+    """Desired and obtained angle [deg] over time [s]: rows of controllers and gains, columns as `across` says."""
     rows, columns = _names(results, across)
     size = {"width": max(WIDTH, 1.0 + 1.3 * len(columns)), "height": 1.0 + 1.05 * len(rows)}
     made, axes = figure(len(rows), len(columns), sharex=True, sharey=True, **size)
