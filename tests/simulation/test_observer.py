@@ -132,8 +132,9 @@ def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batc
 def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
     level: str, rmse: float, steady_state: float
 ) -> None:
-    """Medians of 20 seeds at -20 % stiffness unknown to the law."""
-    loop = Loop.model_validate({"sensor": CAMERA, "plant": SOFT, "actuator": {"level": level}})
+    """Medians of 20 seeds at -20 % stiffness unknown to the law; its gains were chosen on another stream of noise."""
+    other_noise = CAMERA.model_copy(update={"seed": 7})
+    loop = Loop.model_validate({"sensor": other_noise, "plant": SOFT, "actuator": {"level": level}})
     found = run("smc-tracking", "camera", loop, seeds=20, record=False).metrics
     assert np.median(found["rmse"]) <= rmse and np.median(found["steady_state"]) <= steady_state
     pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(force=2.0, start=2.5, duration=0.5))})
