@@ -4,9 +4,11 @@
  * What simavr 1.6 does otherwise than the chip, and is mended or avoided here:
  *  - an 8N1 byte lasts 11 bits: cycles_per_byte is scaled in board_run();
  *  - a pull-up is applied again at each write to PORT or DDR: driven inputs are declared external;
+ *  - a compare at 0 never matches: compare_at_zero() raises its interrupt;
  *  - WDR renews avr_run()'s cycle budget: an own timer ends each run on time;
  *  - its receive buffer holds 64 bytes where the chip's holds 2, so it never shows an overrun.                         */
 #include <avr_ioport.h>
+#include <avr_timer.h>
 #include <avr_uart.h>
 #include <sim_avr.h>
 #include <sim_elf.h>
@@ -28,6 +30,12 @@ struct bytes {
   size_t count, taken, room;
 };
 
+struct compare_write { /* the timer's own handler of writes to OCRnA, which ours calls first */
+  avr_timer_t *timer;
+  avr_io_write_t handler;
+  void *param;
+};
+
 struct board {
   avr_t *avr;
   avr_uart_t *uart;
@@ -37,6 +45,7 @@ struct board {
   struct bytes to_board, from_board;
   struct event *events;
   size_t event_count, event_room;
+  struct compare_write compares[8];
   uint8_t level[256], driven[256], drive_level[256]; /* by port letter */
 };
 
@@ -75,6 +84,27 @@ static void on_port_c(avr_irq_t *irq, uint32_t value, void *b) { (void)irq, note
 static void no_sleep(avr_t *avr, avr_cycle_count_t cycles) { (void)avr, (void)cycles; }
 static void no_log(avr_t *avr, const int level, const char *format, va_list args) {
   (void)avr, (void)level, (void)format, (void)args;
+}
+
+static avr_cycle_count_t compare_at_zero(avr_t *avr, avr_cycle_count_t when, void *timer) {
+  avr_raise_interrupt(avr, &((avr_timer_t *)timer)->comp[AVR_TIMER_COMPA].interrupt);
+  return when + 0x10000;
+}
+
+static void on_compare_write(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  struct compare_write *w = param;
+  w->handler(avr, address, value, w->param);
+  avr_cycle_timer_cancel(avr, compare_at_zero, w->timer);
+  if (value == 0 && avr->data[w->timer->comp[AVR_TIMER_COMPA].r_ocrh] == 0)
+    avr_cycle_timer_register(avr, w->timer->tov_base + 0x10000 - avr->cycle, compare_at_zero, w->timer);
+}
+
+static void watch_compare(struct board *b, avr_timer_t *timer) {
+  struct compare_write *w = &b->compares[timer->name - '0'];
+  avr_io_addr_t io = AVR_DATA_TO_IO(timer->comp[AVR_TIMER_COMPA].r_ocr);
+  *w = (struct compare_write){timer, b->avr->io[io].w.c, b->avr->io[io].w.param};
+  b->avr->io[io].w.c = on_compare_write;
+  b->avr->io[io].w.param = w;
 }
 
 static void apply_drive(struct board *b, uint8_t port) {
@@ -116,8 +146,11 @@ struct board *board_new(const char *hex, uint32_t baud, int start_in_bootloader)
   avr_ioctl(avr, AVR_IOCTL_UART_GET_FLAGS('0'), &flags);
   flags &= ~(uint32_t)(AVR_UART_FLAG_STDIO | AVR_UART_FLAG_POLL_SLEEP);
   avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
-  for (avr_io_t *io = avr->io_port; io; io = io->next)
-    if (io->kind && !strcmp(io->kind, "uart") && ((avr_uart_t *)io)->name == '0') b->uart = (avr_uart_t *)io;
+  for (avr_io_t *io = avr->io_port; io; io = io->next) {
+    if (!io->kind) continue;
+    if (!strcmp(io->kind, "uart") && ((avr_uart_t *)io)->name == '0') b->uart = (avr_uart_t *)io;
+    if (!strcmp(io->kind, "timer") && strchr("1345", ((avr_timer_t *)io)->name)) watch_compare(b, (avr_timer_t *)io);
+  }
   b->receive = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
   b->byte_cycles = 10 * CLOCK / baud;
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent_byte, b);
@@ -151,9 +184,11 @@ int board_run(struct board *b, uint64_t cycles) {
 }
 
 /* Out of any interrupt first, then on from another place: a main program that has lost its way. */
-void board_jump(struct board *b, uint32_t address) {
+uint32_t board_jump(struct board *b, uint32_t address) {
   while (!b->avr->sreg[S_I]) board_run(b, 1);
+  uint32_t from = b->avr->pc;
   b->avr->pc = address;
+  return from;
 }
 
 void board_write(struct board *b, const uint8_t *data, size_t count) { append(&b->to_board, data, count); }

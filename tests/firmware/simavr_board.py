@@ -20,7 +20,7 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
     "cycles": (ctypes.c_uint64, [ctypes.c_void_p]),
     "port": (ctypes.c_uint8, [ctypes.c_void_p, ctypes.c_uint8]),
     "drive": (None, [ctypes.c_void_p, ctypes.c_uint8, ctypes.c_int, ctypes.c_int]),
-    "jump": (None, [ctypes.c_void_p, ctypes.c_uint32]),
+    "jump": (ctypes.c_uint32, [ctypes.c_void_p, ctypes.c_uint32]),
     "poke": (None, [ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint8]),
     "reset": (None, [ctypes.c_void_p]),
     "free": (None, [ctypes.c_void_p]),
@@ -79,9 +79,9 @@ class SimavrBoard:
         self._lib.board_take_events(self._board, out.ctypes.data)
         return out[["cycle", "port", "value"]]
 
-    def jump(self, address: int) -> None:
-        """Send the main program (not an interrupt) on from this byte address of the flash."""
-        self._lib.board_jump(self._board, address)
+    def jump(self, address: int) -> int:
+        """Send the main program (not an interrupt) on from this byte address of the flash; return where it was."""
+        return int(self._lib.board_jump(self._board, address))
 
     def poke(self, address: int, value: int) -> None:
         """Write one byte of data memory."""

@@ -35,7 +35,7 @@ class Chip(Protocol):
     def pin(self, port: str, bit: int) -> bool: ...
     def drive(self, port: str, bit: int, level: bool) -> None: ...
     def events(self) -> np.ndarray[Any, Any]: ...
-    def jump(self, address: int) -> None: ...
+    def jump(self, address: int) -> int: ...
     def poke(self, address: int, value: int) -> None: ...
     def reset(self) -> None: ...
     def close(self) -> None: ...
@@ -60,28 +60,30 @@ def decode(stuffed: bytes) -> tuple[int, int, bytes]:
 
 
 class Bench:
-    """Runs a chip in virtual time; everything its pins do goes to the four watched drives."""
+    """Runs a chip in virtual time; what its pins do is seen by four watched drives."""
 
     def __init__(self, chip: Chip) -> None:
         self.chip = chip
-        self.drives = [DriveWatch(axis) for axis in range(4)]
-        self.rises: list[list[np.ndarray[Any, Any]]] = [[], [], [], []]  # of each axis, while `recording`
-        self.recording = False
+        self._drives = [DriveWatch(axis) for axis in range(4)]
         self._seq = 0
         self._received = b""
         self.run_ms(3)
 
     def run(self, cycles: int) -> None:
         self.chip.run(cycles)
-        events = self.chip.events()
-        if len(events):
-            for axis, drive in enumerate(self.drives):
-                rises = drive.read(events)
-                if self.recording:
-                    self.rises[axis].append(rises)
 
     def run_ms(self, ms: float) -> None:
         self.run(round(ms * MS))
+
+    def look(self) -> list[np.ndarray[Any, Any]]:
+        """Let the drives see what the pins did; return each axis's cycles of rising STEP edges since the last look."""
+        events = self.chip.events()
+        return [drive.read(events) for drive in self._drives]
+
+    @property
+    def drives(self) -> list[DriveWatch]:
+        self.look()
+        return self._drives
 
     def frames(self) -> list[tuple[int, int, bytes]]:
         """Return code, seq and payload of the frames that have come in."""

@@ -14,7 +14,7 @@ NEVER = -(1 << 40)  # a cycle long before power came on
 
 
 class DriveWatch:
-    """Reads pin changes of one axis: STEP on port A bit 2 axis, DIR on the bit above, ENA on port C bit `axis` (high = off)."""
+    """Reads the pin changes of one axis: STEP and DIR are neighbours on port A, ENA is on port C (high = off)."""
 
     def __init__(self, axis: int) -> None:
         self.step, self.dir, self.ena = 1 << 2 * axis, 2 << 2 * axis, 1 << axis
@@ -22,6 +22,7 @@ class DriveWatch:
         self.steps = 0
         self.last_rise = NEVER
         self.steps_while_off = 0
+        self.was_on = False
         self.least = dict.fromkeys(LEAST, float("inf"))  # us
         self._last_fall = self._last_turn = self._last_on = NEVER
         self._port, self._off = 0, True
@@ -50,6 +51,7 @@ class DriveWatch:
         self._last_fall = int(falls[-1]) if len(falls) else self._last_fall
         self._last_turn = int(turns[-1]) if len(turns) else self._last_turn
         self._last_on = int(ons[-1]) if len(ons) else self._last_on
+        self.was_on |= len(ons) > 0
         self._port, self._off = int(value[-1]), bool(off[-1])
         return rises
 

@@ -7,6 +7,7 @@
 
 #define UPDATE_MS 2         /* between two new rates of one axis */
 #define LONGEST_UPDATE_MS 8 /* a late update must not leap */
+#define BRAKING 0.9f        /* of the acceleration is planned with; the rest makes up for updates that come late */
 #define CREEP 50.0f         /* steps/s at least, on the way to a goal */
 
 static struct motion {
@@ -19,16 +20,18 @@ static struct motion {
 
 static int32_t lowest[AXES], highest[AXES];
 static float acceleration, stop_acceleration;
-static float half_change;     /* of the rate, in one update at this acceleration */
+static float braking;         /* planned deceleration */
+static float half_change;     /* of the rate, in one update of planned braking */
 static float arrival_rate;    /* an axis this slow may end its motion from one step to the next */
 static int32_t braking_steps; /* from MAX_RATE, with a margin */
 
 void motion_configure(uint32_t accelerate, uint32_t stop) {
   acceleration = accelerate;
   stop_acceleration = stop;
-  half_change = acceleration * (UPDATE_MS * 0.0005f);
+  braking = BRAKING * acceleration;
+  half_change = braking * (UPDATE_MS * 0.0005f);
   arrival_rate = 2.0f * sqrtf(2.0f * acceleration);
-  braking_steps = (float)MAX_RATE * MAX_RATE / (2.0f * acceleration) + MAX_RATE * 0.01f;
+  braking_steps = (float)MAX_RATE * MAX_RATE / (2.0f * braking) + MAX_RATE * 0.01f;
 }
 
 uint16_t motion_longest_stop_ms(void) { return MAX_RATE * 1000.0f / stop_acceleration + 3 * UPDATE_MS; }
@@ -84,7 +87,7 @@ int16_t motion_rate(uint8_t axis) { return axis_stepping(axis) ? motions[axis].r
 
 /* The rate from which constant braking, in updates of this length, ends exactly after `distance` steps. */
 static float braking_rate(int32_t distance) {
-  return fmaxf(sqrtf(2.0f * acceleration * distance + half_change * half_change) - half_change, CREEP);
+  return fmaxf(sqrtf(2.0f * braking * distance + half_change * half_change) - half_change, CREEP);
 }
 
 static float wanted_rate(const struct motion *m, int32_t left) {

@@ -21,7 +21,8 @@ static struct configuration config;
 #error "settle_left is 8 bits"
 #endif
 
-/* The watchdog interrupts and never resets: the stock bootloader of the Mega may loop on a watchdog reset. */
+/* Watches the millisecond interrupt, which watches the main loop. It interrupts and never resets: the stock bootloader of
+ * the Mega may loop on a watchdog reset. */
 static void start_chip_watchdog(void) {
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
@@ -91,6 +92,7 @@ static void show_state(uint16_t ms) { /* ENABLED lit, FAULT fast, else slow */
 
 ISR(TIMER0_COMPA_vect) {
   uint32_t ms = ++milliseconds;
+  wdt_reset();
   if (estop_open() && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
   if (silent_ms < HEARTBEAT_MS)
     silent_ms++;
@@ -104,19 +106,11 @@ ISR(TIMER0_COMPA_vect) {
   show_state(ms);
 }
 
-/* Only when the millisecond interrupt itself has died. */
 ISR(WDT_vect) {
   if (!(faults & FAULT_WATCHDOG)) latch(FAULT_WATCHDOG, !config.hold_on_fault);
 }
 
-void safety_alive(void) {
-  static uint8_t fed_at;
-  silent_ms = 0;
-  uint8_t now = milliseconds;
-  if (now == fed_at) return; /* once per millisecond: a dead millisecond interrupt starves the chip's watchdog */
-  fed_at = now;
-  wdt_reset();
-}
+void safety_alive(void) { silent_ms = 0; }
 
 uint8_t safety_state(void) { return state; }
 uint8_t safety_faults(void) { return faults; }
