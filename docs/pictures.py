@@ -58,9 +58,9 @@ def main() -> None:
         "network). Loops: `exact` is the model as its own plant, torque held for a microsecond, no limits; `sampled` "
         "the same at 1 kHz with 60 N tendons; `default` a four-segment plant under the one-segment model.\n\n"
         + table(results)
-        + "\n\nThe printed gains do not move the wrist. With P1 and P2 exchanged (a hypothesis) the paper's RMSE lies between those of "
-        "the two moves on the exact loop; sampled at 1 kHz the same gains slam the tendons at every tick, and on the "
-        "four-segment plant they do not arrive.\n"
+        + "\n\nThe printed gains do not move the wrist. With P1 and P2 exchanged (a hypothesis) the paper's RMSE lies "
+        "between those of the two moves on the exact loop; sampled at 1 kHz the same gains slam the tendons at every "
+        "tick, and on the four-segment plant they do not arrive.\n"
     )
 
 

@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from wristctl.cli.app import main
+
 ROOT = Path(__file__).parents[2]
 WRISTCTL = ["-c", "from wristctl.cli.app import main; main()"]
 PROBE = [str(Path(__file__).parent / "probe.py")]
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
+Call = Callable[..., tuple[int, str, str]]
 
 
 def _environment(probe: str) -> dict[str, str]:
@@ -58,3 +61,18 @@ def begin(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
     for child in started:
         child.kill()
         child.communicate()
+
+
+@pytest.fixture
+def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """Runs `wristctl ...` in this process, in an empty folder: exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["wristctl", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return int(ended.value.code or 0), out, err
+
+    return run

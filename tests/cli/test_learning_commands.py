@@ -3,36 +3,16 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wristctl.cli.app import main
 from wristctl.learning import training
 from wristctl.learning.network_file import load_network, training_record
 from wristctl.runs import list_runs, open_run
 
 QUICK = ("--set", "hidden=[16,8]", "--set", "activation=tanh", "--set", "learning_rate=0.01", "--epochs", "12")
-
-
-@pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["wristctl", *arguments])
-        with pytest.raises(SystemExit) as exit:
-            main()
-        out, err = capsys.readouterr()
-        return int(exit.value.code or 0), out, err
-
-    return run
 
 
 def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
@@ -99,13 +79,13 @@ def test_interrupted_training_keeps_the_network_found_so_far(call, monkeypatch: 
     run.check()
 
 
-def test_dry_runs_write_nothing(call, here: Path) -> None:
+def test_dry_runs_write_nothing(call, tmp_path: Path) -> None:
     code, out, _ = call("gen-data", "--dry-run")
-    assert code == 0 and "1000 samples" in out and not list(here.iterdir())
+    assert code == 0 and "1000 samples" in out and not list(tmp_path.iterdir())
     call("gen-data", "--samples", "100")
-    before = sorted(here.rglob("*"))
+    before = sorted(tmp_path.rglob("*"))
     code, out, _ = call("train", "--data", "latest:gen-data", "--dry-run")
-    assert code == 0 and "75 samples to train on" in out and sorted(here.rglob("*")) == before
+    assert code == 0 and "75 samples to train on" in out and sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize(
@@ -119,8 +99,10 @@ def test_dry_runs_write_nothing(call, here: Path) -> None:
         (("train", "--data", "latest:gen-data", "--set", "hidden=[0]"), "hidden"),
     ],
 )
-def test_what_the_user_got_wrong_is_said_in_one_line_and_leaves_no_run(call, here: Path, arguments, message) -> None:
+def test_what_the_user_got_wrong_is_said_in_one_line_and_leaves_no_run(
+    call, tmp_path: Path, arguments, message
+) -> None:
     call("gen-data", "--samples", "100")
     code, _, err = call(*arguments)
     assert code == 2 and len(err.splitlines()) == 1 and message in err
-    assert len(list((here / "results").iterdir())) == 1
+    assert len(list((tmp_path / "results").iterdir())) == 1

@@ -15,7 +15,7 @@ from wristctl.control.smc import SMC
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.loop_figures import angles, errors, tensions
 from wristctl.report.tuning_figures import convergence, gain_history
-from wristctl.report.wrist_drawing import bent_wrist, directions, stroboscope
+from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.simulation.simulate import Simulation, chain_tip
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.tuning.search import Search
@@ -44,7 +44,8 @@ def course(label: str, tau: float = 0.3, diverges: bool = False, network_error: 
 def result(row: str, reference: str, rmse: float, failed: bool = False) -> Result:
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
-    return Result("default", reference, "exact", controller, gains, Simulation(course(row, 1.0, failed), metrics, failed))
+    done = Simulation(course(row, 1.0, failed), metrics, failed)
+    return Result("default", reference, "exact", controller, gains, done)
 
 
 def results() -> list[Result]:
@@ -75,20 +76,19 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
     "gain history of pid": lambda: gain_history(search("pid"), PID.gains),
-    "bent wrist": lambda: bent_wrist(np.array([0.3, 0.2, 0.1, 0.1]), WRIST),
     "directions": lambda: directions(WRIST),
     "stroboscope": lambda: stroboscope(course("smc/tuned"), WRIST),
 }
 """Every figure of the report but those of learning."""
 
 
-@pytest.fixture(params=FIGURES)
+@pytest.fixture(params=FIGURES, scope="module")
 def make(request: pytest.FixtureRequest) -> Callable[[], Figure]:
     """Each figure in turn, or the ones named by indirect parameters."""
     return FIGURES[request.param]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def drawn(make: Callable[[], Figure]) -> Figure:
     """Each figure, laid out as on paper."""
     made = make()

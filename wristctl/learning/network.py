@@ -76,9 +76,11 @@ class Scaler:
         return Scaler(np.zeros(columns), np.ones(columns))
 
     def scale(self, values: Array) -> Array:
+        """Scaled values, (..., D)."""
         return (values - self.mean) / self.deviation
 
     def restore(self, scaled: Array) -> Array:
+        """Values of scaled ones, (..., D)."""
         return scaled * self.deviation + self.mean
 
 

@@ -69,7 +69,7 @@ def rmse_map(results: Sequence[Result], heading: str = "") -> Figure:
         ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
         ours.text(column, row, "x", ha="center", va="center", fontsize=11.0, fontweight="bold", backgroundcolor="w")
     ours.set_yticks(range(len(rows)), rows)
-    ours.set_xticks(range(len(columns)), [fill(name, 12) for name in columns])
+    ours.set_xticks(range(len(columns)), [fill(name, 10) for name in columns])
     paper.set_xticks([0], ["the paper's\nT2"])
     title(ours, heading)
     bar = made.colorbar(image, ax=[ours, paper], pad=0.02, label="RMSE [rad]")
@@ -118,6 +118,6 @@ def _cells(axes: Axes, values: Array, norm: LogNorm) -> AxesImage:
     image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
     for row, column in np.argwhere(np.isfinite(values)):
         value = values[row, column]
-        dark = value <= 0.0 or norm(value) < 0.5
-        axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize=9.0, color="w" if dark else "k")
+        ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
+        axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize=9.0, color=ink)
     return image

@@ -74,15 +74,6 @@ def draw_wrist(
     _frame(axes)
 
 
-def bent_wrist(segment_theta: Array, wrist: WristParameters) -> Figure:
-    """The wrist with the given segment angles (n,) [rad]."""
-    made, ((axes,),) = figure(width=4.0, height=4.5)
-    draw_wrist(axes, segment_theta, wrist)
-    axes.set(xlabel="y [mm]", ylabel="x [mm]")
-    title(axes, f"bending angle {math.degrees(segment_theta.sum()):.3g} deg")
-    return made
-
-
 def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Figure:
     """The wrist bent by `angle` [rad] in the four directions, with the tendons that pull; cross-sections below."""
     made, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
