@@ -130,6 +130,8 @@ void board_reset(struct board *b) {
     if (b->driven[port]) apply_drive(b, (uint8_t)port);
 }
 
+void board_set_baud(struct board *b, uint32_t baud) { b->byte_cycles = 10 * CLOCK / baud; }
+
 struct board *board_new(const char *hex, uint32_t baud, int start_in_bootloader) {
   elf_firmware_t firmware = {.frequency = CLOCK};
   avr_global_logger_set(no_log);
@@ -152,7 +154,7 @@ struct board *board_new(const char *hex, uint32_t baud, int start_in_bootloader)
     if (!strcmp(io->kind, "timer") && strchr("1345", ((avr_timer_t *)io)->name)) watch_compare(b, (avr_timer_t *)io);
   }
   b->receive = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
-  b->byte_cycles = 10 * CLOCK / baud;
+  board_set_baud(b, baud);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent_byte, b);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('A'), IOPORT_IRQ_PIN_ALL), on_port_a, b);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_PIN_ALL), on_port_c, b);

@@ -22,6 +22,7 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
     "drive": (None, [ctypes.c_void_p, ctypes.c_uint8, ctypes.c_int, ctypes.c_int]),
     "jump": (ctypes.c_uint32, [ctypes.c_void_p, ctypes.c_uint32]),
     "poke": (None, [ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint8]),
+    "set_baud": (None, [ctypes.c_void_p, ctypes.c_uint32]),
     "reset": (None, [ctypes.c_void_p]),
     "free": (None, [ctypes.c_void_p]),
 }
@@ -82,6 +83,10 @@ class SimavrBoard:
     def jump(self, address: int) -> int:
         """Send the main program (not an interrupt) on from this byte address of the flash; return where it was."""
         return int(self._lib.board_jump(self._board, address))
+
+    def set_baud(self, baud: int) -> None:
+        """Let the host write at another baud rate from here on."""
+        self._lib.board_set_baud(self._board, baud)
 
     def poke(self, address: int, value: int) -> None:
         """Write one byte of data memory."""
