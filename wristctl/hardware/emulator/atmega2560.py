@@ -14,7 +14,7 @@ from wristctl.hardware.emulator.execute import run
 from wristctl.hardware.emulator.flash import self_program
 from wristctl.hardware.emulator.intel_hex import read_hex
 from wristctl.hardware.emulator.ports import LETTERS, levels
-from wristctl.hardware.emulator.registers import GLOBAL_INTERRUPT, SREG
+from wristctl.hardware.emulator.registers import GLOBAL_INTERRUPT, SREG, write
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "wrist.hex"
 BOOT_SECTION = 0x3E000
@@ -121,11 +121,16 @@ class Atmega2560:
             found[name] = rows[:, column]
         return found
 
-    def jump(self, address: int) -> None:
-        """Put the main program at a byte address, once interrupts are on."""
+    def jump(self, address: int) -> int:
+        """Put the main program at a byte address, once it has interrupts on; the byte address where it was."""
         while not self._chip.memory[SREG] & GLOBAL_INTERRUPT:
             self.run(1)
-        self._chip.pc = address // 2
+        was, self._chip.pc = 2 * self._chip.pc, address // 2
+        return int(was)
+
+    def poke(self, address: int, value: int) -> None:
+        """Store a byte at an address of the data space, as a program would."""
+        write(self._chip, address, value)
 
     def reset(self) -> None:
         """Pull the reset pin; bytes on the line are lost."""
