@@ -10,6 +10,7 @@ import numpy as np
 from tests.hardware.drive_watch import CLOCK, DriveWatch
 from wristctl.hardware.messages import (
     ANSWER_TO,
+    BAUD,
     COMMAND_OF,
     ENABLE_KEY,
     LAYOUTS,
@@ -66,6 +67,7 @@ class Bench:
         self.chip = chip
         self._drives = [DriveWatch(axis) for axis in range(4)]
         self._seq = 0
+        self._line_busy_until = 0
         self._received = b""
         self.run_ms(3)
 
@@ -90,14 +92,15 @@ class Bench:
         *whole, self._received = (self._received + self.chip.read()).split(b"\0")
         return [decode(part) for part in whole if part]
 
-    def send(self, message: Command | tuple[Any, ...]) -> tuple[Command, int, int]:
+    def send(self, message: Command | tuple[Any, ...], seq: int | None = None) -> tuple[Command, int, int]:
         """Queue a command; return it, its sequence number and the cycle at which its last byte is in."""
         command = message if isinstance(message, Command) else COMMAND_OF[type(message)]
         payload = b"" if isinstance(message, Command) else LAYOUTS[type(message)].pack(message)
-        self._seq = (self._seq + 1) % 256
+        self._seq = (self._seq + 1) % 256 if seq is None else seq
         data = encode(command, self._seq, payload)
         self.chip.write(data)
-        return command, self._seq, self.chip.cycles + len(data) * 10 * CLOCK // 250_000
+        self._line_busy_until = max(self.chip.cycles, self._line_busy_until) + len(data) * 10 * CLOCK // BAUD
+        return command, self._seq, self._line_busy_until
 
     def ask(self, message: Command | tuple[Any, ...]) -> tuple[Result, Any]:
         """Send a command and run until it is answered; return the result and the answer's message (None for PING)."""
@@ -131,7 +134,9 @@ class Bench:
 
     def wait_for_rest(self) -> Status:
         """Keep the link alive until no axis moves."""
+        patience = self.chip.cycles + 30 * CLOCK
         while Flag.MOVING in (status := self.status()).flags:
+            assert self.chip.cycles < patience, f"still moving after 30 s: {status}"
             self.do(Command.PING)
             self.run_ms(5)
         return status

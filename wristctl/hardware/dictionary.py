@@ -8,6 +8,7 @@ Standard library only, so that the firmware builds with nothing but Python and a
 
 from __future__ import annotations
 
+import binascii
 import hashlib
 import json
 import sys
@@ -54,6 +55,8 @@ def c_header(table: Table) -> str:
     for prefix, group in (("", "constants"), ("DEFAULT_", "defaults")):
         for name, entry in table[group].items():
             lines += [f"#define {prefix}{name.upper()} {_c_number(entry['value'])} /* {entry['unit']} */"]
+    estop = ", ".join(f"{byte:#04x}" for byte in _estop_frame(table))
+    lines += [f"#define ESTOP_FRAME {{{estop}}} /* ESTOP with ESTOP_SEQ as it comes over the wire */"]
     for kind, group in (CODES | BITS).items():
         members = (f"{kind.upper()}_{name} = {_number(entry)}" for name, entry in table[group].items())
         lines += ["", f"enum {kind.lower()} {{ {', '.join(members)} }};"]
@@ -76,6 +79,12 @@ def c_header(table: Table) -> str:
             lines += [f"  case COMMAND_{name}: {{", f"    const struct {name.lower()}_command *m = payload;"]
             lines += [*checks, "    return true;", "  }"]
     return "\n".join([*lines, "  }", "  return true;", "}", "", "#endif", ""])
+
+
+def _estop_frame(table: Table) -> bytes:
+    body = bytes([table["commands"]["ESTOP"]["code"], table["constants"]["ESTOP_SEQ"]["value"]])
+    body += binascii.crc_hqx(body, 0xFFFF).to_bytes(2, "big")
+    return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")) + b"\0"
 
 
 def _number(entry: Table) -> int:

@@ -9,7 +9,7 @@ from wristctl.hardware.layout import Field, Layout
 
 PROTOCOL_VERSION = 1
 FIRMWARE_VERSION = (1, 0, 0)
-DICTIONARY_HASH = 0xD7C88CF1
+DICTIONARY_HASH = 0xB57568A7
 BAUD = 250000
 AXES = 4  # 1: step/direction drives
 MAX_RATE = 20000  # steps/s: of one axis
@@ -19,6 +19,7 @@ JOG_SPAN = 3200  # steps: furthest a JOG may lie from where the axis is: one tur
 SETTLE_MS = 200  # ms: from energising a drive to its first step
 HEARTBEAT_MS = 5  # ms: a main loop silent for longer counts as hung
 ENABLE_KEY = 1465010515  # 1: makes an ENABLE that no noise produces
+ESTOP_SEQ = 0  # 1: an ESTOP with this sequence number is obeyed on its last byte, whatever waits before it
 MAX_PAYLOAD = 48  # bytes: of any message, either way
 
 

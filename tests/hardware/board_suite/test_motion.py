@@ -20,6 +20,7 @@ from wristctl.hardware.messages import (
     Limits,
     Rate,
     Result,
+    State,
     Target,
 )
 
@@ -65,16 +66,11 @@ def test_moves_retargeted_on_the_fly_end_exactly_on_the_last_target(bench: Bench
         assert status.position == target.position == positions(bench)
 
 
-RATES = [
-    (10.0, -33.3, 100.1, -999.9),
-    (20_000.0, -20_000.0, 0.0, 0.0),
-    (0.0, 0.0, 19_999.5, 15_000.25),
-    (10_000.0, -10_000.0, 10_000.0, 10_000.0),
-    (244.1, -5_000.0, 12_345.6, -17_001.0),
-]
+SWEEP = np.geomspace(10, 20_000, 24).reshape(4, 6).T * (1, -1, 1, -1)  # six sets of four rates
+HEAVIEST = [(20_000.0, -20_000.0, 0.0, 0.0), (10_000.0, -10_000.0, 10_000.0, 10_000.0)]
 
 
-@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("rates", [*map(tuple, SWEEP.tolist()), *HEAVIEST], ids=lambda r: f"to {r[3]:.0f}")
 def test_step_rates_are_within_100_ppm_and_no_step_is_late(bench: Bench, rates: tuple[float, ...]) -> None:
     bench.get_ready()
     rate = Rate(rates)  # type: ignore[arg-type]
@@ -87,6 +83,26 @@ def test_step_rates_are_within_100_ppm_and_no_step_is_late(bench: Bench, rates: 
         else:
             mean = (len(rises) - 1) * CLOCK / int(rises[-1] - rises[0])
             assert mean == pytest.approx(abs(wanted), rel=100e-6)
+    assert bench.do(Command.COUNTERS).late_steps == 0
+
+
+@pytest.mark.parametrize("rates", HEAVIEST)
+def test_flooded_line_costs_answers_but_neither_steps_nor_the_link(bench: Bench, rates: tuple[float, ...]) -> None:
+    bench.get_ready()
+    rate = Rate(rates)  # type: ignore[arg-type]
+    keep_rate(bench, rate, 0.5)
+    bench.look()
+    for _ in range(200):
+        bench.send(rate)
+        bench.run_ms(0.92)  # as long as the frame takes: the line is never silent
+    for wanted, rises in zip(rates, bench.look(), strict=True):
+        if wanted:
+            intervals = np.diff(rises) * abs(wanted) / CLOCK
+            assert intervals.mean() == pytest.approx(1, rel=100e-6)
+            assert intervals.max() < 2
+    bench.run_ms(30)
+    bench.frames()
+    assert bench.status().state is State.ENABLED
     assert bench.do(Command.COUNTERS).late_steps == 0
 
 

@@ -11,6 +11,7 @@ from tests.hardware.bench import MS, Bench
 from tests.hardware.conftest import IMAGE
 from wristctl.hardware.messages import (
     ENABLE_KEY,
+    ESTOP_SEQ,
     HEARTBEAT_MS,
     Command,
     Configure,
@@ -102,14 +103,23 @@ def test_hold_on_fault_keeps_the_drives_on_until_disabled(bench: Bench) -> None:
 @pytest.mark.parametrize("hold", [0, 1])
 def test_emergency_stop_command_ends_stepping_within_a_millisecond(bench: Bench, hold: int) -> None:
     rng = np.random.default_rng(3)
-    for _ in range(5):
+    for seq in (ESTOP_SEQ, 77, 1, ESTOP_SEQ, 255):
         set_moving(bench, Configure(hold_on_fault=hold), int(rng.integers(0, MS)))
-        _, _, last_byte = bench.send(Command.ESTOP)
+        _, _, last_byte = bench.send(Command.ESTOP, seq)
         assert milliseconds_to_last_step(bench, last_byte) < 1.0
         assert bench.drives_energised() == [False] * 4
         assert_latched(bench, Fault.ESTOP_COMMAND)
         bench.do(Command.DISABLE)
         bench.run_ms(60)
+
+
+def test_emergency_stop_overtakes_the_commands_that_wait_before_it(bench: Bench) -> None:
+    set_moving(bench)
+    for _ in range(6):
+        bench.send(FAST)
+    _, _, last_byte = bench.send(Command.ESTOP, ESTOP_SEQ)
+    assert milliseconds_to_last_step(bench, last_byte) < 0.1
+    assert_latched(bench, Fault.ESTOP_COMMAND)
 
 
 @pytest.mark.parametrize("hold", [0, 1])

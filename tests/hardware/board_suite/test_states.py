@@ -46,6 +46,7 @@ class BoardStates(RuleBasedStateMachine):
     def power_on(self) -> None:
         self.bench = Bench(new_chip(self.emulator))
         self.state, self.faults, self.homed, self.open = State.DISABLED, Fault(0), False, False
+        self.origins = [0, 0, 0, 0]
 
     def teardown(self) -> None:
         self.bench.assert_drives_content()
@@ -142,7 +143,8 @@ class BoardStates(RuleBasedStateMachine):
         assert result is (self.expected_refusal(enabled=True) or Result.OK)
         if self.state is State.ENABLED:
             status = self.bench.wait_for_rest()
-            assert status.position == tuple(drive.position for drive in self.bench.drives) or not self.homed
+            at = zip(self.bench.drives, self.origins, strict=True)
+            assert status.position == tuple(drive.position + origin for drive, origin in at)
 
     @rule(position=integers(-100, 100))
     def home(self, position: int) -> None:
@@ -153,6 +155,7 @@ class BoardStates(RuleBasedStateMachine):
             assert result is Result.OK
         if result is Result.OK:
             self.homed = True
+            self.origins = [position - drive.position for drive in self.bench.drives]
 
     @rule(watchdog=sampled_from([0.05, 0.1, 0.2]), hold=integers(0, 1))
     def configure(self, watchdog: float, hold: int) -> None:

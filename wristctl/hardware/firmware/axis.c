@@ -23,7 +23,7 @@ static struct axis {
 } axes[AXES];
 
 static volatile uint16_t late_steps;
-static volatile bool permitted; /* cleared by axes_halt(), so that a rate worked out before cannot start an axis after */
+volatile bool axes_permitted; /* so that a rate worked out before a halt cannot start an axis after it */
 
 struct timer {
   volatile uint16_t *count, *compare;
@@ -84,11 +84,11 @@ void axis_halt(uint8_t axis) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { halt(axis); }
 }
 
-void axes_permit(void) { permitted = true; }
+void axes_permit(void) { axes_permitted = true; }
 
 void axes_halt(void) {
-  permitted = false;
-  for (uint8_t i = 0; i < AXES; i++) halt(i);
+  axes_silence();
+  for (uint8_t i = 0; i < AXES; i++) axes[i].stepping = false;
 }
 
 static void point(uint8_t axis, int8_t direction) {
@@ -127,7 +127,7 @@ void axis_turn(uint8_t axis, float rate) {
     a->chunks = chunks;
     a->rest = rest;
     a->fraction = interval;
-    if (!a->stepping && permitted)
+    if (!a->stepping && axes_permitted)
       start(axis);
     else if (a->chunks_left > chunks)
       a->chunks_left = chunks; /* speeding up: do not sit out the old long wait */

@@ -58,12 +58,12 @@ bool frame_receive(struct frame *f) {
         encoded[encoded_length++] = byte;
       else
         overlong = true;
-      continue;
+    } else if (encoded_length) { /* delimiters in a row are no frames */
+      bool sound = accept(f);
+      encoded_length = 0;
+      overlong = false;
+      return sound; /* also of a bad one: the main loop has more to do than to read noise */
     }
-    bool whole = encoded_length && accept(f); /* delimiters in a row are no frames */
-    encoded_length = 0;
-    overlong = false;
-    if (whole) return true;
   }
   return false;
 }

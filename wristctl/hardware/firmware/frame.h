@@ -11,8 +11,8 @@ struct frame {
   uint8_t length;                   /* of the payload */
 };
 
-bool frame_receive(struct frame *f);      /* true once a whole, sound frame has come in; call again until bytes run out */
-void frame_send(struct frame *f);         /* dropped, and counted, where the host does not read */
+bool frame_receive(struct frame *f); /* reads up to the end of one frame: true where it came whole and sound */
+void frame_send(struct frame *f);    /* dropped, and counted, where the host does not read */
 extern uint32_t frames_received;
 extern uint16_t frames_bad_crc, frames_malformed, frames_dropped;
 

@@ -13,6 +13,7 @@ static volatile uint8_t state, faults, silent_ms;
 static volatile uint8_t settle_left;
 static volatile uint16_t watchdog_left, stop_left;
 static volatile bool homed;
+volatile bool safety_estop_heard;
 static uint8_t state_after_stop;
 static uint16_t longest_stop_ms;
 static struct configuration config;
@@ -68,6 +69,11 @@ static void latch(uint8_t fault, bool release) {
   if (release) drives_off();
 }
 
+static void latch_estop_command(void) {
+  safety_estop_heard = false;
+  latch(FAULT_ESTOP_COMMAND, true);
+}
+
 static void end_stop(void) {
   stop_at_once(state_after_stop);
   if (!config.hold_on_fault) drives_off();
@@ -94,6 +100,7 @@ ISR(TIMER0_COMPA_vect) {
   uint32_t ms = ++milliseconds;
   wdt_reset();
   if (estop_open() && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
+  if (safety_estop_heard) latch_estop_command();
   if (silent_ms < HEARTBEAT_MS)
     silent_ms++;
   else if (!(faults & FAULT_HANG))
@@ -160,7 +167,7 @@ void safety_trust_positions(void) {
 }
 
 void safety_emergency_stop(void) {
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { latch(FAULT_ESTOP_COMMAND, true); }
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { latch_estop_command(); }
 }
 
 void safety_clear(void) {

@@ -25,6 +25,7 @@ void safety_enable(void);
 void safety_disable(void); /* ramp down first; in FAULT: release held drives */
 void safety_trust_positions(void);
 void safety_emergency_stop(void);
+extern volatile bool safety_estop_heard; /* the receive interrupt has silenced the axes; the next millisecond latches it */
 void safety_clear(void);
 void safety_at_rest(void); /* motion has ended: a stop is complete */
 

@@ -1,5 +1,7 @@
 #include "uart.h"
+#include "axis.h"
 #include "messages.h"
+#include "safety.h"
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <util/atomic.h>
@@ -16,8 +18,23 @@ void uart_init(void) {
   UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 }
 
+/* An emergency stop does not wait behind other commands: its frame is known by its bytes, CRC and all. The main loop
+ * meets it again in its turn, and answers it. */
+static inline void listen_for_estop(uint8_t byte) {
+  static const uint8_t frame[] = ESTOP_FRAME;
+  static uint8_t heard;
+  if (byte != frame[heard]) {
+    heard = byte == frame[0];
+  } else if (++heard == sizeof frame) {
+    heard = 1; /* one delimiter may end a frame and begin the next */
+    axes_silence();
+    safety_estop_heard = true;
+  }
+}
+
 ISR(USART0_RX_vect) {
   uint8_t status = UCSR0A, byte = UDR0, head = rx_head, next = head + 1;
+  listen_for_estop(byte);
   if (status & (_BV(DOR0) | _BV(FE0))) errors++;
   if (next == rx_tail) {
     errors++;
