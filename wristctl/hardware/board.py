@@ -41,7 +41,7 @@ Axes = tuple[float, float, float, float]
 ATTEMPTS = 3
 """Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
 
-_HELLO_PATIENCE, _BOOT_TIME = 0.25, 5.0
+_START_PATIENCE, _START_TIME = 0.1, 3.0
 _ANSWER = 0x80
 _FIRST_OF_HELLO = struct.Struct("<BI3B")  # protocol, dictionary, firmware: in this place in every version
 
@@ -95,16 +95,8 @@ class Board:
 
     def connect(self) -> Hello:
         """Wait for the board, which may be starting, and see that it speaks by our message table."""
-        deadline = self.transport.now() + _BOOT_TIME
-        while True:
-            try:
-                payload = self._exchange(Command.HELLO, b"", _HELLO_PATIENCE, attempts=1)
-                break
-            except NoAnswer:
-                if self.transport.now() > deadline:
-                    seen = self.traffic.bytes_read
-                    tried = self.traffic.sent
-                    raise NoAnswer(self.transport.name, Command.HELLO, tried, seen) from None
+        self.transport.wait(self.transport.boot_time)
+        payload = self._when_up(Command.HELLO)
         _protocol, dictionary, *version = _FIRST_OF_HELLO.unpack_from(payload, 1)
         if dictionary != DICTIONARY_HASH:
             raise WrongFirmware(self.transport.name, dictionary, tuple(version), DICTIONARY_HASH)
@@ -157,6 +149,15 @@ class Board:
         """No further step, drives released, FAULT latched."""
         return self.send(Command.ESTOP)
 
+    def stop_whatever_runs(self) -> Result:
+        """Emergency stop without a session, at once and until answered, of a board of any message table."""
+        try:
+            answer = self._exchange(Command.ESTOP, b"", _START_PATIENCE, ATTEMPTS)
+        except NoAnswer:
+            self.transport.wait(self.transport.boot_time)
+            answer = self._when_up(Command.ESTOP)
+        return Result(answer[0])
+
     def clear(self) -> Status:
         """Leave FAULT for DISABLED."""
         return self.send(Command.CLEAR)
@@ -206,6 +207,17 @@ class Board:
             self._see_restart()
             raise Refused(self.transport.name, command, result)
         return result, content
+
+    def _when_up(self, command: Command) -> bytes:
+        """Send for as long as the board may be starting; what it answers."""
+        deadline = self.transport.now() + _START_TIME
+        while True:
+            try:
+                return self._exchange(command, b"", _START_PATIENCE, attempts=1)
+            except NoAnswer:
+                if self.transport.now() > deadline:
+                    sent, seen = self.traffic.sent, self.traffic.bytes_read
+                    raise NoAnswer(self.transport.name, command, sent, seen) from None
 
     def _see_restart(self) -> None:
         before, now = self.hello, self.connect()

@@ -22,9 +22,7 @@ HARDWARE, SAFETY_STOP = 4, 5
 class BoardError(UserError):
     """The board could not be made to do something; `origin` is host, cable or firmware."""
 
-    def __init__(
-        self, origin: str, what: str, where: str = "", fix: str = "", exit_code: int = HARDWARE
-    ) -> None:
+    def __init__(self, origin: str, what: str, where: str = "", fix: str = "", exit_code: int = HARDWARE) -> None:
         super().__init__(f"{origin}: {what}", where, fix, exit_code)
         self.origin = origin
 
@@ -82,9 +80,7 @@ class Refused(BoardError):
 
     def __init__(self, port: str, command: Command, result: Result) -> None:
         self.result = result
-        super().__init__(
-            "host", f"{command.name} refused: {RESULT_MEANING[result]}", port, RESULT_FIX[result]
-        )
+        super().__init__("host", f"{command.name} refused: {RESULT_MEANING[result]}", port, RESULT_FIX[result])
 
 
 class Restarted(BoardError):

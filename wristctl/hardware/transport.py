@@ -10,7 +10,10 @@ from typing import Any, NamedTuple, Protocol
 import serial
 from serial.tools import list_ports
 
-from wristctl.hardware.errors import PortLost, PortUnusable
+from wristctl.hardware.errors import BoardError, PortLost, PortUnusable
+
+BOOT_TIME = 2.0
+"""Seconds that a Mega's boot loader waits for a program after a reset, and some more."""
 
 _BOARD_VENDORS = {0x2341, 0x2A03, 0x1A86, 0x0403, 0x10C4}
 """USB vendors: Arduino (two), and the makers of the serial chips CH340, FT232 and CP210x."""
@@ -20,6 +23,9 @@ class Transport(Protocol):
     """Bytes to and from a board, and the clock by which answers are late."""
 
     name: str
+    boot_time: float
+    """Seconds after opening in which the board may be starting, and must hear nothing: a byte would keep the Mega's
+    boot loader waiting for a program."""
 
     def write(self, data: bytes) -> None:
         """Send."""
@@ -51,6 +57,7 @@ class SerialTransport:
             self._serial = serial.serial_for_url(port, baudrate=baud, timeout=0, write_timeout=1.0, **only)
         except (OSError, ValueError) as error:
             raise PortUnusable(port, error) from error
+        self.boot_time = BOOT_TIME if self._resets_board() else 0.0
 
     def write(self, data: bytes) -> None:
         """Send. Raises PortLost."""
@@ -79,6 +86,13 @@ class SerialTransport:
         """Close the port."""
         self._serial.close()
 
+    def _resets_board(self) -> bool:
+        """Whether it has modem lines, of which DTR resets an Arduino: sockets and pseudo-terminals have none."""
+        try:
+            return "://" not in self.name and self._serial.cts is not None
+        except OSError:
+            return False
+
     @contextmanager
     def _watched(self) -> Iterator[None]:
         try:
@@ -103,3 +117,30 @@ def ports() -> list[PortFound]:
         for each in list_ports.comports()
     ]
     return sorted(found, key=lambda port: (not port.board_like, port.device))
+
+
+EMULATED = "emulated"
+"""The name of the port that is no port: the emulated board in this process, in virtual time."""
+
+
+def open_transport(port: str | None, baud: int, exclusive: bool = True) -> Transport:
+    """The wire to the board at `port`: a device, `socket://host:port` or `emulated`; None finds the only board.
+
+    Raises PortUnusable, and BoardError where None finds no board or several.
+    """
+    if port == EMULATED:
+        from wristctl.hardware.emulator.virtual import VirtualTransport
+
+        return VirtualTransport()
+    return SerialTransport(port or only_board(), baud, exclusive)
+
+
+def only_board() -> str:
+    """The port of the only board plugged in. Raises BoardError where there is none, or more than one."""
+    boards = [port.device for port in ports() if port.board_like]
+    if len(boards) == 1:
+        return boards[0]
+    if boards:
+        raise BoardError("host", f"several boards: {', '.join(boards)}", fix=f"--port {boards[0]}")
+    fix = "plug it in, name it with --port (wristctl hw ports), or try without one: --port emulated"
+    raise BoardError("host", "no board is plugged in", fix=fix)

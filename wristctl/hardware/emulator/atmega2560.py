@@ -14,7 +14,7 @@ from wristctl.hardware.emulator.execute import run
 from wristctl.hardware.emulator.flash import self_program
 from wristctl.hardware.emulator.intel_hex import read_hex
 from wristctl.hardware.emulator.ports import LETTERS, levels
-from wristctl.hardware.emulator.registers import GLOBAL_INTERRUPT, SREG, write
+from wristctl.hardware.emulator.registers import GLOBAL_INTERRUPT, SREG, read, write
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "wrist.hex"
 BOOT_SECTION = 0x3E000
@@ -30,10 +30,10 @@ class Halted(RuntimeError):
 
 
 class Atmega2560:
-    """The chip of a Mega 2560 board, running an Intel hex file from flash.
+    """The chip of a Mega 2560 board, running an Intel hex file from flash; its emergency stop input is closed.
 
     `baud` is the rate of bytes to the receiver; None means the rate that the program itself has set. With a
-    `boot_loader` (another hex file) reset starts that. The emergency stop input is closed.
+    `boot_loader` (another hex file) reset starts that. The first chip on a machine takes some 15 s, to be compiled.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class Atmega2560:
         self._edges: list[NDArray[np.int64]] = []
         self.drive(*ESTOP_INPUT, False)
         reset(self._chip, POWER_ON)
+        self.run(0)
 
     @property
     def cycles(self) -> int:
@@ -131,6 +132,10 @@ class Atmega2560:
     def poke(self, address: int, value: int) -> None:
         """Store a byte at an address of the data space, as a program would."""
         write(self._chip, address, value)
+
+    def peek(self, address: int) -> int:
+        """Load a byte from an address of the data space, as a program would."""
+        return int(read(self._chip, address))
 
     def reset(self) -> None:
         """Pull the reset pin; bytes on the line are lost."""

@@ -15,9 +15,7 @@ _RANK = "dDPrRAsKqbkhw"
 Words = NDArray[np.int64]
 
 
-def decode(
-    flash: NDArray[np.uint8], program: NDArray[np.int32], first: int = 0, count: int = FLASH_WORDS
-) -> None:
+def decode(flash: NDArray[np.uint8], program: NDArray[np.int32], first: int = 0, count: int = FLASH_WORDS) -> None:
     """Fill `count` rows of `program` (operation and two operands) from the flash bytes."""
     every = flash.view("<u2").astype(np.int64)
     words = every[first : first + count]
@@ -34,9 +32,7 @@ def decode(
                 {*pattern, *extra.replace("X", "").replace("Y", "").replace("Z", "")} - {*"01"},
                 key=_RANK.find,
             )
-            operands = [
-                _operand(letter, pattern, words[at], behind[at]) for letter in letters if letter != "h"
-            ]
+            operands = [_operand(letter, pattern, words[at], behind[at]) for letter in letters if letter != "h"]
             if extra in _POINTER:
                 displacement = operands[1] if len(operands) == 2 else np.zeros_like(at)
                 operands = [operands[0], _POINTER[extra] + (displacement << 5)]

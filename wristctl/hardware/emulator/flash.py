@@ -31,5 +31,6 @@ def self_program(chip: Chip) -> None:
     if command in (_WRITE, _READ_AGAIN):
         chip.page[:] = 0xFF
     if command in (_ERASE, _WRITE):
-        decode(chip.flash, chip.program, page // 2, PAGE_BYTES // 2)
+        before = max(0, page // 2 - 1)  # its second word may be the first of this page
+        decode(chip.flash, chip.program, before, (page + PAGE_BYTES) // 2 - before)
     memory[SPMCSR] &= ~np.int32(0x1F)

@@ -24,9 +24,7 @@ def read_hex(path: Path) -> dict[int, bytes]:
             if not line.startswith(":") or record[0] != len(record) - 5:
                 raise ValueError
         except (ValueError, IndexError) as error:
-            raise UserError(
-                "not a line of an Intel hex file", where, "build or fetch the file anew"
-            ) from error
+            raise UserError("not a line of an Intel hex file", where, "build or fetch the file anew") from error
         if sum(record) & 0xFF:
             raise UserError("a wrong check sum", where, "build or fetch the file anew")
         kind, payload = record[3], record[4:-1]

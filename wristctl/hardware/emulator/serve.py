@@ -139,7 +139,8 @@ def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: Tr
         before, there = there, line.wait(_QUANTUM if there else _IDLE_QUANTUM)
         if there and not before:
             chip.reset()
-        chip.write(line.receive())
+        if there:
+            chip.write(line.receive())
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
         chip.run(max(0, round(min(behind, _FURTHEST_BEHIND) * FREQUENCY)))

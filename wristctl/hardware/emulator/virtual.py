@@ -10,6 +10,7 @@ class VirtualTransport:
     """The wire to an emulated chip in the same process."""
 
     name = "emulated"
+    boot_time = 0.0
 
     def __init__(self, chip: Atmega2560 | None = None) -> None:
         self.chip = chip or Atmega2560()
