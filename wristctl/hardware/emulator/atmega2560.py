@@ -84,8 +84,7 @@ class Atmega2560:
             elif why == state.BUFFER_FULL:
                 self._keep_edges()
             else:
-                what = "not an instruction" if why == state.ILLEGAL else "a device mode that is not emulated"
-                raise Halted(f"{what}, near byte address {2 * chip.pc - 2:#x}")
+                raise self._halted(why)
 
     def write(self, data: bytes) -> None:
         """Queue bytes on the line to the receiver; they arrive one after another."""
@@ -132,10 +131,16 @@ class Atmega2560:
     def poke(self, address: int, value: int) -> None:
         """Store a byte at an address of the data space, as a program would."""
         write(self._chip, address, value)
+        if self._chip.halt == state.NOT_EMULATED:
+            raise self._halted(state.NOT_EMULATED)
 
     def peek(self, address: int) -> int:
         """Load a byte from an address of the data space, as a program would."""
         return int(read(self._chip, address))
+
+    def ram(self, address: int, count: int) -> NDArray[np.int32]:
+        """Bytes of memory, read from outside the chip."""
+        return self._chip.memory[address : address + count].copy()
 
     def reset(self) -> None:
         """Pull the reset pin; bytes on the line are lost."""
@@ -143,6 +148,10 @@ class Atmega2560:
 
     def close(self) -> None:
         """Nothing to give back: here so that every emulator ends alike."""
+
+    def _halted(self, why: int) -> Halted:
+        what = "not an instruction" if why == state.ILLEGAL else "a device mode that is not emulated"
+        return Halted(f"{what}, near byte address {2 * self._chip.pc - 2:#x}")
 
     def _keep_edges(self) -> None:
         self._edges.append(self._chip.edges[: self._chip.edge_count].copy())

@@ -6,6 +6,7 @@ As on a Mega, the first client to open the port resets the board.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import select
 import socket
@@ -14,8 +15,10 @@ from collections.abc import Callable
 from typing import Protocol
 
 from wristctl.config.errors import UserError
-from wristctl.hardware.emulator.atmega2560 import Atmega2560
+from wristctl.hardware.emulator.atmega2560 import Atmega2560, Halted
 from wristctl.hardware.emulator.chip import FREQUENCY
+
+log = logging.getLogger(__name__)
 
 _QUANTUM, _IDLE_QUANTUM = 0.0005, 0.02
 _FURTHEST_BEHIND = 0.1
@@ -132,7 +135,7 @@ class TcpLine:
 
 
 def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: True) -> None:
-    """Run the chip in real time on this line for as long as `running` says."""
+    """Run the chip in real time on this line for as long as `running` says; a program that crashes is reset."""
     start = time.monotonic() - chip.cycles / FREQUENCY
     there = False
     while running():
@@ -143,7 +146,11 @@ def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: Tr
             chip.write(line.receive())
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
-        chip.run(max(0, round(min(behind, _FURTHEST_BEHIND) * FREQUENCY)))
+        try:
+            chip.run(max(0, round(min(behind, _FURTHEST_BEHIND) * FREQUENCY)))
+        except Halted as crash:
+            log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
+            chip.reset()
         if data := chip.read():
             line.send(data)
         chip.events()
