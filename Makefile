@@ -25,6 +25,7 @@ lint: .venv/dev
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
+	$(BIN)/python benchmarks/board.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:

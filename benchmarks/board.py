@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import threading
+import subprocess
+import sys
 import time
 
 from wristctl.hardware.board import Board
 from wristctl.hardware.check import RoundTrips, round_trips
 from wristctl.hardware.emulator import Atmega2560
 from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.emulator.serve import PtyLine, serve
 from wristctl.hardware.emulator.virtual import VirtualTransport
 from wristctl.hardware.messages import BAUD, Command
 from wristctl.hardware.transport import SerialTransport
@@ -26,11 +26,10 @@ def loop(board: Board) -> tuple[int, float]:
     wire, missed, longest = board.transport, 0, 0.0
     due = wire.now()
     for k in range(CYCLES):
-        began = wire.now()
         board.turn((2000.0, -2000.0, 5.0 * k, 0.0))
-        longest = max(longest, wire.now() - began)
-        due += PERIOD
-        missed += wire.now() > due
+        longest = max(longest, wire.now() - due)
+        missed += wire.now() > due + PERIOD
+        due = max(due + PERIOD, wire.now())
         wire.wait(max(0.0, due - wire.now()))
     board.stop()
     return missed, longest
@@ -52,14 +51,15 @@ def speed(rates: tuple[float, float, float, float]) -> float:
 
 def main() -> None:
     began = time.perf_counter()
-    chip = Atmega2560()
+    Atmega2560()
     print(f"first chip ready after {time.perf_counter() - began:.1f} s")
-    line, running = PtyLine(), [True]
-    serving = threading.Thread(target=serve, args=(chip, line, lambda: running[0]))
-    serving.start()
+    command = [sys.executable, "-c", "from wristctl.cli.app import main; main()", "hw", "emulate", "-q"]
+    serving = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert serving.stdout is not None
+    port = serving.stdout.readline().strip()
     print(f"\nround trips at {BAUD} baud, {COUNT} each")
     print(f"{'':24} {'command':8} {'median ms':>10} {'p99 ms':>10} {'worst ms':>10}")
-    for where, wire in (("virtual time", VirtualTransport()), ("pty, real time", SerialTransport(line.address, BAUD))):
+    for where, wire in (("virtual time", VirtualTransport()), ("pty, real time", SerialTransport(port, BAUD))):
         with Board(wire) as board:
             for command in (Command.PING, Command.STATUS):
                 show(where, round_trips(board, command, COUNT))
@@ -67,9 +67,8 @@ def main() -> None:
             board.home()
             missed, longest = loop(board)
             print(f"{where:24} 200 Hz command-status loop: {missed} of {CYCLES} missed, longest {1e3 * longest:.2f} ms")
-    running[0] = False
-    serving.join()
-    line.close()
+    serving.terminate()
+    serving.wait()
     print("\nvirtual seconds a processor second")
     for what, rates in (
         ("drives on, at rest", (0.0, 0.0, 0.0, 0.0)),

@@ -110,8 +110,11 @@ MODELS: list[Model] = [
     shifted(lambda x, sreg: 0 * x),
     shifted(lambda x, sreg: 0 * x + (sreg & C)),
 ]
-NAMES = "add adc sub sbc cp cpc and or eor com neg swap inc dec asr lsr ror".split()
-PRODUCTS = "mul muls mulsu fmul fmuls fmulsu".split()
+NAMES = (
+    *("add", "adc", "sub", "sbc", "cp", "cpc", "and", "or", "eor"),
+    *("com", "neg", "swap", "inc", "dec", "asr", "lsr", "ror"),
+)
+PRODUCTS = ("mul", "muls", "mulsu", "fmul", "fmuls", "fmulsu")
 
 
 @pytest.fixture(scope="module")

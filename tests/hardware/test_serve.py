@@ -38,6 +38,7 @@ def test_a_board_answers_through_pyserial_and_starts_anew_for_the_next_client(li
             assert board.hello is not None
             nonces.append(board.hello.boot_nonce)
             board.enable()
+            board.home()
             assert board.turn((1000.0, 0.0, 0.0, 0.0))[1].state == State.ENABLED
         time.sleep(0.1)
     assert nonces[1] == nonces[0] + 1

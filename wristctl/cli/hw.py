@@ -106,7 +106,7 @@ def check(
         print(json.dumps(shown, indent=2))
         return
     columns = ("command", "times", "median [ms]", "p99 [ms]", "worst [ms]")
-    rows = [(each.command, each.count, *(1e3 * value for value in each[2:])) for each in times]
+    rows = [(each.command, each.rounds, *(1e3 * value for value in each[2:])) for each in times]
     for table in (
         Table("Board", ("port", transport.name), [(name, str(value)) for name, value in facts.items()]),
         Table("Round trips", columns, rows),

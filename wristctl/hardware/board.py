@@ -220,8 +220,10 @@ class Board:
                     raise NoAnswer(self.transport.name, command, sent, seen) from None
 
     def _see_restart(self) -> None:
-        before, now = self.hello, self.connect()
-        if before is not None and now.boot_nonce != before.boot_nonce:
+        if self.hello is None:
+            return
+        answer = self._exchange(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
+        if LAYOUTS[Hello].unpack(Hello, answer[1:]).boot_nonce != self.hello.boot_nonce:
             raise Restarted(self.transport.name)
 
     def _exchange(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:

@@ -15,7 +15,7 @@ class RoundTrips(NamedTuple):
     """Seconds from a command's first byte to its answer's last."""
 
     command: str
-    count: int
+    rounds: int
     median: float
     p99: float
     worst: float
