@@ -106,6 +106,27 @@ def test_flooded_line_costs_answers_but_neither_steps_nor_the_link(bench: Bench,
     assert bench.do(Command.COUNTERS).late_steps == 0
 
 
+def test_host_that_does_not_wait_loses_answers_but_gets_none_broken(bench: Bench) -> None:
+    bench.get_ready()
+    for _ in range(100):
+        bench.send(Rate((0.0, 0.0, 0.0, 0.0)))
+    bench.run_ms(150)
+    answers = bench.frames()  # each with a right CRC
+    counters = bench.do(Command.COUNTERS)
+    assert counters.dropped_answers > 0
+    assert len(answers) + counters.dropped_answers == 100
+
+
+def test_rates_that_cross_over_at_more_than_the_allowed_total_delay_no_step(bench: Bench) -> None:
+    bench.get_ready()
+    one_fast, three_fast = (20_000.0, -6_600.0, 6_600.0, -6_600.0), (0.0, 13_300.0, -13_300.0, 13_300.0)
+    for rates in (one_fast, three_fast, one_fast, three_fast):
+        keep_rate(bench, Rate(rates), 0.6)
+    assert bench.do(Command.COUNTERS).late_steps == 0
+    bench.do(Command.STOP)
+    assert bench.wait_for_rest().position == positions(bench)
+
+
 def test_ramps_keep_the_configured_acceleration(bench: Bench) -> None:
     acceleration = 20_000
     bench.do(Configure(acceleration=acceleration))

@@ -138,6 +138,21 @@ def test_emergency_stop_input_ends_stepping_within_two_milliseconds(bench: Bench
         bench.run_ms(60)
 
 
+def test_no_axis_starts_again_when_a_stop_falls_into_the_working_out_of_its_rate(bench: Bench, rounds: int) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(60 + 10 * rounds):
+        bench.get_ready()
+        for _ in range(rng.integers(10, 20)):  # always accelerating, the main loop never idle
+            bench.send(Rate(tuple(rng.uniform(-10_000, 10_000, 4))))  # type: ignore[arg-type]
+            bench.run(int(rng.integers(10_000, 20_000)))
+        opened = bench.chip.cycles
+        bench.chip.drive(*ESTOP, True)
+        assert milliseconds_to_last_step(bench, opened) < 2.0
+        bench.chip.drive(*ESTOP, False)
+        bench.frames()
+        bench.do(Command.CLEAR)
+
+
 def flash() -> bytes:
     """Return the image's bytes from address 0 (a hex image below 64 KiB)."""
     out = b""
