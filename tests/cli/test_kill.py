@@ -35,9 +35,13 @@ def _start(folder: Path, command: str) -> subprocess.Popen[bytes]:
 
 
 def _duration(folder: Path, command: str) -> float:
-    began = time.monotonic()
-    assert _start(folder, command).wait() == 0
-    return time.monotonic() - began
+    """How long the command takes once its loops are compiled [s]."""
+    took = []
+    for _ in range(2 if THOROUGH else 1):
+        began = time.monotonic()
+        assert _start(folder, command).wait() == 0
+        took.append(time.monotonic() - began)
+    return took[-1]
 
 
 def test_killed_at_random_moments_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:
@@ -49,7 +53,7 @@ def test_killed_at_random_moments_no_run_looks_complete_that_is_not(tmp_path: Pa
     for number in range(KILLS):
         name = names[number % len(names)]
         child = _start(tmp_path, name)
-        time.sleep(durations[name] * moments.uniform(0.2, 1.1))
+        time.sleep(durations[name] * moments.uniform(0.2, 1.0))
         child.kill()
         ended = child.wait()
         for run in list_runs(tmp_path / "results"):
