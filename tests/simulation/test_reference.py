@@ -64,3 +64,37 @@ def test_chain_tip_equals_the_compiled_kinematics() -> None:
     np.testing.assert_allclose(
         chain_tip(angles, WRIST.length), terms(segments(WRIST, 4), angles, 0 * angles).tip[:, :2], atol=1e-15
     )
+
+
+def test_sine_swings_between_straight_and_the_angle_and_never_rests() -> None:
+    m = evaluated(kind="sine", frequency=0.5, angle_deg=20.0)
+    np.testing.assert_allclose(m.theta_ref[[0, 1000, 2000]], np.deg2rad([0.0, 20.0, 0.0]), atol=1e-15)
+    np.testing.assert_allclose(np.gradient(m.theta_ref, m.time)[1:-1], m.rate_ref[1:-1], atol=1e-5)
+    np.testing.assert_allclose(np.gradient(m.rate_ref, m.time)[1:-1], m.acceleration_ref[1:-1], atol=1e-4)
+    assert m.rest == m.horizon
+
+
+def test_multi_step_holds_each_angle_for_its_duration() -> None:
+    m = evaluated(kind="multi-step", angles_deg=(10.0, -20.0, 5.0), duration=0.5)
+    np.testing.assert_allclose(np.rad2deg(m.theta_ref[[0, 499, 500, 999, 1000, 2999]]), [10, 10, -20, -20, 5, 5])
+    assert (m.begin, m.rest) == (1.0, 1.0) and m.move == pytest.approx(np.deg2rad(25.0))
+    assert not m.rate_ref.any()
+
+
+def test_tip_path_visits_its_tips_and_rests_at_each() -> None:
+    tips = tuple(tuple(float(v) for v in arc_tip(np.array(a), r)) for a, r in ((0.4, 0.082), (-0.2, 0.079)))
+    m = evaluated(kind="tip-path", tips=tips, duration=0.8, inverse="exact")
+    np.testing.assert_allclose(m.tip_desired[[800, 1600]], tips, atol=1e-15)
+    np.testing.assert_allclose(m.theta_ref[[800, 1600]], [0.4, -0.2], atol=1e-14)
+    np.testing.assert_allclose(m.rate_ref[[0, 800, 1600]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.gradient(m.theta_ref, m.time)[1:-1], m.rate_ref[1:-1], atol=1e-4)
+    assert m.rest == pytest.approx(1.6) and m.move == pytest.approx(-0.6)
+
+
+def test_every_target_of_a_path_must_be_within_reach() -> None:
+    with pytest.raises(UserError, match="beyond the wrist's range"):
+        evaluated(kind="multi-step", angles_deg=(10.0, 60.0))
+    with pytest.raises(UserError, match="beyond the range"):
+        evaluated(kind="tip-path", tips=((0.078, 0.014), (0.0, 0.08)), inverse="exact")
+    with pytest.raises(ValidationError, match="needs inverse"):
+        Reference(kind="tip-path")

@@ -96,7 +96,10 @@ def test_a_wrist_that_bends_beyond_a_full_turn_is_a_failure_and_spoils_no_other_
     outcome = run("computed-torque", [tame, (900.0, 9.0), tame], loop, MOVES[0])
     assert outcome.failed.tolist() == [False, True, False]
     assert np.isnan(outcome.metrics["rmse"][1]) and outcome.metrics["rmse"][0] == outcome.metrics["rmse"][2] < 1e-3
-    assert np.isfinite(outcome.column("theta", 1)).all()
+    theta = outcome.column("theta", 1)
+    lost = int(np.argmax(np.isnan(theta)))
+    assert 0 < lost < len(theta) and np.isnan(theta[lost:]).all() and np.isfinite(theta[:lost]).all()
+    assert np.isfinite(outcome.segment_theta(1)).all()
 
 
 def test_the_loop_is_left_right_symmetric() -> None:
@@ -110,16 +113,3 @@ def test_substeps_change_the_result_by_less_than_a_microradian() -> None:
     coarse = run("computed-torque", [(50.0, 1.0)], LOOPS["default"], MOVES[0])
     fine = run("computed-torque", [(50.0, 1.0)], Loop(substeps=10), MOVES[0])
     assert np.abs(coarse.column("theta", 0) - fine.column("theta", 0)).max() < 1e-6
-
-
-def test_tensions_stay_between_pretension_and_limit_for_any_gains_in_the_box() -> None:
-    rng = np.random.default_rng(1)
-    for name in ("smc", "pid", "computed-torque"):
-        boxes = np.log10([[g.low, g.high] for g in controller(name).gains.values()]).T
-        gains = [tuple(row) for row in 10.0 ** rng.uniform(boxes[0], boxes[1], (40, boxes.shape[1]))]
-        outcome = run(name, gains, LOOPS["default"], STEP, horizon=0.5)
-        assert outcome.samples is not None
-        for side in ("plus", "minus"):
-            tension = np.array([outcome.column(f"tension_{side}", i) for i in range(40)])
-            assert np.isfinite(tension).all()
-            assert tension.min() >= WRIST.pretension and tension.max() <= WRIST.tension_limit

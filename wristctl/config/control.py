@@ -22,7 +22,9 @@ class Objective(Section):
 
     rmse: float = quantity(1.0, "1/rad", "weight of the RMSE", ge=0)
     settling: float = quantity(0.01, "1/s", "weight of the settling time (the horizon where it never settles)", ge=0)
-    chattering: float = quantity(1e-6, "s/N", "weight of the total variation of tension per second", "paper: output error and chattering", ge=0)
+    chattering: float = quantity(
+        1e-6, "s/N", "weight of the total variation of tension per second", "paper: output error and chattering", ge=0
+    )
     saturation: float = quantity(0.0, "", "weight of the share of time in saturation", ge=0)
 
 
@@ -67,6 +69,7 @@ class CompareSettings(Section):
     horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
+    tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
 
 
 class SimulateSettings(Section):
@@ -76,6 +79,9 @@ class SimulateSettings(Section):
     gains: Gains = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
+    start: Literal["straight", "equilibrium"] = choice(
+        "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
+    )
     horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     tuned: str | None = choice(None, "tune run behind gains: tuned")

@@ -18,11 +18,12 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserErr
     details = error.errors(include_url=False)
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
     detail: Any = unknown[0] if unknown else max(details, key=lambda each: len(each["loc"]))
-    path: KeyPath = detail["loc"]
-    what, fix = _what(detail), _fix(detail)
-    while path and path not in origins:
-        path = path[:-1]
-    return UserError(what, f"{origins[path]}: {'.'.join(map(str, path))}" if path else "", fix)
+    path: KeyPath = ()
+    for key in detail["loc"]:
+        if (*path, key) in origins:  # a location also names the alternatives of a union, which no file does
+            path = (*path, key)
+    where = f"{origins[path]}: {'.'.join(map(str, path))}" if path else ""
+    return UserError(_what(detail), where, _fix(detail))
 
 
 def _what(detail: Any) -> str:

@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import Section, choice, quantity
 
 Inverse = Literal["none", "exact", "network"]
@@ -15,18 +16,37 @@ class Loop(Section):
     """The plant and the timing. Controllers always see one segment (E13: a scalar input)."""
 
     plant_segments: int = choice(4, "constant-curvature segments of the simulated wrist", "assumed", ge=1, le=8)
+    plant: Plant = Plant()
+    disturbances: Disturbances = Disturbances()
+    actuator: Actuator = Actuator()
+    sensor: Sensor = Sensor()
     control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
     substeps: int = choice(1, "integration steps within one control period", ge=1, le=1000)
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")
 
+    @model_validator(mode="after")
+    def _a_frame_lasts_a_tick(self) -> Self:
+        if self.sensor.level == "camera" and self.sensor.frame_rate * self.control_period > 1.0:
+            raise ValueError("sensor.frame_rate is above one frame per control_period")
+        return self
+
 
 class Reference(Section):
-    """The wanted motion, from rest and straight: a step or a minimum-jerk move to an angle or a tip position."""
+    """The wanted motion, from rest and straight.
 
-    kind: Literal["step", "minimum-jerk"] = choice("minimum-jerk", "shape of the move")
-    angle_deg: float | None = quantity(None, "deg", "wanted bending angle at the end; 30 deg where no target is given", "paper")
+    step and minimum-jerk move to an angle or a tip position, sine swings between straight and the angle, multi-step
+    jumps through angles, tip-path moves through tip positions, each move a minimum jerk of `duration`.
+    """
+
+    kind: Literal["step", "minimum-jerk", "sine", "multi-step", "tip-path"] = choice("minimum-jerk", "shape of it")
+    angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
-    duration: float = quantity(1.0, "s", "duration of a minimum-jerk move", "assumed", gt=0)
+    angles_deg: tuple[float, ...] = quantity((20.0, -10.0, 30.0), "deg", "angles of a multi-step", min_length=1)
+    tips: tuple[tuple[float, float], ...] = quantity(
+        ((0.078, 0.014), (0.076, 0.021), (0.079, -0.010), (0.076, 0.021)), "m", "tips of a tip-path", min_length=1
+    )
+    duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
+    frequency: float = quantity(0.5, "1/s", "frequency of a sine", "assumed", gt=0)
     inverse: Inverse = choice(
         "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
     )
@@ -35,7 +55,7 @@ class Reference(Section):
     def _one_target(self) -> Self:
         if self.angle_deg is not None and self.tip is not None:
             raise ValueError("give angle_deg or tip, not both")
-        if self.tip is not None and self.inverse == "none":
+        if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
             raise ValueError("a tip target needs inverse: network or exact")
         return self
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
@@ -20,3 +21,4 @@ class Study(Section):
     tune: TuneSettings = TuneSettings()
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
+    audit: AuditSettings = AuditSettings()

@@ -22,8 +22,8 @@ COMPUTED_TORQUE = Controller(
     law=law,
     source="baseline",
     gains={
-        "w": Gain("rad/s", "natural frequency of the error", 1e0, 1e3),
-        "zeta": Gain("", "damping ratio of the error", 1e-1, 1e1),
+        "w": Gain("rad/s", "natural frequency of the error", 1e-1, 1e5),
+        "zeta": Gain("", "damping ratio of the error", 1e-3, 1e3),
     },
     presets={"default": (50.0, 1.0)},
 )

@@ -10,8 +10,8 @@ from wristctl.lanes.lane import dot, planar, turn
 
 
 @compiled
-def one_segment(wrist: Any, theta: Any, rate: Any) -> Any:
-    """Inertia M and load (C + D) rate + G + K theta of the one-segment wrist, so that M theta'' + load = torque.
+def one_segment_terms(wrist: Any, theta: Any) -> Any:
+    """Inertia M, half its slope dM/d(theta)/2 (so that C = slope rate) and gravity G of the one-segment wrist.
 
     The chord's middle and the hand move along d = dp/d(theta) and bend by d' = d2p/d(theta)2, hence
     M = sum m d.d, C rate = sum m d.d' rate^2 and G = -sum m d.g, all in the chord's own frame.
@@ -36,6 +36,11 @@ def one_segment(wrist: Any, theta: Any, rate: Any) -> Any:
         dot(planar(wrist.gravity_x, wrist.gravity_y), turn(half_turn)),
     )
     falling = dot(0.5 * wrist.mass * chord + wrist.hand_mass * along, weight)
-    return inertia, curving * rate * rate - falling + wrist.damping * rate + wrist.stiffness * theta
+    return inertia, curving, -falling
 
 
+@compiled
+def one_segment(wrist: Any, theta: Any, rate: Any) -> Any:
+    """Inertia M and load (C + D) rate + G + K theta of the one-segment wrist, so that M theta'' + load = torque."""
+    inertia, curving, gravity = one_segment_terms(wrist, theta)
+    return inertia, curving * rate * rate + gravity + wrist.damping * rate + wrist.stiffness * theta

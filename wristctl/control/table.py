@@ -7,11 +7,18 @@ from collections.abc import Mapping
 from wristctl.config.errors import UserError, meant
 from wristctl.control.computed_torque import COMPUTED_TORQUE
 from wristctl.control.feedforward import FEEDFORWARD
+from wristctl.control.gvsc import GVSC
 from wristctl.control.law import Controller
+from wristctl.control.mrac import MRAC
+from wristctl.control.nc import NC
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
+from wristctl.control.smc_tracking import SMC_TRACKING
+from wristctl.control.super_twisting import SUPER_TWISTING
 
-CONTROLLERS: dict[str, Controller] = {c.name: c for c in (SMC, PID, FEEDFORWARD, COMPUTED_TORQUE)}
+CONTROLLERS: dict[str, Controller] = {
+    c.name: c for c in (SMC, PID, MRAC, GVSC, NC, SMC_TRACKING, SUPER_TWISTING, COMPUTED_TORQUE, FEEDFORWARD)
+}
 
 
 def controller(name: str) -> Controller:

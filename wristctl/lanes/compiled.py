@@ -53,5 +53,5 @@ def compiled(function: F) -> F:
     folder = cache_folder()
     if folder is not None:
         numba.config.CACHE_DIR = str(folder)
-    jit = numba.njit(fastmath={"contract"}, error_model="numpy", nogil=True, cache=folder is not None)
+    jit = numba.njit(fastmath={"contract"}, error_model="numpy", nogil=True, forceinline=True, cache=folder is not None)
     return cast(F, jit(function))

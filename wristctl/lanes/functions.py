@@ -6,11 +6,13 @@ import math
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import exp2i, floor, where
+from wristctl.lanes.lane import exp2i, floor, polynomial, where
 
 _LOG2_E = 1.0 / math.log(2.0)
 _LN2_HIGH = 6.93147180369123816490e-01
 _LN2_LOW = 1.90821492927058770002e-10
+_exp_rest = polynomial(tuple(1.0 / math.factorial(k) for k in range(13, 1, -1)))
+"""(exp(r) - 1 - r)/r^2"""
 
 
 @compiled
@@ -34,25 +36,13 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 @compiled
 def tanh(x: Any) -> Any:
     """Hyperbolic tangent to 3 ulp: -t/(t + 2) with t = exp(-2|x|) - 1, by reduction to |r| <= ln(2)/2 and Taylor."""
-    y = -2.0 * minimum(abs(x), 22.0 + 0.0 * x)
+    y = -2.0 * minimum(abs(x), 22.0)
     k = floor(y * _LOG2_E + 0.5)
     r = (y - k * _LN2_HIGH) - k * _LN2_LOW
-    p = 1.0 / 6227020800.0 + 0.0 * x
-    p = p * r + 1.0 / 479001600.0
-    p = p * r + 1.0 / 39916800.0
-    p = p * r + 1.0 / 3628800.0
-    p = p * r + 1.0 / 362880.0
-    p = p * r + 1.0 / 40320.0
-    p = p * r + 1.0 / 5040.0
-    p = p * r + 1.0 / 720.0
-    p = p * r + 1.0 / 120.0
-    p = p * r + 1.0 / 24.0
-    p = p * r + 1.0 / 6.0
-    p = p * r + 0.5
     scale = exp2i(k)
-    t = scale * (r + r * r * p) + (scale - 1.0)
+    t = scale * (r + r * r * _exp_rest(r)) + (scale - 1.0)
     size = -t / (t + 2.0)
-    return where(x < 0.0 * x, -size, size)
+    return where(x < 0.0, -size, size)
 
 
 def _series(order: int, terms: int) -> tuple[float, ...]:
@@ -65,8 +55,8 @@ def _series(order: int, terms: int) -> tuple[float, ...]:
     return tuple(reversed(coefficients))
 
 
-_E2 = _series(2, 15)
-_E3 = _series(3, 15)
+_e2 = polynomial(_series(2, 15))
+_e3 = polynomial(_series(3, 15))
 
 ARC_LIMIT = 2.0 * math.pi
 """Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
@@ -81,11 +71,7 @@ def bessel(x: Any) -> Any:
     (stable, DLMF 10.51) hold at 0 as anywhere else. Absolute error below 4e-16 (E0), that is 2 ulp of 1.
     """
     s = x * x
-    e2 = _E2[0] + 0.0 * x
-    e3 = _E3[0] + 0.0 * x
-    for k in range(1, len(_E2)):
-        e2 = e2 * s + _E2[k]
-        e3 = e3 * s + _E3[k]
+    e2, e3 = _e2(s), _e3(s)
     e1 = 5.0 * e2 - s * e3
     e0 = 3.0 * e1 - s * e2
     return e0, e1, e2, e3

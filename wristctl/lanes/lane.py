@@ -8,6 +8,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils
+from numba.core.typing.templates import signature
+from numba.extending import intrinsic
 
 from wristctl.lanes.types import FAST, LANES, PAIR, VECTOR, define, lane, mask, plane
 
@@ -63,6 +65,24 @@ define(sqrt, (lane,), lane, _instruction("sqrt"))
 define(floor, (lane,), lane, _instruction("floor"))
 define(abs, (lane,), lane, _instruction("fabs"))
 define(exp2i, (lane,), lane, _exp2i)
+
+
+def polynomial(coefficients: tuple[float, ...]) -> Any:
+    """The polynomial with these coefficients, highest power first, as a function of compiled code (Horner)."""
+
+    def emit(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        total = ir.Constant(VECTOR, [coefficients[0]] * LANES)
+        for coefficient in coefficients[1:]:
+            product = builder.fmul(total, args[0], flags=FAST)
+            total = builder.fadd(product, ir.Constant(VECTOR, [coefficient] * LANES), flags=FAST)
+        return total
+
+    @intrinsic
+    def p(typingctx: Any, x: Any) -> Any:
+        """Value at x."""
+        return signature(lane, lane), emit
+
+    return p
 
 
 def planar(x: Any, y: Any) -> Any:

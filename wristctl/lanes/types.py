@@ -33,6 +33,7 @@ class LaneType(types.Type):
         super().__init__(name=f"lane{LANES}")
 
     def can_convert_from(self, typingctx: Any, other: types.Type) -> Conversion | None:
+        """Numbers become lanes by repetition."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
 
@@ -68,6 +69,7 @@ class RowsType(types.Type):
 
     @property
     def llvm(self) -> ir.Type:
+        """A pointer to the first element."""
         return self.element.llvm.as_pointer()
 
     @property

@@ -1,40 +1,54 @@
-"""The compiled closed loop of one block of lanes: reference -> law -> allocation -> tendons -> plant -> metrics."""
+"""The compiled closed loop of one block of lanes.
+
+reference -> law -> allocation -> actuator -> plant with its disturbances -> metrics, sensor and observer -> law.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.law import now_of, wrist_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.actuator import actuate, pulls
+from wristctl.simulation.disturbances import disturb
 from wristctl.simulation.metrics import SUMS, gather, goals_of
+from wristctl.simulation.observer import expect, observe
 from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate, reach, torque_of
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments
 
-RECORDED = ("theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus")
-"""Columns of a recorded sample, followed by the angle of each segment."""
+RECORDED = (
+    "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
+)  # fmt: skip
+"""Columns of a recorded sample, followed by the angle of each segment: tensions as commanded and as they act, and the
+angle that the law sees. theta is nan where the lane has failed."""
 
 _ALIVE = SUMS.index("alive")
-_FIELDS = len(NOW)
 _COLUMNS = len(RECORDED)
 _SIDE = float(TENDONS_PER_SIDE)
+_NAN = float("nan")
 
 
 @compiled
 def run_block(
     law: Any, plant: Any, model: Any, limits: Any, gains: Any, goals: Any, reference: Any, now: Any, memory: Any,
-    state: Any, sums: Any, record: Any, period: float, substeps: int, ticks: int, first: int, last: int, segments: Any,
+    state: Any, sums: Any, record: Any, drive: Any, motors: Any, observer: Any, disturbed: Any,
+    period: float, substeps: int, ticks: int, first: int, last: int, segments: Any,
 ) -> None:  # fmt: skip
     """Advance one block from sample `first` to `last`, `ticks` control periods each.
 
     `reference` is [sample, (angle, rate, acceleration), lane], continued between samples by its own derivatives;
     `state`, `memory` and `sums` carry the loop on, so that a long run may be done in pieces. `record` takes each
-    sample's values, or has no samples. A lane leaves the game when a segment bends beyond a full turn.
+    sample's values, or has no samples. `drive` with its state `motors` are the actuators, `observer` stands behind a
+    camera, `disturbed` holds (tip force, stiffness scale) of each sample; each of the three is None where it is ideal
+    or absent, and then not compiled in. A lane leaves the game when a segment bends beyond a full turn.
     """
-    wrist = load_segments(rows_of(plant))
+    undisturbed = load_segments(rows_of(plant))
+    wrist = undisturbed
+    motor = rows_of(motors)
     known, seen, view = load_segments(rows_of(model)), wrist_of(model), now_of(now)
     bound, gain, goal, kept, sum_ = rows_of(limits), rows_of(gains), goals_of(goals), rows_of(memory), rows_of(sums)
     low, high = _SIDE * bound[0], _SIDE * bound[1]
@@ -46,15 +60,22 @@ def run_block(
     h = period / substeps + zero
     for sample in range(first, last):
         target = rows_of(reference[sample])
+        if disturbed is not None:
+            wrist = disturb(undisturbed, disturbed[sample, 0], disturbed[sample, 1])
         for tick in range(ticks):
             since = tick * period
             angle, rate = zero, zero
             for i in range(n):
                 angle = angle + theta[i]
                 rate = rate + omega[i]
-            torque_low, torque_high = reach(angle, known, low, high)
-            signals[0] = angle
-            signals[1] = rate
+            angle_seen, rate_seen = angle, rate
+            now_tick = sample * ticks + tick
+            if observer is not None:
+                observe(observer, drive, known, now_tick, angle, period)
+                angle_seen, rate_seen = rows_of(observer.now)[0], rows_of(observer.now)[1]
+            torque_low, torque_high = reach(angle_seen, known, low, high)
+            signals[0] = angle_seen
+            signals[1] = rate_seen
             signals[2] = target[0] + since * (target[1] + 0.5 * since * target[2])
             signals[3] = target[1] + since * target[2]
             signals[4] = target[2]
@@ -62,25 +83,34 @@ def run_block(
             signals[6] = torque_high
             signals[7] = period + zero
             wanted = law(view, seen, gain, kept)
-            plus, minus = allocate(angle, known, wanted, low, high)
+            plus, minus = allocate(angle_seen, known, wanted, low, high)
+            given_plus, given_minus = actuate(drive, motor, known, signals[2], plus, minus, period)
+            acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
-            time = (sample * ticks + tick) * period + zero
-            gather(sum_, goal, time, angle, signals[2], plus / _SIDE, minus / _SIDE, saturated)
+            time = now_tick * period + zero
+            gather(sum_, goal, time, angle, signals[2], acting_plus / _SIDE, acting_minus / _SIDE, saturated)
             if tick == 0 and sample < record.shape[0]:
                 row = rows_of(record[sample])
-                row[0] = angle
+                row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
                 row[1] = rate
                 row[2] = wanted
-                row[3] = torque_of(angle, known, plus, minus)
+                row[3] = torque_of(angle_seen, known, plus, minus)
                 row[4] = plus / _SIDE
                 row[5] = minus / _SIDE
+                row[6] = acting_plus / _SIDE
+                row[7] = acting_minus / _SIDE
+                row[8] = angle_seen
                 for i in range(n):
                     row[_COLUMNS + i] = theta[i]
+            if observer is not None:
+                expect(observer, drive, known, now_tick, given_plus, given_minus, period)
             for _ in range(substeps):
                 for i in range(n):
                     old_theta[i] = theta[i]
                     old_omega[i] = omega[i]
-                step(wrist, theta, omega, plus, minus, h)
+                if drive is not None:
+                    acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
+                step(wrist, theta, omega, acting_plus, acting_minus, h)
                 alive = sum_[_ALIVE]
                 for i in range(n):
                     alive = where(abs(theta[i]) < ARC_LIMIT, alive, zero)

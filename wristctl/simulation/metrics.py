@@ -1,7 +1,8 @@
 """Metrics of one rollout, gathered tick by tick, each with formula, unit and direction.
 
 e = theta - theta_ref (E12), sampled at the control ticks; T is the horizon. The move is the time until the reference
-rests. Tensions are those of one tendon of each side.
+rests; a reference that does not rest before the horizon has neither settling time nor overshoot. Tensions are those
+that act, of one tendon of each side.
 """
 
 from __future__ import annotations
@@ -23,11 +24,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metric:
-    """What a number means: unit, formula, and whether less is better."""
+    """What a number means; of all of them less is better."""
 
     unit: str
     formula: str
-    better: str = "lower"
 
 
 METRICS: dict[str, Metric] = {
@@ -37,7 +37,7 @@ METRICS: dict[str, Metric] = {
     "settling": Metric("s", "last instant outside +-2 % of the move around the final reference; never: nan"),
     "settling_5": Metric("s", "the same for +-5 %"),
     "steady_state": Metric("rad", "mean |e| over the last 10 % of the horizon"),
-    "overshoot": Metric("%", "largest passing of the final reference over the move"),
+    "overshoot": Metric("%", "largest passing of the final reference over the last move, from that move's beginning"),
     "iae": Metric("rad s", "integral of |e|"),
     "peak_tension": Metric("N", "largest tension of a tendon"),
     "rms_tension": Metric("N", "sqrt(mean of both sides' squared tensions)"),
@@ -52,8 +52,8 @@ SUMS = (
 )  # fmt: skip
 """Running sums of a lane, from which `summary` makes the metrics."""
 
-GOALS = ("final", "move", "rest", "horizon")
-"""What metrics need to know of the reference: final angle and move [rad], time of rest and horizon [s]."""
+GOALS = ("final", "move", "begin", "rest", "horizon")
+"""What metrics need of the reference: final angle and last move [rad], when it begins and rests, horizon [s]."""
 
 goals_of = rows_named(GOALS)
 (
@@ -75,12 +75,13 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
     sums[_ABSOLUTE] = sums[_ABSOLUTE] + abs(error)
     sums[_LATE] = sums[_LATE] + late * abs(error)
     sums[_LATE_COUNT] = sums[_LATE_COUNT] + late
-    outside = size > 0.02 * goals.move
+    move = abs(goals.move)
+    outside = size > 0.02 * move
     sums[_EXIT_2] = where(outside, time, sums[_EXIT_2])
     sums[_SQUARED_EXIT] = where(outside, sums[_SQUARED], sums[_SQUARED_EXIT])
-    sums[_EXIT_5] = where(size > 0.05 * goals.move, time, sums[_EXIT_5])
-    passed = where(goals.final < 0.0, goals.final - theta, theta - goals.final)
-    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], passed)
+    sums[_EXIT_5] = where(size > 0.05 * move, time, sums[_EXIT_5])
+    passed = where(goals.move < 0.0, goals.final - theta, theta - goals.final)
+    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= goals.begin, passed, 0.0 * passed))
     sums[_PEAK] = maximum(sums[_PEAK], maximum(plus, minus))
     sums[_SQUARED_TENSION] = sums[_SQUARED_TENSION] + 0.5 * (plus * plus + minus * minus)
     change = abs(plus - sums[_PLUS]) + abs(minus - sums[_MINUS])
@@ -101,7 +102,8 @@ def summary(sums: Array, goals: Array, period: float) -> dict[str, Array]:
     after = np.round(ticks - of["exit_2"] / period) - 1.0
     step = goal["rest"] <= 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        settled = of["exit_2"] < goal["horizon"] - 1.5 * period
+        rests = goal["rest"] < goal["horizon"]
+        settled = rests & (of["exit_2"] < goal["horizon"] - 1.5 * period)
         result = {
             "rmse": np.sqrt(of["squared"] / ticks),
             "rmse_move": np.sqrt(np.where(step, of["squared"] / ticks, of["squared_move"] / of["ticks_move"])),
@@ -109,9 +111,9 @@ def summary(sums: Array, goals: Array, period: float) -> dict[str, Array]:
                 settled, np.sqrt((of["squared"] - of["squared_exit"]).clip(0.0) / after), np.nan
             ),
             "settling": np.where(settled, of["exit_2"], np.nan),
-            "settling_5": np.where(of["exit_5"] < goal["horizon"] - 1.5 * period, of["exit_5"], np.nan),
+            "settling_5": np.where(rests & (of["exit_5"] < goal["horizon"] - 1.5 * period), of["exit_5"], np.nan),
             "steady_state": of["late"] / of["late_count"],
-            "overshoot": 100.0 * of["overshoot"] / goal["move"],
+            "overshoot": np.where(rests, 100.0 * of["overshoot"] / np.abs(goal["move"]), np.nan),
             "iae": of["absolute"] * period,
         }
     alive = of["alive"] > 0.0
@@ -149,7 +151,7 @@ def metrics_of(
     count = len(theta)
     flags = np.zeros(count) if saturated is None else np.asarray(saturated, float)
     series = np.column_stack([theta, theta_ref, tension, flags])
-    goals = np.array([[final, abs(final), rest, count * period]])
+    goals = np.array([[final, final, 0.0, rest, count * period]])
     sums = np.zeros((1, len(SUMS)))
     sums[0, _ALIVE] = 1.0
     blocks = to_blocks(sums)

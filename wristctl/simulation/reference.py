@@ -27,8 +27,12 @@ class Motion:
     """The true wanted angle, which a network only approximates."""
     tip_desired: Array
     """The wanted tip position, (T, 2)."""
+    move: float
+    """Last move of the reference, signed [rad]."""
+    begin: float
+    """Time at which the last move begins."""
     rest: float
-    """Time at which the reference rests."""
+    """Time at which the reference rests; the horizon if it never does."""
     horizon: float
     outside: float = 0.0
     """Share of samples whose tip position lies outside the domain that the network was trained on."""
@@ -53,46 +57,65 @@ def motion(
 ) -> Motion:
     """Evaluate a reference on the grid of `period` [s] over the horizon [s].
 
-    A tip target, or an angle with inverse `network` or `exact`, becomes a tip path (an arc whose angle and length move
+    Tip targets, or angles with inverse `network` or `exact`, become a tip path (an arc whose angle and length move
     from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
     """
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
-    still = np.zeros_like(time)
-    if reference.kind == "step":
-        course, rate, acceleration, rest = np.ones_like(time), still, still, 0.0
-    else:
-        course, rate, acceleration = minimum_jerk(time, reference.duration)
-        rest = reference.duration
-    angle, length = _target(reference, wrist)
-    theta = np.stack([angle * course, angle * rate, angle * acceleration])
-    longer = length - wrist.length
-    arc = np.stack([wrist.length + longer * course, longer * rate, longer * acceleration])
-    tip = arc_path(theta, arc)
+    targets = np.array(_targets(reference, wrist))
+    before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
+    arc = np.zeros((2, 3, len(time)))
+    arc[:, 0] = before[0][:, None]
+    for number, change in enumerate(targets - before):
+        arc += change[:, None, None] * _course(reference, time - number * reference.duration)
+    move, begin = float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
+    rest = {"sine": horizon, "step": begin, "multi-step": begin}.get(reference.kind, begin + reference.duration)
+    theta, tip = arc[0], arc_path(arc[0], arc[1])
     if reference.inverse == "none":
-        return Motion(time, theta[0], theta[1], theta[2], theta[0], tip.position, rest, horizon)
+        return Motion(time, theta[0], theta[1], theta[2], theta[0], tip.position, move, begin, rest, horizon)
     found = _inverse(reference, network)(tip)
+    angles = found.theta, found.rate, found.acceleration
     outside = float(np.mean(found.outside))
-    return Motion(time, found.theta, found.rate, found.acceleration, theta[0], tip.position, rest, horizon, outside)
+    return Motion(time, *angles, theta[0], tip.position, move, begin, rest, horizon, outside)
 
 
-def _target(reference: Reference, wrist: WristParameters) -> tuple[float, float]:
-    """Final angle [rad] and arc length [m]."""
-    if reference.tip is None:
-        degrees = 30.0 if reference.angle_deg is None else reference.angle_deg
-        if abs(degrees) > wrist.range_deg:
-            raise UserError(
-                f"reference of {degrees} deg is beyond the wrist's range of +-{wrist.range_deg} deg",
-                where="reference.angle_deg",
-                fix="ask for less, or widen wrist.range_deg",
-            )
-        return float(np.deg2rad(degrees)), wrist.length
-    x, y = reference.tip
-    theta, arc = exact_arc(np.array([x, y]))
+def _course(reference: Reference, time: Array) -> Array:
+    """The course of one move from 0 to 1 with two derivatives, (3, T), by the time since it began."""
+    if reference.kind in ("step", "multi-step"):
+        return np.stack([np.where(time > -1e-9, 1.0, 0.0), 0.0 * time, 0.0 * time])
+    if reference.kind == "sine":
+        w = 2.0 * np.pi * reference.frequency
+        return 0.5 * np.stack([1.0 - np.cos(w * time), w * np.sin(w * time), w * w * np.cos(w * time)])
+    return np.stack(minimum_jerk(time, reference.duration))
+
+
+def _targets(reference: Reference, wrist: WristParameters) -> list[tuple[float, float]]:
+    """Angle [rad] and arc length [m] of each target in turn."""
+    if reference.kind == "tip-path":
+        return [_tip_target(tip, "reference.tips", wrist) for tip in reference.tips]
+    if reference.kind == "multi-step":
+        return [_angle_target(angle, "reference.angles_deg", wrist) for angle in reference.angles_deg]
+    if reference.tip is not None:
+        return [_tip_target(reference.tip, "reference.tip", wrist)]
+    return [_angle_target(30.0 if reference.angle_deg is None else reference.angle_deg, "reference.angle_deg", wrist)]
+
+
+def _angle_target(degrees: float, where: str, wrist: WristParameters) -> tuple[float, float]:
+    if abs(degrees) > wrist.range_deg:
+        raise UserError(
+            f"reference of {degrees} deg is beyond the wrist's range of +-{wrist.range_deg} deg",
+            where=where,
+            fix="ask for less, or widen wrist.range_deg",
+        )
+    return float(np.deg2rad(degrees)), wrist.length
+
+
+def _tip_target(tip: tuple[float, float], where: str, wrist: WristParameters) -> tuple[float, float]:
+    theta, arc = exact_arc(np.array(tip))
     angle, length = float(theta), float(arc)
     if abs(angle) > np.deg2rad(wrist.range_deg) or not 0.0 < length < np.inf:
         raise UserError(
-            f"tip ({x}, {y}) m asks for {np.rad2deg(angle):.1f} deg, beyond the range of +-{wrist.range_deg} deg",
-            where="reference.tip",
+            f"tip {tip} m asks for {np.rad2deg(angle):.1f} deg, beyond the range of +-{wrist.range_deg} deg",
+            where=where,
             fix="choose a tip position within reach",
         )
     return angle, length

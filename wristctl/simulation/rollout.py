@@ -16,8 +16,12 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.types import LANES
+from wristctl.simulation.actuator import at_rest, drive_of
+from wristctl.simulation.disturbances import course
 from wristctl.simulation.kernel import RECORDED, run_block
 from wristctl.simulation.metrics import SUMS, summary
+from wristctl.simulation.observer import observers_of
+from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion
 from wristctl.wrist.segments import segments
 
@@ -59,42 +63,54 @@ def rollout(
     which: NDArray[np.int64],
     loop: Loop,
     wrist: WristParameters,
+    start: Array | None = None,
+    seeds: NDArray[np.int64] | None = None,
     record: bool = False,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
-    The plant and the controller's one-segment model both come from `wrist`; the loop says how finely the plant is cut.
+    They begin at rest with the segments' angles `start` (n,), straight where none is given. The controller's
+    one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and what stands
+    between command and measurement. `seeds` (count,) number the camera's noise; all have the same where none is given.
     """
     count, n = len(gains), loop.plant_segments
     ticks = max(1, round(sample_period(loop) / loop.control_period))
     samples = len(motions[0].theta_ref)
     limit = wrist.tension_limit if loop.limits else np.inf
-    fixed = [segments(wrist, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
+    fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
-    goal_rows = np.array([[m.final, abs(m.final), m.rest, m.horizon] for m in motions])[which]
-    start = np.zeros((count, len(SUMS)))
-    start[:, SUMS.index("alive")] = 1.0
-    blocks = {"gains": to_blocks(gains.reshape(count, -1)), "goals": to_blocks(goal_rows), "sums": to_blocks(start)}
+    goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
+    sums_at_start = np.zeros((count, len(SUMS)))
+    sums_at_start[:, SUMS.index("alive")] = 1.0
+    rows = {"gains": gains.reshape(count, -1), "goals": goal_rows, "sums": sums_at_start}
+    blocks = {name: to_blocks(values) for name, values in rows.items()}
+    rest = np.zeros(n) if start is None else start
+    drive, period = drive_of(loop.actuator), loop.control_period
+    motors_at_rest = np.repeat(at_rest(drive, plant_of(wrist, loop.plant), rest)[:, None], LANES, axis=1)
+    disturbed = course(loop.disturbances, motions[0].time)
     lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
     table = np.stack([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions], axis=-1)
     total = len(lanes)
+    streams = np.zeros(count, np.int64) if seeds is None else seeds
+    observers = observers_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest)
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
     stop, done = threading.Event(), [0] * total
 
     def run(block: int) -> None:
         reference = np.ascontiguousarray(table[..., lanes[block]])
-        state, memory = np.zeros((2 * n, LANES)), np.zeros((max(1, controller.memory), LANES))
-        now = np.zeros((len(NOW), LANES))
+        state = np.repeat(np.concatenate([rest, 0.0 * rest])[:, None], LANES, axis=1)
+        memory, now = np.zeros((max(1, controller.memory), LANES)), np.zeros((len(NOW), LANES))
+        motors = motors_at_rest.copy()
         piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
             run_block(
-                controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block], reference,
-                now, memory, state, blocks["sums"][block], recorded[block], loop.control_period, loop.substeps, ticks,
-                first, min(first + piece, samples), (0,) * n,
+                controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block],
+                reference, now, memory, state, blocks["sums"][block], recorded[block], drive, motors,
+                observers[block], disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
             )  # fmt: skip
             done[block] = min(first + piece, samples)
 

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
 from wristctl.simulation.trajectory import Trajectory, desired_errors
 from wristctl.wrist.kinematics import Inverse, arc_tip
+from wristctl.wrist.statics import equilibrium
 
 Array = NDArray[np.float64]
 
@@ -71,12 +73,18 @@ def simulate(
     """Run the study's `simulate` section: one closed loop.
 
     `network` is needed where the reference has `inverse: network`, `tuned` (gains by controller and name) where the
-    gains are `tuned`. Raises UserError for an unknown controller, preset or unreachable reference.
+    gains are `tuned`. Raises UserError for an unknown controller or preset, a reference out of reach, or a start in
+    equilibrium of a wrist that buckles.
     """
     chosen = study.simulate
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
     followed = motion(chosen.reference, study.wrist, chosen.horizon, sample_period(chosen.loop), network)
-    outcome = rollout(law, gains, [followed], np.zeros(1, np.int64), chosen.loop, study.wrist, record=True)
+    start = None
+    if chosen.start == "equilibrium":
+        plant = plant_of(study.wrist, chosen.loop.plant)
+        start = equilibrium(plant, chosen.loop.plant_segments, (plant.pretension, plant.pretension))
+    which = np.zeros(1, np.int64)
+    outcome = rollout(law, gains, [followed], which, chosen.loop, study.wrist, start, record=True)
     name = chosen.gains if isinstance(chosen.gains, str) else "given"
     return simulation(outcome, 0, followed, study.wrist, f"{law.name}/{name}")

@@ -28,7 +28,7 @@ def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any
         for j in range(n):
             total = total + mass[i, j] * r_rate[j] - hg * by_theta[i, j] * r_theta[j]
         k_rate[i] = total
-    solve(lu, n, k_rate)
+    solve(lu, k_rate)
     for i in range(n):
         k_theta[i] = hg * (r_theta[i] + k_rate[i])
 
@@ -38,6 +38,7 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     """Advance angles and rates by h [s] with the tendons' pulls [N] held."""
     n = len(theta)
     hg = 0.5 * h
+    per_h, per_hg = 1.0 / h, 2.0 / h
     z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
     mass, other_mass, lu, by_theta = square_like(theta), square_like(theta), square_like(theta), square_like(theta)
     zero, a0, a = lanes_like(theta), lanes_like(theta), lanes_like(theta)
@@ -54,40 +55,40 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
         a0[i] = -a0[i]
         for j in range(n):
             other_mass[i, j] = mass[i, j]
-    factorise(other_mass, n)
-    solve(other_mass, n, a0)
+    factorise(other_mass)
+    solve(other_mass, a0)
     residual_jacobians(segment, theta, omega, a0, z, dz, d2z, d3z, tangent, plus, minus, by_theta, lu)
     for i in range(n):
         for j in range(n):
-            lu[i, j] = mass[i, j] / hg + lu[i, j] + hg * by_theta[i, j]
-    factorise(lu, n)
+            lu[i, j] = per_hg * mass[i, j] + lu[i, j] + hg * by_theta[i, j]
+    factorise(lu)
 
     _stage(mass, by_theta, lu, hg, omega, a0, k1, l1)
     for i in range(n):
-        r_theta[i] = omega[i] + 4.0 / h * k1[i]
-        r_rate[i] = a0[i] + 4.0 / h * l1[i]
+        r_theta[i] = omega[i] + 4.0 * per_h * k1[i]
+        r_rate[i] = a0[i] + 4.0 * per_h * l1[i]
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k2, l2)
 
     for i in range(n):
         at[i] = theta[i] + 2.0 * k1[i]
         rate[i] = omega[i] + 2.0 * l1[i]
     equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
-    factorise(other_mass, n)
-    solve(other_mass, n, a)
+    factorise(other_mass)
+    solve(other_mass, a)
     for i in range(n):
-        r_theta[i] = rate[i] + (k1[i] - k2[i]) / h
-        r_rate[i] = -a[i] + (l1[i] - l2[i]) / h
+        r_theta[i] = rate[i] + per_h * (k1[i] - k2[i])
+        r_rate[i] = -a[i] + per_h * (l1[i] - l2[i])
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k3, l3)
 
     for i in range(n):
         at[i] = at[i] + k3[i]
         rate[i] = rate[i] + l3[i]
     equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
-    factorise(other_mass, n)
-    solve(other_mass, n, a)
+    factorise(other_mass)
+    solve(other_mass, a)
     for i in range(n):
-        r_theta[i] = rate[i] + (k1[i] - k2[i] - 8.0 / 3.0 * k3[i]) / h
-        r_rate[i] = -a[i] + (l1[i] - l2[i] - 8.0 / 3.0 * l3[i]) / h
+        r_theta[i] = rate[i] + per_h * (k1[i] - k2[i] - 8.0 / 3.0 * k3[i])
+        r_rate[i] = -a[i] + per_h * (l1[i] - l2[i] - 8.0 / 3.0 * l3[i])
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k4, l4)
     for i in range(n):
         theta[i] = at[i] + k4[i]

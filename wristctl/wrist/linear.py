@@ -8,8 +8,9 @@ from wristctl.lanes.compiled import compiled
 
 
 @compiled
-def factorise(a: Any, n: Any) -> None:
-    """LU factors of the n x n matrix a, in place; the diagonal holds the pivots' reciprocals."""
+def factorise(a: Any) -> None:
+    """LU factors of a square matrix, in place; the diagonal holds the pivots' reciprocals."""
+    n = len(a)
     for k in range(n):
         a[k, k] = 1.0 / a[k, k]
         for i in range(k + 1, n):
@@ -19,8 +20,9 @@ def factorise(a: Any, n: Any) -> None:
 
 
 @compiled
-def solve(lu: Any, n: Any, b: Any) -> None:
+def solve(lu: Any, b: Any) -> None:
     """Overwrite b with the solution of a x = b."""
+    n = len(b)
     for i in range(1, n):
         for k in range(i):
             b[i] = b[i] - lu[i, k] * b[k]

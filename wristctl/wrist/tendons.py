@@ -15,17 +15,17 @@ from wristctl.lanes.functions import bessel
 @compiled
 def moment_arms(theta: Any, segment: Any) -> Any:
     """Moment arms of the + and the - side of one segment [m]: +-c cos(y) + (l/2g) y E1(y)."""
-    y = 0.5 * theta / segment.spans
+    y = (0.5 / segment.spans) * theta
     e0, e1, _, _ = bessel(y)
     bending = segment.tendon_offset * (e0 - y * y * e1)
-    compression = 0.5 * segment.length / segment.spans * y * e1
+    compression = (0.5 / segment.spans) * segment.length * y * e1
     return bending + compression, compression - bending
 
 
 @compiled
 def lengths(theta: Any, segment: Any) -> Any:
     """Lengths of the + and the - side of one segment [m]: l E0(y) -+ 2 g c sin(y)."""
-    y = 0.5 * theta / segment.spans
+    y = (0.5 / segment.spans) * theta
     e0 = bessel(y)[0]
     bending = 2.0 * segment.spans * segment.tendon_offset * y * e0
     return segment.length * e0 - bending, segment.length * e0 + bending
@@ -34,11 +34,11 @@ def lengths(theta: Any, segment: Any) -> Any:
 @compiled
 def tendon_torque(theta: Any, segment: Any, plus: Any, minus: Any) -> Any:
     """Torque of both sides' pulls [N] on one segment and its derivative by theta."""
-    y = 0.5 * theta / segment.spans
+    y = (0.5 / segment.spans) * theta
     e0, e1, e2, _ = bessel(y)
     s = y * y
-    half_span = 0.5 * segment.length / segment.spans
+    half_span = (0.5 / segment.spans) * segment.length
     bend, squeeze = segment.tendon_offset * (plus - minus), half_span * (plus + minus)
     torque = bend * (e0 - s * e1) + squeeze * y * e1
-    slope = 0.5 / segment.spans * (squeeze * (e1 - s * e2) - bend * y * e0)
+    slope = (0.5 / segment.spans) * (squeeze * (e1 - s * e2) - bend * y * e0)
     return torque, slope

@@ -1,0 +1,43 @@
+# make run: the paper's study in small, from data to the table of controllers. make test: what CI runs.
+
+SHELL := /bin/bash
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+STUDY ?= experiments/quick.yaml
+BIN := .venv/bin
+
+.PHONY: run test lint bench clean venv
+
+run: .venv/run
+	@set -e; \
+	step() { echo; echo "== wristctl $$*"; said=$$($(BIN)/wristctl "$$@"); echo "$$said"; made=$${said##*$$'\n'}; }; \
+	step gen-data $(STUDY); data=$$made; \
+	step train $(STUDY) --data "$$data"; network=$$made; \
+	step tune $(STUDY) --network "$$network"; tuned=$$made; \
+	step compare $(STUDY) --network "$$network" --tuned "$$tuned"; \
+	printf '\nRuns:\n%s\n%s\n%s\n%s\n' "$$data" "$$network" "$$tuned" "$$made"
+
+test: lint
+	$(BIN)/pytest
+
+lint: .venv/dev
+	$(BIN)/ruff check .
+	$(BIN)/mypy --strict wristctl
+
+bench: .venv/run
+	$(BIN)/python benchmarks/rollouts.py
+
+venv: .venv/dev
+
+.venv/run: pyproject.toml constraints.txt
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt -e .
+	touch $@
+
+.venv/dev: pyproject.toml constraints.txt
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+clean:
+	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

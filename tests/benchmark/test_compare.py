@@ -1,0 +1,70 @@
+"""The comparison: order, verdicts, cost."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from wristctl.benchmark.compare import compare, frame, reference_name, series
+from wristctl.benchmark.cost import step_time
+from wristctl.benchmark.paper import verdict
+from wristctl.config.load import load_study
+from wristctl.config.loop import Reference
+from wristctl.control.table import CONTROLLERS, controller
+
+SETTINGS = (
+    "loops={one: {plant_segments: 1}, four: {}}", "horizon=0.4", "inverses=[none, exact]",
+    "references=[{kind: step, angle_deg: 10}, {duration: 0.3}]",
+)  # fmt: skip
+PID, SMC = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: smc, gains: exchanged}"
+
+
+def results(rows: str):
+    return compare(load_study([], [*SETTINGS, f"rows={rows}"], "compare"))
+
+
+def test_rows_come_in_the_studys_order_and_do_not_depend_on_it() -> None:
+    one, other = results(f"[{PID}, {SMC}]"), results(f"[{SMC}, {PID}]")
+    assert [r.label for r in one[:3]] == ["pid/Kp=30 Ki=10 Kd=0.5"] * 2 + ["smc/exchanged"]
+    assert [(r.loop, r.reference) for r in one][::4] == [
+        (loop, name) for loop in ("one", "four") for name in ("step 10 deg", "minimum jerk 0.3 s 30 deg")
+    ]
+
+    def values(found):
+        return sorted((r.loop, r.reference, r.inverse, r.label, tuple(r.simulation.metrics.values())) for r in found)
+
+    assert repr(values(one)) == repr(values(other))
+
+
+def test_exact_inverse_changes_nothing_on_an_inextensible_arc() -> None:
+    found = results(f"[{PID}]")
+    for direct, through_tip in zip(found[::2], found[1::2], strict=True):
+        assert through_tip.simulation.metrics["rmse"] == pytest.approx(direct.simulation.metrics["rmse"], rel=1e-6)
+
+
+def test_frame_and_series_hold_one_row_per_result() -> None:
+    found = results(f"[{SMC}]")
+    table, courses = frame(found), series(found)
+    assert len(table) == len(found) == 8 and courses["theta"].shape == (8, 80) == courses["theta_ref"].shape
+    assert (table["reference"] == [r.reference for r in found]).all()
+
+
+def test_verdict_needs_rmse_and_settling_near_the_papers() -> None:
+    assert verdict("smc", 2.7e-4, 1.2, 1e-9) == "reproduced" == verdict("smc", 4.0e-4, 0.87, 0.0)
+    assert verdict("smc", 4.2e-4, 1.2, 0.0) == "not reproduced" == verdict("smc", 2.7e-4, math.nan, 0.0)
+    assert verdict("smc", 1e-5, 1.2, 0.0) == "not reproduced" == verdict("smc", 2.7e-4, 1.2, 5e-4)
+    assert verdict("feedforward", 1.0, 1.0, 1.0) == ""
+
+
+def test_references_are_named_by_kind_duration_and_target() -> None:
+    assert reference_name(Reference(kind="step")) == "step 30 deg"
+    assert reference_name(Reference(tip=(0.07, 0.02), inverse="exact")) == "minimum jerk 1 s tip 70, 20 mm"
+
+
+def test_step_time_is_measured_for_every_controller() -> None:
+    study = load_study([])
+    for name in CONTROLLERS:
+        chosen = controller(name)
+        time = step_time(chosen, next(iter(chosen.presets.values())), study.wrist)
+        assert 0.0 < time.median <= time.p99

@@ -1,0 +1,149 @@
+"""`simulate`, `tune` and `compare` as they are typed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from wristctl.runs import list_runs, open_run
+
+LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.5")
+MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
+TUNE = (
+    "tune", *LOOP, "--candidates", "4", "--iterations", "3",
+    "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]",
+)  # fmt: skip
+COMPARE = (
+    "compare", *LOOP, "--set", "inverses=[none, exact]", "--set", f"references=[{MOVE % 30}, {{kind: step}}]",
+    "--set", "rows=[{controller: smc, gains: exchanged}, {controller: computed-torque, gains: default}]",
+)  # fmt: skip
+
+
+def test_simulate_leaves_a_trajectory_metrics_and_pictures(call) -> None:
+    code, out, _ = call("simulate", "--controller", "computed-torque", "--gains", "default")
+    run = open_run("latest:simulate")
+    course = run.data("trajectory")
+    assert code == 0 and out.splitlines()[-1].endswith(run.id)
+    assert run.metrics["rmse"]["value"] < 1e-4 and run.metrics["rmse"]["unit"] == "rad"
+    assert course["theta"].iloc[-1] == pytest.approx(0.5236, abs=1e-3)
+    parts = course[[f"theta_{k}" for k in range(1, 5)]].sum(axis=1)
+    assert parts.to_numpy() == pytest.approx(course["theta"], abs=1e-15)
+    drawn = {file.name for file in (run.path / "figures").iterdir()}
+    assert {"angle.png", "error.svg", "tensions.png", "motion.png", "directions.png"} <= drawn
+
+
+def test_tuned_gains_reach_compare_and_simulate(call) -> None:
+    assert call(*TUNE, "--set", "controllers=[smc,pid]")[0] == 0
+    tuned = open_run("latest:tune")
+    gains = json.loads(tuned.file("data/gains.json").read_text())
+    history = tuned.data("history-smc")
+    best = history.loc[history["objective"].idxmin()]
+    assert {name: best[name] for name in gains["smc"]} == gains["smc"] and len(history) == 12
+    code, out, _ = call(*COMPARE, "--set", "rows=[{controller: pid, gains: tuned}]", "--tuned", "latest:tune")
+    assert code == 0 and "pid/tuned" in out
+    compared = open_run("latest:compare")
+    assert [entry["run"] for entry in compared.manifest.model_dump()["inputs"]] == [tuned.id]
+    assert call("simulate", "--gains", "tuned", "--tuned", tuned.id, "--set", "horizon=0.5")[0] == 0
+
+
+def test_compare_has_a_row_for_every_combination_and_the_papers_numbers_beside(call) -> None:
+    code, out, _ = call(*COMPARE)
+    table = open_run("latest:compare").data("comparison")
+    assert code == 0 and "0.00027 / 1.2 / 0.000231" in out and "Control step" in out
+    assert len(table) == 8 and set(table["loop"]) == {"fast"}
+    smc, ours = table[table["controller"] == "smc"], table[table["controller"] == "computed-torque"]
+    assert (smc["paper_rmse"] == 2.7e-4).all() and ours["paper_rmse"].isna().all()
+    assert (table["inverse"].tolist() == ["none", "exact"] * 4) and not table["failed"].any()
+
+
+@pytest.mark.parametrize("command", [TUNE, COMPARE], ids=["tune", "compare"])
+def test_the_same_command_and_seed_give_the_same_result(call, command: tuple[str, ...]) -> None:
+    hashes = {json.loads(call(*command, "--json")[1])["result_sha256"] for _ in range(2)}
+    assert len(hashes) == 1
+
+
+def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call) -> None:
+    assert call(*TUNE)[0] == 0
+    code, _, said = call(*COMPARE, "--set", f"references=[{MOVE % 20}]", "--tuned", "latest:tune")
+    assert code == 2 and "tuned on a scenario" in said
+    assert {run.kind: run.state for run in list_runs(Path("results"))} == {"tune": "ok", "compare": "failed"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("simulate", "--controller", "scm"), "did you mean 'smc'?"),
+        (("simulate", "--gains", "exchangd"), "did you mean 'exchanged'?"),
+        (("simulate", "--gains", "tuned"), "no tuned gains of smc"),
+        (("simulate", "--set", "reference.angle_deg=80"), "beyond the wrist's range"),
+        (("simulate", "--set", "reference.inverse=network"), "--network RUN"),
+        (("simulate", "--set", "start=equilibrium", "--set", "wrist.hand_mass=0.9"), "the wrist buckles"),
+        (("simulate", "--tuned", "nowhere"), "nowhere"),
+        (("tune", "--set", "controllers=[feedforward]"), "no gains to tune"),
+        (("tune", "--set", "scenarios=[{loop: defalt}]"), "did you mean 'default'?"),
+        (("compare", "--set", "rows=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
+        (("compare", "--set", "rows=[{controller: smc, gains: tuned}]", "--set", "inverses=[none]"), "--tuned RUN"),
+        (("compare",), "--network RUN"),
+    ],
+)
+def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
+    call, arguments: tuple[str, ...], said: str
+) -> None:
+    code, _, err = call(*arguments)
+    lines = [line for line in err.splitlines() if line.startswith("error:")]
+    assert code == 2 and len(lines) == 1 and said in lines[0] and "Traceback" not in err
+    assert all(run.state == "failed" for run in list_runs(Path("results")))
+
+
+@pytest.mark.parametrize("command", ["simulate", "tune", "compare"])
+def test_a_dry_run_writes_nothing(call, tmp_path: Path, command: str) -> None:
+    code, out, _ = call(command, "--dry-run")
+    assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())
+
+
+def test_a_buckling_wrist_is_a_warning_and_a_mark_in_the_manifest(call) -> None:
+    code, _, err = call("simulate", "--set", "wrist.hand_mass=0.8", "--set", "horizon=0.1")
+    assert code == 0 and "warning: the straight wrist buckles" in err
+    assert open_run("latest:simulate").manifest.model_dump()["numerics"]["buckles"] is True
+
+
+def begun_tuning(folder: Path) -> subprocess.Popen[bytes]:
+    """A tuning of hours, with its first iterations done."""
+    code = "import sys; from wristctl.cli.app import main; main()"
+    arguments = ["tune", "--iterations", "100000", "--candidates", "8", "--set", "loops={fast: {plant_segments: 1}}"]
+    arguments += ["--set", "scenarios=[{loop: fast}]"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-c", code, *arguments]
+    child = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, env=environment)
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and child.poll() is None:
+        events = list(folder.glob("results/*/events.jsonl"))
+        if events and '"progress"' in events[0].read_text():
+            return child
+        time.sleep(0.05)
+    raise AssertionError(f"no progress: {child.poll()}")
+
+
+def test_a_killed_tuning_reads_as_crashed(tmp_path: Path) -> None:
+    child = begun_tuning(tmp_path)
+    child.kill()
+    child.communicate()
+    (run,) = list_runs(tmp_path / "results")
+    assert run.state == "crashed"
+
+
+def test_an_interrupted_tuning_keeps_what_it_found(tmp_path: Path) -> None:
+    child = begun_tuning(tmp_path)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=60)
+    (run,) = list_runs(tmp_path / "results")
+    assert child.returncode == 130 and run.state == "interrupted" and b"Traceback" not in said
+    assert set(json.loads(run.file("data/gains.json").read_text())["smc"]) == {"P1", "P2", "P3"}
+    assert len(run.data("history-smc")) >= 8 and (run.path / "SHA256SUMS").exists()

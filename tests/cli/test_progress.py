@@ -1,0 +1,40 @@
+"""Progress is shown off a terminal as plain lines, and noted as events."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from wristctl.cli import progress as module
+
+
+def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
+    screen, events = io.StringIO(), []
+    console = Console(file=screen, width=20)
+    with module.progress(
+        console, lambda name, **fields: events.append(fields), "tuning", total, "steps", quiet
+    ) as done:
+        for count in range(1, 1001):
+            done(count, best=1.0 / count)
+    return screen.getvalue().splitlines(), events
+
+
+def test_frequent_calls_give_few_lines_and_events() -> None:
+    lines, events = _shown(1000)
+    assert lines == []
+    assert [event["count"] for event in events] == [1, 1000]
+    assert events[-1]["best"] == 1e-3
+
+
+def test_a_line_tells_count_and_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_LINE_EVERY", 0.0)
+    lines, _ = _shown(1000)
+    assert lines[-1] == "tuning: 1000 of 1000 steps, best 0.001"
+
+
+def test_a_length_that_is_unknown_is_announced_and_quiet_is_quiet() -> None:
+    assert _shown(None)[0] == ["tuning ..."]
+    assert _shown(None, quiet=True)[0] == []

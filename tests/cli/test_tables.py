@@ -1,0 +1,37 @@
+"""Tables are aligned, rounded for people, and never wider than the terminal where that can be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wristctl.cli.tables import Table
+
+TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
+
+
+def test_columns_are_aligned_and_numbers_have_four_digits() -> None:
+    assert TABLE.text().splitlines() == [
+        "T",
+        "",
+        "name  rmse [rad]  ok",
+        "----  ----------  ---",
+        "smc       0.3333  yes",
+        "pid            -  no",
+        "x              -  yes",
+    ]
+
+
+def test_a_narrow_terminal_gets_the_columns_below_each_other() -> None:
+    text = TABLE.text(18)
+    assert max(map(len, text.splitlines())) <= 18
+    assert [line.split() for line in text.splitlines() if line.startswith("smc")] == [["smc", "0.3333"], ["smc", "yes"]]
+
+
+def test_counts_are_whole_whatever_library_made_them() -> None:
+    assert Table("", ("n", "ok"), [(np.int64(123456), np.True_)]).text().splitlines()[-1] == "123456  yes"
+
+
+def test_a_table_without_rows_shows_its_columns() -> None:
+    assert Table("", ("a", "b"), []).text() == "a  b\n-  -"

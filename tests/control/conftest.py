@@ -1,0 +1,89 @@
+"""A closed loop that keeps what a law remembers, which rollouts do not record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.table import controller
+from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import part, rows_of
+from wristctl.wrist.allocation import allocate, reach
+from wristctl.wrist.integrator import step
+from wristctl.wrist.segments import load_segments, segments
+
+
+@dataclass(frozen=True)
+class Course:
+    """Angle, rate, wanted torque (T,) and memory before each tick (T, memory)."""
+
+    theta: np.ndarray
+    rate: np.ndarray
+    torque: np.ndarray
+    memory: np.ndarray
+
+
+@compiled
+def _run(law, plant, model, limits, gains, reference, now, memory, state, out, period, segments):
+    wrist, known, bound = load_segments(rows_of(plant)), load_segments(rows_of(model)), rows_of(limits)
+    signals, kept = rows_of(now), rows_of(memory)
+    n = len(segments)
+    theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
+    for tick in range(reference.shape[0]):
+        row, target = rows_of(out[tick]), rows_of(reference[tick])
+        angle, rate = 0.0 * bound[0], 0.0 * bound[0]
+        for i in range(n):
+            angle = angle + theta[i]
+            rate = rate + omega[i]
+        signals[0], signals[1] = angle, rate
+        for i in range(3):
+            signals[2 + i] = target[i]
+        signals[5], signals[6] = reach(angle, known, bound[0], bound[1])
+        signals[7] = period + 0.0 * angle
+        for i in range(memory.shape[0]):
+            row[3 + i] = kept[i]
+        torque = law(now_of(now), wrist_of(model), rows_of(gains), kept)
+        row[0], row[1], row[2] = angle, rate, torque
+        plus, minus = allocate(angle, known, torque, bound[0], bound[1])
+        step(wrist, theta, omega, plus, minus, period + 0.0 * angle)
+
+
+def _closed_loop(
+    name: str, gains: tuple[float, ...], reference: np.ndarray, plant: WristParameters, model: WristParameters,
+    segments_: int = 1, period: float = 1e-3, limit: float = 1e6,
+) -> Course:  # fmt: skip
+    """Follow a reference (T, 3) of angle, rate and acceleration from rest, one row per control period."""
+    law, ticks = controller(name), len(reference)
+    rows = [segments(plant, segments_), segments(model, 1), np.array([4.0, limit]), np.array([*gains, 0.0])]
+    plant_row, model_row, limits, gain_row = (to_blocks(row[None])[0] for row in rows)
+    lanes = np.ascontiguousarray(np.repeat(reference[:, :, None], 8, axis=2))
+    memory, state = np.zeros((max(1, law.memory), 8)), np.zeros((2 * segments_, 8))
+    out = np.zeros((ticks, 3 + len(memory), 8))
+    _run(
+        law.compiled, plant_row, model_row, limits, gain_row, lanes, np.zeros((len(NOW), 8)), memory, state, out,
+        period, (0,) * segments_,
+    )  # fmt: skip
+    return Course(out[:, 0, 0], out[:, 1, 0], out[:, 2, 0], out[:, 3:, 0])
+
+
+@pytest.fixture(scope="session")
+def closed_loop() -> Callable[..., Course]:
+    return _closed_loop
+
+
+@pytest.fixture(scope="session")
+def sine() -> Callable[..., np.ndarray]:
+    """amplitude (1 - cos(2 pi f t)) / 2 with two derivatives, (T, 3): from rest, exciting on and on."""
+
+    def made(amplitude: float, frequency: float, duration: float, period: float = 1e-3) -> np.ndarray:
+        w, t = 2.0 * np.pi * frequency, np.arange(round(duration / period)) * period
+        waves = 1.0 - np.cos(w * t), w * np.sin(w * t), w * w * np.cos(w * t)
+        return 0.5 * amplitude * np.stack(waves, axis=1)
+
+    return made

@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
+from wristctl.learning.training import Training, train
+
+
+@pytest.fixture(scope="session")
+def quick() -> TrainSettings:
+    return TrainSettings(hidden=(24, 16), activation="tanh", learning_rate=0.01, epochs=25, batch=50)
+
+
+@pytest.fixture(scope="session")
+def samples() -> Samples:
+    return draw_samples(DataSettings(samples=400), WristParameters(), np.random.default_rng(1))
+
+
+@pytest.fixture(scope="session")
+def split(samples: Samples) -> Split:
+    return split_samples(len(samples.theta), 0.75, np.random.default_rng(5))
+
+
+@pytest.fixture(scope="session")
+def trained(samples: Samples, split: Split, quick: TrainSettings) -> Training:
+    return train(samples, split, quick, [np.random.SeedSequence(7)])

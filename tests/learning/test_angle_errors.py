@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wristctl.learning.domain import Domain
+from wristctl.learning.metrics import angle_errors, error_map
+from wristctl.wrist.kinematics import exact_angle
+
+DOMAIN = Domain((-0.8, 0.8), (0.07, 0.09))
+
+
+def test_errors_of_a_shifted_angle_are_the_shift() -> None:
+    true = np.linspace(-1.0, 1.0, 101)
+    measured = angle_errors(true + math.radians(0.4), true)
+    assert measured.rmse_deg == pytest.approx(0.4) and measured.max_error_deg == pytest.approx(0.4)
+    assert measured.close_share == 1.0
+    assert measured.r2 == pytest.approx(1.0 - math.radians(0.4) ** 2 / np.mean(true**2))
+
+
+def test_predicting_the_mean_explains_nothing() -> None:
+    true = np.linspace(-0.5, 1.0, 50)
+    assert angle_errors(np.full(50, true.mean()), true).r2 == pytest.approx(0.0, abs=1e-15)
+
+
+def test_close_share_counts_errors_up_to_half_a_degree() -> None:
+    error = np.radians([0.0, 0.49, -0.49, 0.51, -3.0])
+    assert angle_errors(error, np.zeros(5)).close_share == 0.6
+
+
+def test_error_map_of_the_exact_inverse_is_rounding_and_reaches_the_corners() -> None:
+    result = error_map(exact_angle, DOMAIN, 21, 5)
+    assert np.abs(result.error).max() < 1e-15
+    assert result.tip.shape == (21, 5, 2)
+    assert np.allclose(exact_angle(result.tip[[0, -1]][:, [0, -1]]), [[-0.8, -0.8], [0.8, 0.8]])

@@ -1,0 +1,111 @@
+"""Small results with known numbers, and every figure drawn from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from wristctl.benchmark.compare import Result
+from wristctl.config.wrist import WristParameters
+from wristctl.control.pid import PID
+from wristctl.control.smc import SMC
+from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.report.loop_figures import angles, errors, tensions
+from wristctl.report.tuning_figures import convergence, gain_history
+from wristctl.report.wrist_drawing import directions, stroboscope
+from wristctl.simulation.simulate import Simulation, chain_tip
+from wristctl.simulation.trajectory import Trajectory
+from wristctl.tuning.search import Search
+
+WRIST = WristParameters()
+REFERENCES = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
+ROWS = ("smc/printed", "smc/exchanged", "smc/tuned", "pid/tuned", "feedforward/default", "computed-torque/default")
+
+
+def course(label: str, tau: float = 0.3, diverges: bool = False, network_error: float = 0.0) -> Trajectory:
+    """A first-order response to a step of 30 deg, on four segments."""
+    time, final = np.arange(200) * 0.025, np.radians(30.0)
+    theta = final * (1.0 - np.exp(-time / tau))
+    if diverges:
+        theta = np.where(time < 2.0, np.expm1(2.0 * time), np.nan)
+    segments = np.repeat(0.25 * theta[:, None], 4, axis=1)
+    wanted = np.full_like(time, final)
+    tension = np.stack([np.where(np.arange(200) % 2, 60.0, 2.0), np.full(200, 2.0)], axis=-1)
+    torque = 0.04 * (tension[:, 0] - tension[:, 1])
+    tips = (chain_tip(np.repeat(0.25 * each[:, None], 4, axis=1), WRIST.length) for each in (theta, wanted))
+    rate = np.gradient(theta, time)
+    reference = wanted + network_error
+    return Trajectory(label, time, theta, segments, rate, reference, wanted, *tips, 2.0 * torque, torque, tension)
+
+
+def result(row: str, reference: str, rmse: float, failed: bool = False) -> Result:
+    controller, gains = row.split("/")
+    metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
+    done = Simulation(course(row, 1.0, failed), metrics, failed)
+    return Result("default", reference, "exact", controller, gains, done)
+
+
+def results() -> list[Result]:
+    """RMSE 1e-5, 2e-5, ... in the order of rows and references; smc/exchanged diverged on the step."""
+    pairs = [(row, reference) for row in ROWS for reference in REFERENCES]
+    return [result(*pair, rmse=1e-5 * (k + 1), failed=k == 3) for k, pair in enumerate(pairs)]
+
+
+def search(name: str = "smc", count: int = 3) -> Search:
+    """Twelve iterations of eight candidates that close in on gains of 10."""
+    rng = np.random.default_rng(len(name))
+    exponent = 1.0 + rng.normal(size=(12, 8, count)) / np.arange(1, 13)[:, None, None]
+    values = 0.02 + (np.abs(exponent - 1.0).sum(axis=-1)) ** 2
+    values[0, :3] = np.inf
+    best = np.unravel_index(values.argmin(), values.shape)
+    gains = dict(zip("abc", 10.0 ** exponent[best], strict=False))
+    return Search(name, gains, float(values.min()), values.size, values, 10.0**exponent)
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "angles": lambda: angles([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "Loop default"),
+    "errors": lambda: errors([course("smc/printed"), course("smc/tuned", 0.1)], "SMC"),
+    "errors, log": lambda: errors([course("pid/printed"), course("pid/tuned", 0.1)], log=True),
+    "tensions": lambda: tensions(course("smc/exchanged")),
+    "angle grid": lambda: angle_grid(results(), "Loop default"),
+    "rmse map": lambda: rmse_map(results(), "Loop default"),
+    "chattering": lambda: chattering_bars(results(), "Loop default"),
+    "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
+    "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
+    "gain history of pid": lambda: gain_history(search("pid"), PID.gains),
+    "directions": lambda: directions(WRIST),
+    "stroboscope": lambda: stroboscope(course("smc/tuned"), WRIST),
+}
+"""Every figure of the report but those of learning."""
+
+
+@pytest.fixture(params=FIGURES, scope="module")
+def make(request: pytest.FixtureRequest) -> Callable[[], Figure]:
+    """Each figure in turn, or the ones named by indirect parameters."""
+    return FIGURES[request.param]
+
+
+@pytest.fixture(scope="module")
+def drawn(make: Callable[[], Figure]) -> Figure:
+    """Each figure, laid out as on paper."""
+    made = make()
+    made.draw_without_rendering()
+    return made
+
+
+@pytest.fixture(name="course")
+def course_maker() -> Callable[..., Trajectory]:
+    return course
+
+
+@pytest.fixture(name="results")
+def results_of_a_comparison() -> list[Result]:
+    return results()
+
+
+@pytest.fixture(name="search")
+def search_of_smc() -> Search:
+    return search()

@@ -1,0 +1,70 @@
+"""Figures of loops show the numbers of their trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from wristctl.report.loop_figures import angles, errors, tensions
+from wristctl.simulation.trajectory import Trajectory
+
+Course = Callable[..., Trajectory]
+
+
+def line(axes: Axes, label: str) -> Line2D:
+    (found,) = (each for each in axes.lines if each.get_label() == label)
+    return found
+
+
+def labels(axes: Axes) -> list[str]:
+    return [str(each.get_label()) for each in axes.lines]
+
+
+def test_angles_are_drawn_in_degrees_against_the_desired_angle(course: Course) -> None:
+    one = course("smc/tuned")
+    (axes,) = angles([one]).axes
+    np.testing.assert_array_equal(line(axes, "smc/tuned").get_ydata(), np.degrees(one.theta))
+    np.testing.assert_allclose(line(axes, "desired").get_ydata(), 30.0)
+
+
+def test_reference_is_drawn_where_a_network_makes_it_differ_from_the_desired_angle(course: Course) -> None:
+    assert "reference" not in labels(angles([course("smc/tuned")]).axes[0])
+    (axes,) = angles([course("smc/tuned", network_error=0.01)]).axes
+    np.testing.assert_allclose(line(axes, "reference").get_ydata(), 30.0 + np.degrees(0.01))
+
+
+def test_loop_that_diverges_is_named_so_and_hides_no_other(course: Course) -> None:
+    (axes,) = angles([course("smc/tuned"), course("pid/printed", diverges=True)]).axes
+    assert "pid/printed (diverged)" in labels(axes)
+    assert axes.get_ylim()[1] <= 45.0
+
+
+def test_errors_are_drawn_in_radians(course: Course) -> None:
+    one = course("smc/printed")
+    (axes,) = errors([one], "SMC").axes
+    np.testing.assert_array_equal(line(axes, "smc/printed").get_ydata(), one.error)
+    assert axes.get_title("left") == "SMC"
+
+
+def test_logarithmic_errors_are_positive_and_leave_out_what_is_too_small(course: Course) -> None:
+    one = course("smc/printed", tau=0.1)
+    (axes,) = errors([one], log=True).axes
+    drawn = np.asarray(line(axes, "smc/printed").get_ydata())
+    known = np.abs(one.error) >= 1e-8
+    np.testing.assert_array_equal(drawn[known], np.abs(one.error)[known])
+    assert axes.get_yscale() == "log" and np.isnan(drawn[~known]).all() and not known.all()
+
+
+def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(course: Course) -> None:
+    one = course("smc/exchanged")
+    plus, close, minus, _, torque, _ = tensions(one).axes
+    np.testing.assert_array_equal(plus.lines[0].get_ydata(), one.tension[:, 0])
+    np.testing.assert_array_equal(minus.lines[0].get_ydata(), one.tension[:, 1])
+    np.testing.assert_array_equal(line(torque, "wanted by the law").get_ydata(), one.torque_wanted)
+    np.testing.assert_array_equal(line(torque, "given by the tendons").get_ydata(), one.torque)
+    np.testing.assert_array_equal(close.lines[0].get_ydata(), one.tension[-20:, 0])
+    assert np.asarray(close.lines[0].get_xdata())[0] == pytest.approx(1e3 * (one.time[-20] - one.time[-1]))

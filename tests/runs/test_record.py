@@ -1,0 +1,191 @@
+"""What a run directory holds: everything needed to read, check and repeat it, the same bytes each time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
+from wristctl.config.study import Study
+from wristctl.runs import InputRun, Run, start_run, stream
+
+Make = Callable[..., Run]
+
+
+def test_the_same_results_have_the_same_hash_and_other_results_another(make: Make) -> None:
+    first, again, other = make(label="a"), make(label="b"), make(value=0.4)
+    assert first.result_hash == again.result_hash
+    assert first.result_hash != other.result_hash
+    assert first.manifest.fingerprint == again.manifest.fingerprint
+
+
+def test_volatile_files_stand_outside_the_result_hash(results: Path) -> None:
+    hashes = []
+    for wall in ("1.0", "2.0"):
+        with start_run("tune", Study(), "", results) as run:
+            run.file("data/gains.json").write_text("{}")
+            run.file("timing.json").write_text(wall)
+            run.file("data/timing.csv").write_text(wall)
+            run.volatile("data/timing.csv")
+        hashes.append(Run(run.path).result_hash)
+    assert hashes[0] == hashes[1]
+
+
+def test_sealed_files_pass_sha256sum(make: Make) -> None:
+    run = make()
+    done = subprocess.run(["sha256sum", "-c", "SHA256SUMS"], cwd=run.path, capture_output=True, text=True)
+    assert done.returncode == 0
+    files = {path.relative_to(run.path).as_posix() for path in run.path.rglob("*") if path.is_file()}
+    assert {line.rpartition(": ")[0] for line in done.stdout.splitlines()} == files - {"SHA256SUMS"}
+
+
+@pytest.mark.parametrize("name", ["data/samples.csv", "run.json", "config.yaml", "metrics.json"])
+def test_a_flipped_byte_is_found_and_its_file_named(make: Make, name: str) -> None:
+    run = make()
+    path = run.path / name
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="hash does not match") as caught:
+        run.check()
+    assert str(path) in str(caught.value)
+
+
+def test_a_missing_file_is_found(make: Make) -> None:
+    run = make()
+    (run.path / "metrics.json").unlink()
+    with pytest.raises(UserError, match=r"missing.*metrics\.json"):
+        run.check()
+
+
+def test_tables_and_arrays_read_back_exactly(results: Path) -> None:
+    rng = np.random.default_rng(1)
+    values = np.concatenate([rng.standard_normal(1000) * 10.0 ** rng.integers(-300, 300, 1000), [0.1, 1 / 3, 5e-324]])
+    with start_run("tune", Study(), "", results) as run:
+        run.table("data/values.csv", pd.DataFrame({"value": values}))
+        run.arrays("data/values.npz", {"value": values, "whole": np.arange(3)})
+    read = Run(run.path)
+    assert np.array_equal(read.data("values")["value"], values)
+    assert np.array_equal(read.array("values")["value"], values)
+    assert read.array("values")["whole"].dtype == np.arange(3).dtype
+
+
+def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    digests = []
+    for folder in ("a", "b"):
+        with start_run("tune", Study(), "", tmp_path / folder) as run:
+            figure = Figure()
+            axes = figure.subplots()
+            axes.plot([0, 1], [0, 1], label="line")
+            axes.legend()
+            run.figure("line", figure)
+        digests.append(
+            [hashlib.sha256((run.path / f"figures/line.{end}").read_bytes()).hexdigest() for end in ("png", "svg")]
+        )
+    assert digests[0] == digests[1]
+
+
+def test_the_manifest_says_what_was_run_on_what_by_which_code(make: Make, results: Path) -> None:
+    data = make()
+    study = load_study([], ["seed=5"])
+    with start_run("train", study, "quick", results, ["wristctl", "train"], [InputRun("data", data)]) as run:
+        assert run.stream("weights") == stream(5, "weights")
+        run.numerics(dtype="float64", step=np.float64(1e-3))
+        run.metric("accuracy", float("nan"), better="higher")
+        run.event("checkpoint", loss=np.float32(0.5))
+    manifest = json.loads((run.path / "run.json").read_bytes())
+    assert manifest["schema"] == "wristctl.run/1"
+    assert (manifest["kind"], manifest["label"], manifest["seed"], manifest["state"]) == ("train", "quick", 5, "ok")
+    assert manifest["argv"] == ["wristctl", "train"]
+    assert manifest["inputs"][0]["run"] == data.id
+    assert manifest["inputs"][0]["result_sha256"] == data.result_hash
+    assert manifest["streams"] == {"weights": list(stream(5, "weights"))}
+    assert manifest["numerics"] == {"dtype": "float64", "step": 1e-3}
+    assert manifest["environment"]["packages"]["numpy"] == np.__version__
+    assert manifest["timing"]["wall_s"] > 0
+    assert len(manifest["code"]["tree_sha256"]) == 64
+    assert Run(run.path).metrics["accuracy"]["value"] is None
+    events = [json.loads(line) for line in (run.path / "events.jsonl").read_text().splitlines()]
+    assert [event["event"] for event in events] == ["start", "checkpoint", "end"]
+    assert events[1]["loss"] == 0.5
+
+
+def test_columns_carry_units_into_manifest_and_readme(make: Make) -> None:
+    run = make()
+    output = next(each for each in run.manifest.outputs if each.path == "data/samples.csv")
+    assert [(column.name, column.unit, column.meaning) for column in output.columns] == [
+        ("x", "m", "tip"),
+        ("name", "", ""),
+    ]
+    assert "`x` [m]: tip" in (run.path / "README.md").read_text()
+
+
+def test_warnings_go_to_console_log_and_events(results: Path) -> None:
+    with start_run("tune", Study(), "", results) as run:
+        logging.getLogger("wristctl.wrist").warning("the wrist buckles at %.1f N", 60.0)
+    assert "warning: the wrist buckles at 60.0 N" in (run.path / "console.log").read_text()
+    assert '"event": "warning"' in (run.path / "events.jsonl").read_text()
+
+
+def test_the_config_fed_back_is_the_same_study(results: Path) -> None:
+    study = load_study([], ["seed=5", "epochs=3", "wrist.length=0.1"], "train")
+    with start_run("train", study, "", results) as run:
+        pass
+    assert Run(run.path).config == study
+
+
+@pytest.mark.parametrize("name", ["../outside", "/outside", "data/../../outside", "run.json", "SHA256SUMS"])
+def test_outputs_stay_inside_the_run_and_off_its_records(results: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="no name for an output"), start_run("tune", Study(), "", results) as run:
+        run.file(name)
+
+
+def test_a_full_disk_is_an_error_of_the_user(results: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full")
+    with pytest.raises(UserError, match="No space left"), start_run("tune", Study(), "", results) as run:
+        run.file("data/.x.npz.part").symlink_to("/dev/full")
+        run.arrays("data/x.npz", {"x": np.zeros(100_000)})
+    assert Run(run.path).state == "failed"
+    assert not (run.path / "data" / "x.npz").exists()
+
+
+def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
+    package = Path(__file__).parents[2] / "wristctl"
+    clone = tmp_path / "clone"
+    shutil.copytree(package, clone / "wristctl", ignore=shutil.ignore_patterns("__pycache__"))
+    git = ["git", "-C", str(clone), "-c", "user.name=a", "-c", "user.email=a@b"]
+    for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "all"]):
+        subprocess.run([*git, *command], check=True, capture_output=True)
+    ask = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.runs.code import code_state; "
+        "code, patch = code_state(); print(code.commit, code.dirty); sys.stdout.write(patch.decode())"
+    )
+
+    def state() -> list[str]:
+        asked = subprocess.run([sys.executable, "-c", ask, str(clone)], check=True, capture_output=True, text=True)
+        return asked.stdout.splitlines()
+
+    head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True).stdout.strip()
+    assert state() == [f"{head} False"]
+    (clone / "wristctl" / "new.py").write_text("NEW = 1\n")
+    (clone / "wristctl" / "__init__.py").write_text('__version__ = "9"\n')
+    first, *patch = state()
+    assert first == f"{head} True"
+    assert "+NEW = 1" in patch
+    assert '+__version__ = "9"' in patch
+    status = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True).stdout
+    assert "?? wristctl/new.py" in status, "the user's index is untouched"

@@ -1,0 +1,110 @@
+"""Actuators: lag, steps, limits of speed, elastic tendons that only pull, friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Plant
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
+from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.wrist.segments import load_segments, segments
+
+WRIST = WristParameters()
+PERIOD, MOVE = 1e-3, Reference()
+
+
+@compiled
+def _drive(drive, state, model, commands, out, h):
+    known, motors = load_segments(rows_of(model)), rows_of(state)
+    for tick in range(commands.shape[0]):
+        command, result = rows_of(commands[tick]), rows_of(out[tick])
+        result[0], result[1] = actuate(drive, motors, known, command[2], command[0], command[1], h)
+
+
+def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
+    """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
+    state = np.repeat(at_rest(drive, WRIST, np.zeros(1))[:, None], 8, axis=1)
+    out = np.zeros((len(commands), 2, 8))
+    lanes = np.ascontiguousarray(np.repeat(commands[:, :, None], 8, axis=2))
+    _drive(drive, state, to_blocks(segments(WRIST, 1)[None])[0], lanes, out, PERIOD)
+    return out[:, :, 0]
+
+
+def run(
+    name: str, actuator: Actuator, plant: Plant | None = None, gains: tuple[float, ...] = (),
+    reference: Reference = MOVE,
+) -> Outcome:  # fmt: skip
+    course = motion(reference, WRIST, 4.0, PERIOD)
+    loop, row = Loop(actuator=actuator, plant=plant or Plant()), np.array([gains]).reshape(1, -1)
+    return rollout(controller(name), row, [course], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
+
+
+def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -> None:
+    drive = drive_of(Actuator(level="lagged", lag=0.05))
+    pull = delivered(drive, np.tile([44.0, 4.0, 0.0], (500, 1)))
+    time = (np.arange(500) + 1) * PERIOD
+    quantum = drive.stiffness * drive.step
+    assert np.abs(pull[:, 0] - (44.0 - 40.0 * np.exp(-time / 0.05))).max() < 0.5 * quantum + 0.4
+    np.testing.assert_allclose(pull / quantum, np.rint(pull / quantum), atol=1e-9)
+    assert np.abs(pull[:, 1] - 4.0).max() <= 0.5 * quantum + 1e-9
+
+
+def test_lagged_pull_grows_no_faster_than_the_motor_turns() -> None:
+    drive = drive_of(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
+    pull = delivered(drive, np.tile([100.0, 4.0, 0.0], (100, 1)))[:, 0]
+    slope = (pull[50] - pull[0]) / (50 * PERIOD)
+    assert slope == pytest.approx(drive.stiffness * drive.speed, rel=0.05)
+
+
+def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_its_target() -> None:
+    drive = drive_of(Actuator(level="tendon"))
+    length = delivered(drive, np.tile([4.0, 4.0, 0.8], (500, 1)))[:, 0]
+    fine = length / drive.step
+    np.testing.assert_allclose(fine, np.rint(fine), atol=1e-6)
+    speed = np.diff(length) / PERIOD
+    assert speed.max() <= drive.speed + drive.step / PERIOD
+    ramp = (length[20] - length[0]) / (0.5 * (20 * PERIOD) ** 2)
+    assert ramp == pytest.approx(drive.acceleration, rel=0.15)
+    target = 4.0 / drive.stiffness + WRIST.length - _plus_length(0.8)
+    assert length[-1] == pytest.approx(target, abs=drive.step)
+    assert length.max() <= target + 2 * drive.step
+
+
+def _plus_length(theta: float) -> float:
+    """Four straight spans between five discs, each bending by theta/4, at the offset +c (E1 and geometry)."""
+    span = theta / 4
+    return 8 * (WRIST.length / theta - WRIST.tendon_offset) * np.sin(span / 2)
+
+
+def test_elastic_tendons_only_pull_and_stiff_ones_hold_a_softer_wrist() -> None:
+    soft = Plant(stiffness_scale=0.8)
+    ideal = run("feedforward", Actuator(), soft)
+    tendon = run("feedforward", Actuator(level="tendon"), soft)
+    for side in ("plus", "minus"):
+        assert tendon.column(f"acting_{side}", 0).min() >= 0.0
+    assert tendon.metrics["steady_state"][0] < 0.05 * ideal.metrics["steady_state"][0]
+
+
+def test_friction_takes_from_a_tendon_that_reels_in_and_adds_to_one_that_pays_out() -> None:
+    """So the wrist lags on the way out and on the way back of a slow sine."""
+    sine = Reference(kind="sine", frequency=0.5)
+    free, rubbing = (
+        run("feedforward", Actuator(level="tendon", friction=f), reference=sine).column("theta", 0) for f in (0.0, 0.3)
+    )
+    out, back = slice(300, 800), slice(1300, 1800)
+    assert (rubbing - free)[out].max() < -1e-4 < 1e-4 < (rubbing - free)[back].min()
+
+
+def test_ideal_actuators_and_sensors_act_and_see_what_is_commanded_and_there() -> None:
+    outcome = run("computed-torque", Actuator(), gains=(50.0, 1.0))
+    for side in ("plus", "minus"):
+        assert (outcome.column(f"acting_{side}", 0) == outcome.column(f"tension_{side}", 0)).all()
+    assert (outcome.column("seen", 0) == outcome.column("theta", 0)).all()

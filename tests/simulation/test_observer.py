@@ -1,0 +1,140 @@
+"""Camera and observer: delay, noise, dropped frames, the load estimate, and what the best law reaches behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
+
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.simulation.actuator import drive_of
+from wristctl.simulation.camera import frames
+from wristctl.simulation.observer import stationary_gain
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.wrist.model import linearised, terms
+from wristctl.wrist.segments import segments
+
+WRIST = WristParameters()
+CAMERA = Sensor(level="camera")
+CLEAN = Sensor(level="camera", noise_deg=0.0, dropped=0.0)
+SOFT = Plant(stiffness_scale=0.8)
+
+
+def run(name: str, preset: str, loop: Loop, seeds: int = 1, horizon: float = 5.0, record: bool = True) -> Outcome:
+    law = controller(name)
+    gains = np.tile(law.presets[preset], (seeds, 1)).reshape(seeds, -1)
+    course = motion(Reference(), WRIST, horizon, 1e-3)
+    which = np.zeros(seeds, np.int64)
+    return rollout(law, gains, [course], which, loop, WRIST, seeds=np.arange(seeds), record=record, threads=1)
+
+
+def test_an_exact_model_and_a_clean_camera_give_the_true_angle() -> None:
+    outcome = run("smc-tracking", "camera", Loop(plant_segments=1, sensor=CLEAN))
+    assert np.abs(outcome.column("seen", 0) - outcome.column("theta", 0)).max() < 3e-4
+
+
+def test_a_push_is_seen_no_earlier_than_its_first_frame_arrives() -> None:
+    push = Disturbances(push=Push(start=1.0))
+    calm, pushed = (
+        run("feedforward", "default", Loop(plant_segments=1, sensor=CLEAN, disturbances=d), horizon=2.0)
+        for d in (Disturbances(), push)
+    )
+    first = [int(np.argmax(calm.column(c, 0) != pushed.column(c, 0))) for c in ("theta", "seen")]
+    assert 1000 <= first[0] <= 1003
+    delay = 2.0 / 60.0
+    assert delay <= (first[1] - first[0]) * 1e-3 <= delay + 1.0 / 60.0 + 0.003
+
+
+def test_the_load_estimate_takes_up_a_wrong_stiffness() -> None:
+    with_load = run("computed-torque", "default", Loop(sensor=CLEAN, plant=SOFT))
+    fixed = Sensor(level="camera", noise_deg=0.0, dropped=0.0, load_drift=1e-9)
+    without = run("computed-torque", "default", Loop(sensor=fixed, plant=SOFT))
+    late = slice(4000, None)
+    error = [np.abs(o.column("seen", 0) - o.column("theta", 0))[late].max() for o in (with_load, without)]
+    assert error[0] < 1e-4 and error[0] < 0.1 * error[1]
+
+
+def linear_wrist(duration: float) -> np.ndarray:
+    """Transition of (theta, rate, load) over `duration`, from the straight one-segment wrist linearised and exact."""
+    zero, pulls = np.zeros(1), np.full(2, 2 * WRIST.pretension)
+    _, stiffness, damping = linearised(segments(WRIST, 1), zero, zero, zero, pulls)
+    mass = terms(segments(WRIST, 1), zero, zero).mass[0, 0]
+    slope = np.array([[0.0, 1.0, 0.0], [-stiffness[0, 0], -damping[0, 0], 1.0], [0.0, 0.0, 0.0]])
+    slope[1] /= mass
+    return expm(slope * duration)
+
+
+def test_the_gain_is_the_stationary_one_of_an_independent_riccati_solver() -> None:
+    fine = linear_wrist(1e-4)
+    noise = np.diag([0.0, fine[1, 2] ** 2 * CAMERA.torque_noise**2 / 1e-4, CAMERA.load_drift**2 * 1e-4])
+    powers = [np.linalg.matrix_power(fine, k) for k in range(170)]
+    between, variance = sum(p @ noise @ p.T for p in powers), np.deg2rad(CAMERA.noise_deg) ** 2
+    covariance = solve_discrete_are((powers[-1] @ fine).T, np.eye(3)[:, :1], between, [[variance]])
+    expected = covariance[:, 0] / (covariance[0, 0] + variance)
+    assert stationary_gain(CAMERA, drive_of(Actuator()), WRIST, 1e-3) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_estimates_error_is_the_noise_that_linear_theory_lets_through() -> None:
+    """Noise of one frame after another through the gain, then predicted over 34 to 50 ms."""
+    sensor = Sensor(level="camera", dropped=0.0)
+    gain, variance = stationary_gain(sensor, drive_of(Actuator()), WRIST, 1e-3), np.deg2rad(sensor.noise_deg) ** 2
+    keep = (np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])) @ linear_wrist(1.0 / 60.0)
+    fused = solve_discrete_lyapunov(keep, variance * np.outer(gain, gain))
+    ahead = [linear_wrist(t)[0] for t in np.arange(34, 51) * 1e-3]
+    expected = np.sqrt(np.mean([row @ fused @ row for row in ahead]))
+    outcome = run("feedforward", "default", Loop(plant_segments=1, sensor=sensor), seeds=24)
+    errors = [(outcome.column("seen", i) - outcome.column("theta", i))[2000:] for i in range(24)]
+    assert np.std(errors) == pytest.approx(expected, rel=0.1)
+
+
+def test_noise_and_drops_have_their_statistics_and_belong_to_the_seed_not_to_the_batch() -> None:
+    many = frames(CAMERA, 1e-3, 200.0, np.arange(3))
+    noise, seen = many.readings[:, 0], many.readings[:, 1]
+    assert noise.std(axis=0) == pytest.approx(np.full(3, np.deg2rad(0.1)), rel=0.03)
+    assert 1.0 - seen.mean() == pytest.approx(0.05, abs=0.006)
+    assert np.abs(np.corrcoef(noise.T)[np.triu_indices(3, 1)]).max() < 0.05
+    alone = frames(CAMERA, 1e-3, 200.0, np.array([2]))
+    assert (alone.readings[..., 0] == many.readings[..., 2]).all()
+    other = frames(CAMERA.model_copy(update={"seed": 1}), 1e-3, 200.0, np.array([2]))
+    assert (other.readings[:, 0, 0] != many.readings[:, 0, 2]).all()
+
+
+def test_frames_are_taken_at_the_frame_rate_and_arrive_after_the_delay() -> None:
+    taken = frames(CAMERA, 1e-3, 5.0, np.zeros(1, np.int64))
+    np.testing.assert_allclose(taken.captures * 1e-3, np.arange(len(taken.captures)) / 60.0, atol=0.5e-3)
+    assert set(taken.arrivals - taken.captures) == {34}
+    with pytest.raises(ValidationError, match="one frame per control_period"):
+        Loop(control_period=0.05, sensor=CAMERA)
+
+
+def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batch() -> None:
+    loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"), disturbances=Disturbances(push=Push(start=0.2)))
+    law, course = controller("smc-tracking"), motion(Reference(), WRIST, 0.5, 1e-3)
+    gains = np.tile(law.presets["camera"], (11, 1))
+    which, seeds = np.zeros(11, np.int64), np.arange(11)
+    batch = rollout(law, gains, [course], which, loop, WRIST, seeds=seeds, record=True, threads=2)
+    assert batch.samples is not None
+    for index in (0, 7, 10):
+        one = np.zeros(1, np.int64)
+        alone = rollout(law, gains[:1], [course], one, loop, WRIST, seeds=one + index, record=True)
+        assert alone.samples is not None and alone.samples[0].tobytes() == batch.samples[index].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("level", "rmse", "steady_state"), [("ideal", 0.004, 0.002), ("tendon", 0.01, 0.005)], ids=["ideal", "tendon"]
+)
+def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
+    level: str, rmse: float, steady_state: float
+) -> None:
+    """Medians of 20 seeds at -20 % stiffness unknown to the law."""
+    loop = Loop.model_validate({"sensor": CAMERA, "plant": SOFT, "actuator": {"level": level}})
+    found = run("smc-tracking", "camera", loop, seeds=20, record=False).metrics
+    assert np.median(found["rmse"]) <= rmse and np.median(found["steady_state"]) <= steady_state
+    pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(start=2.5, duration=0.5))})
+    settled = run("smc-tracking", "camera", pushed, seeds=20, record=False).metrics["settling"]
+    assert np.median(settled) <= 3.0 + 0.5

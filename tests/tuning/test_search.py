@@ -1,0 +1,81 @@
+"""The search: objective, determinism, progress."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.config.load import load_study
+from wristctl.control.table import CONTROLLERS, controller
+from wristctl.tuning.gains_file import read_gains, write_gains
+from wristctl.tuning.search import Evaluator, Search, history, search
+from wristctl.tuning.space import GainSpace
+
+SETTINGS = (
+    "loops={one: {plant_segments: 1}}", "horizon=1.0", "candidates=8", "iterations=5",
+    "scenarios=[{loop: one, reference: {duration: 0.5}}, {loop: one, reference: {kind: step}}]",
+)  # fmt: skip
+
+
+def found(*settings: str, seed: int = 0, name: str = "pid") -> Search:
+    study = load_study([], [*SETTINGS, *settings], "tune")
+    return search(study, controller(name), np.random.default_rng(seed))
+
+
+def test_search_starts_in_the_middle_of_the_box_and_improves_on_it() -> None:
+    result = found()
+    middle = [np.sqrt(gain.low * gain.high) for gain in controller("pid").gains.values()]
+    np.testing.assert_allclose(result.tried[0, 0], middle)
+    assert result.objective < result.values[0, 0] and result.evaluations == 40
+    assert (np.diff(result.best_so_far) <= 0.0).all() and result.best_so_far[-1] == result.objective
+
+
+@pytest.mark.parametrize("optimiser", ["pso", "differential-evolution", "random"])
+def test_the_same_seed_finds_the_same_gains_and_another_seed_others(optimiser: str) -> None:
+    one, again, other = (found(f"optimiser={optimiser}", seed=seed) for seed in (3, 3, 4))
+    assert one.gains == again.gains != other.gains
+    assert one.values.tobytes() == again.values.tobytes()
+
+
+def test_objective_is_the_weighted_mean_over_scenarios() -> None:
+    gains = np.array([[30.0, 10.0, 0.5], [100.0, 10.0, 1.0]])
+    rmse, settling = (
+        Evaluator(load_study([], [*SETTINGS, f"objective={{{weights}, chattering: 0}}"], "tune"), controller("pid"))
+        for weights in ("rmse: 1, settling: 0", "rmse: 0, settling: 1")
+    )
+    both = load_study([], [*SETTINGS, "objective={rmse: 2, settling: 3, chattering: 0}"], "tune")
+    np.testing.assert_allclose(
+        Evaluator(both, controller("pid"))(gains), 2 * rmse(gains) + 3 * settling(gains), rtol=1e-13
+    )
+
+
+def test_what_diverges_has_an_infinite_objective() -> None:
+    study = load_study([], [*SETTINGS, "loops={one: {plant_segments: 1, limits: false}}"], "tune")
+    values = Evaluator(study, controller("computed-torque"))(np.array([[900.0, 9.0], [50.0, 1.0]]))
+    assert np.isinf(values[0]) and np.isfinite(values[1])
+
+
+def test_progress_sees_the_search_after_every_iteration() -> None:
+    seen: list[int] = []
+    study = load_study([], list(SETTINGS), "tune")
+    search(study, controller("smc"), np.random.default_rng(0), progress=lambda s: seen.append(len(s.values)))
+    assert seen == [1, 2, 3, 4, 5]
+
+
+def test_history_lists_every_candidate() -> None:
+    result = found()
+    table = history(result)
+    assert len(table) == 40 and table["objective"].min() == result.objective
+    assert set(result.gains) <= set(table.columns)
+
+
+def test_every_controllers_search_box_spans_six_decades() -> None:
+    for chosen in CONTROLLERS.values():
+        if chosen.gains:
+            np.testing.assert_allclose(GainSpace.of(chosen.gains).decades, 6.0)
+
+
+def test_gains_read_back_exactly(tmp_path) -> None:
+    gains = {"pid": {"Kp": 1 / 3, "Ki": 1e-300, "Kd": 2.0**0.5}}
+    write_gains(tmp_path / "gains.json", gains)
+    assert read_gains(tmp_path / "gains.json") == gains

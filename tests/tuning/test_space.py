@@ -1,0 +1,34 @@
+"""The box of decades per gain and the unit cube."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.control.law import Gain
+from wristctl.tuning.space import GainSpace
+
+SPACE = GainSpace.of({"P1": Gain("1/rad", "", 1e-1, 1e5), "P2": Gain("s/rad", "", 1e-3, 1e3)})
+
+
+def test_corners_of_the_cube_are_the_box_exactly() -> None:
+    assert SPACE.gains(np.zeros(2)).tolist() == [1e-1, 1e-3]
+    assert SPACE.gains(np.ones(2)).tolist() == [1e5, 1e3]
+
+
+def test_equal_steps_of_the_cube_are_equal_factors() -> None:
+    gains = SPACE.gains(np.linspace(0.0, 1.0, 7)[:, None].repeat(2, axis=1))
+    np.testing.assert_allclose(gains[1:] / gains[:-1], 10.0, rtol=1e-12)
+    assert SPACE.decades == pytest.approx([6.0, 6.0])
+
+
+def test_gains_and_unit_undo_each_other() -> None:
+    points = np.random.default_rng(0).random((4, 5, 2))
+    np.testing.assert_allclose(SPACE.unit(SPACE.gains(points)), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("gains", [[1.0, 1e4], [1.0, 0.0], [1.0, np.nan]])
+def test_gain_outside_its_box_is_named(gains: list[float]) -> None:
+    with pytest.raises(UserError, match=r"P2.*0\.001 to 1000"):
+        SPACE.unit(np.array(gains))

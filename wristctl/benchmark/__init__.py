@@ -1,0 +1,1 @@
+"""Fair comparison of controllers, beside the paper's numbers."""

@@ -1,0 +1,41 @@
+"""The paper's numbers (T2: simulation, ulnar, 30 deg) and what counts as having reproduced them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Printed(NamedTuple):
+    """One row of T2: RMSE [rad], settling time [s], steady-state error [rad]."""
+
+    rmse: float
+    settling: float
+    steady_state: float
+
+
+T2: dict[str, Printed] = {
+    "smc": Printed(2.7e-4, 1.2, 2.31e-4),
+    "pid": Printed(1.5e-3, 3.0, 2.48e-3),
+    "mrac": Printed(1.2e-3, 2.8, 1.3e-3),
+    "gvsc": Printed(2.9e-2, 3.18, 1.4e-2),
+    "nc": Printed(5.0e-2, 1.02, 1.9e-2),
+}
+
+FACTOR = 1.5
+"""RMSE and settling time within this factor of the paper's, steady-state error not above that, count as reproduced.
+
+The paper states neither reference, nor sampling, nor limits (C10), so a tighter band would claim more than it says.
+"""
+
+
+def verdict(controller: str, rmse: float, settling: float, steady_state: float) -> str:
+    """`reproduced`, `not reproduced`, or "" for a controller that the paper does not have."""
+    if controller not in T2:
+        return ""
+    printed = T2[controller]
+    within = all(
+        math.isfinite(ours) and paper / FACTOR <= ours <= paper * FACTOR
+        for ours, paper in ((rmse, printed.rmse), (settling, printed.settling))
+    )
+    return "reproduced" if within and steady_state <= FACTOR * printed.steady_state else "not reproduced"

@@ -1,0 +1,198 @@
+"""The one place that wraps a command: configuration, earlier runs, dry run, run directory, output."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+import shutil
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from wristctl.cli.options import Options, signature
+from wristctl.cli.progress import PLAIN, Done, listening, progress
+from wristctl.cli.tables import Table
+from wristctl.config.errors import UserError
+from wristctl.config.keys import section_keys
+from wristctl.config.load import load_study
+from wristctl.config.resolved import resolved_yaml
+from wristctl.config.study import Study
+from wristctl.runs import InputRun, LiveRun, Run, require, start_run
+from wristctl.runs.journal import plain
+
+__all__ = ["Input", "Session", "Table", "study_command"]
+
+
+@dataclass(frozen=True)
+class Input:
+    """An earlier run that a command reads: the leaf of its section that names it, and the kind it must be."""
+
+    leaf: str
+    kind: str
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a command works with; `settings` is its own section of the study."""
+
+    study: Study
+    settings: Any
+    inputs: dict[str, Run]
+    run: LiveRun
+    console: Console
+    quiet: bool
+
+    def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
+        """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""
+        return progress(self.console, self.run.event, what, total, unit, self.quiet)
+
+
+Work = Callable[[Session], Table | Sequence[Table] | None]
+Plan = Callable[[Study, dict[str, Run]], str]
+
+
+@dataclass(frozen=True)
+class _Command:
+    kind: str
+    work: Work
+    plan: Plan | None
+    inputs: Sequence[Input]
+
+    def section(self, study: Study) -> Any:
+        return getattr(study, self.kind.replace("-", "_"))
+
+
+def study_command(
+    kind: str,
+    work: Work,
+    plan: Plan | None = None,
+    inputs: Sequence[Input] = (),
+    shortcuts: Sequence[str] = (),
+    examples: Sequence[str] = (),
+) -> typer.Typer:
+    """The command `kind`, which runs `work` on its section of the study in a run directory of its own.
+
+    `plan` says what will be done and raises UserError for what can be known before anything is written.
+    Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
+    section) an option for `--set`. The docstring of `work` is the help.
+    """
+    command = _Command(kind, work, plan, inputs)
+    named = [each.leaf for each in inputs]
+
+    def call(**given: Any) -> None:
+        own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
+        typed = {leaf: json.dumps(value) if leaf in named else value for leaf, value in own.items()}
+        _execute(
+            command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
+        )
+
+    keys = section_keys(kind)
+    own = [(leaf, keys[leaf].description or "") for leaf in (*named, *shortcuts)]
+    call.__signature__ = signature(own)  # type: ignore[attr-defined]
+    app = typer.Typer(add_completion=False)
+    epilog = "\n\n".join(["Examples:", *examples]) if examples else None
+    app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)
+    return app
+
+
+def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> None:
+    files = [*(options.files or ()), *(options.config or ())]
+    seed = [f"seed={options.seed}"] if options.seed is not None else []
+    study = load_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
+    with listening(options.quiet, options.verbose) as console:
+        inputs = _opened(command, study, options.out)
+        study = _naming(inputs, study, command, options.out)
+        plan = command.plan(study, inputs) if command.plan else ""
+        if options.dry_run:
+            return _print_plan(command.kind, study, plan, options)
+        label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
+        read = [InputRun(role, run) for role, run in inputs.items()]
+        run = None
+        try:
+            with start_run(command.kind, study, label, options.out, ["wristctl", *sys.argv[1:]], read) as run:
+                session = Session(study, command.section(study), inputs, run, console, options.quiet)
+                tables = _worked(command, session)
+        except KeyboardInterrupt:
+            console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)
+            raise
+    _print_result(run.path, tables, options.as_json)
+
+
+def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
+    runs = {}
+    for each in command.inputs:
+        ref = getattr(command.section(study), each.leaf)
+        if ref is not None:
+            runs[each.leaf] = require(ref, each.kind, out)
+        elif not each.optional:
+            fix = f"--{each.leaf} latest:{each.kind}, or the path or id of a {each.kind} run"
+            raise UserError(f"{command.kind} needs a {each.kind} run", f"{command.kind}.{each.leaf}", fix)
+    return runs
+
+
+def _naming(inputs: dict[str, Run], study: Study, command: _Command, out: Path) -> Study:
+    """The study with the inputs named for good: by id within `out`, else by path."""
+    within = out.resolve()
+    names = {leaf: run.id if run.path.parent == within else str(run.path) for leaf, run in inputs.items()}
+    section = command.section(study).model_copy(update=names)
+    return study.model_copy(update={command.kind.replace("-", "_"): section})
+
+
+def _worked(command: _Command, session: Session) -> Sequence[Table]:
+    run = session.run
+    try:
+        found = command.work(session)
+    except UserError as error:
+        run.console(f"error: {error}")
+        raise
+    except Exception as error:
+        run.console(traceback.format_exc())
+        error.add_note(f"the traceback is in {run.path / 'console.log'}")
+        raise
+    tables = [found] if isinstance(found, Table) else list(found or ())
+    text = "\n\n".join(table.text() for table in tables)
+    if text:
+        run.console(text)
+        run.summary(f"```\n{text}\n```")
+    return tables
+
+
+def _print_plan(kind: str, study: Study, plan: str, options: Options) -> None:
+    resolved = resolved_yaml(study, kind)
+    if options.as_json:
+        shown = {"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan}
+        print(json.dumps(shown, indent=2))
+        return
+    print(resolved, end="")
+    for line in [*plan.splitlines(), f"would write a {kind} run under {options.out}; nothing is written now"]:
+        print(f"# {line}")
+
+
+def _print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
+    if as_json:
+        run = Run(path)
+        result = {
+            "schema": "wristctl.result/1",
+            "kind": run.kind,
+            "id": run.id,
+            "run": str(path),
+            "state": run.state,
+            "result_sha256": run.result_hash,
+            "metrics": run.metrics,
+            "tables": [{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables],
+        }
+        print(json.dumps(plain(result), indent=2, allow_nan=False))
+        return
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for table in tables:
+        print(table.text(width), end="\n\n")
+    print(path)

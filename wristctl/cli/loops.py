@@ -1,0 +1,51 @@
+"""What closed loops begin with: the network and gains of earlier runs, and a wrist that does not buckle."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from wristctl.cli.command import Session
+from wristctl.config.study import Study
+
+if TYPE_CHECKING:
+    from wristctl.wrist.kinematics import Inverse
+
+log = logging.getLogger(__name__)
+
+Gains = Mapping[str, Mapping[str, float]]
+
+
+def network_of(session: Session) -> Inverse | None:
+    """The network of the session's train run, None without one."""
+    from wristctl.learning.network_file import load_network
+
+    run = session.inputs.get("network")
+    return load_network(run.file("models/network.safetensors")).along if run else None
+
+
+def tuned_of(session: Session) -> Gains | None:
+    """The gains of the session's tune run, None without one."""
+    from wristctl.tuning.gains_file import read_gains
+
+    run = session.inputs.get("tuned")
+    return read_gains(run.file("data/gains.json")) if run else None
+
+
+def tuned_study(session: Session) -> Study | None:
+    """The study of the session's tune run, None without one."""
+    from wristctl.config.load import load_study
+
+    run = session.inputs.get("tuned")
+    return load_study([run.file("config.yaml")]) if run else None
+
+
+def warn_if_it_buckles(session: Session, n: int) -> None:
+    """Warn where the straight n-segment wrist has no stable equilibrium, and note it in the manifest."""
+    from wristctl.wrist.statics import least_stiffness
+
+    least = least_stiffness(session.study.wrist, n)
+    session.run.numerics(least_stiffness=least, buckles=least <= 0.0)
+    if least <= 0.0:
+        log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)

@@ -1,0 +1,55 @@
+"""The options that every command has, and how a command's own ones join them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The shared options; each field's annotation is the option as typed."""
+
+    files: Annotated[
+        list[Path] | None, typer.Argument(metavar="FILE", help="Study files (YAML); later ones win.")
+    ] = None
+    config: Annotated[
+        list[Path] | None,
+        typer.Option("--config", "-c", metavar="FILE", help="Study file, after the others."),
+    ] = None
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override one setting: a.b=value."),
+    ] = None
+    seed: Annotated[int | None, typer.Option("--seed", help="Root of every random stream.")] = None
+    out: Annotated[Path, typer.Option("--out", help="Folder of run directories.")] = Path("results")
+    label: Annotated[
+        str | None, typer.Option("--label", help="Part of the run's name; by default the study file's.")
+    ] = None
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the resolved study and the plan; write nothing.")
+    ] = False
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details too.")] = False
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False
+
+
+def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help)."""
+    shared = inspect.signature(Options, eval_str=True).parameters.values()
+    named = [
+        inspect.Parameter(
+            leaf,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[str | None, typer.Option(f"--{leaf.replace('_', '-')}", help=text)],
+        )
+        for leaf, text in own
+    ]
+    return inspect.Signature([*shared, *named])

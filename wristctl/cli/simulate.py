@@ -1,0 +1,58 @@
+"""`wristctl simulate`: one closed loop, with pictures."""
+
+from __future__ import annotations
+
+from wristctl.cli.command import Input, Session, Table, study_command
+
+
+def simulate(session: Session) -> Table:
+    """Simulate one closed loop and draw it."""
+    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
+    from wristctl.report.loop_figures import angles, errors, tensions
+    from wristctl.report.wrist_drawing import directions, stroboscope
+    from wristctl.simulation.metrics import METRICS
+    from wristctl.simulation.simulate import simulate as run_simulation
+    from wristctl.simulation.trajectory import COLUMNS
+
+    run, wrist = session.run, session.study.wrist
+    warn_if_it_buckles(session, session.settings.loop.plant_segments)
+    with session.progress("compiling and simulating the loop"):
+        done = run_simulation(session.study, network_of(session), tuned_of(session))
+    course = done.trajectory
+    own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
+    columns = COLUMNS | own
+    units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
+    run.table("data/trajectory.csv", course.frame(), units=units, meaning=meaning)
+    rows = []
+    for name, metric in METRICS.items():
+        run.metric(name, done.metrics[name], unit=metric.unit, better="lower", meaning=metric.formula)
+        rows.append((name, done.metrics[name], metric.unit, metric.formula))
+    for name, unit, formula in (
+        ("rmse_desired", "rad", "RMSE against the true wanted angle"),
+        ("tip_rmse_mm", "mm", "RMSE of the tip's distance from the wanted position"),
+        ("tip_steady_mm", "mm", "mean distance of the tip from the wanted position over the last 10 %"),
+        ("outside_domain", "", "share of the wanted tips outside the network's trained domain"),
+    ):
+        run.metric(name, done.metrics[name], unit=unit, better="lower", meaning=formula)
+        rows.append((name, done.metrics[name], unit, formula))
+    with session.progress("drawing"):
+        run.figure("angle", angles([course]))
+        run.figure("error", errors([course]))
+        run.figure("tensions", tensions(course))
+        run.figure("motion", stroboscope(course, wrist))
+        run.figure("directions", directions(wrist))
+    title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if done.failed else "")
+    return Table(title, ("metric", "value", "unit", "meaning"), rows)
+
+
+app = study_command(
+    "simulate",
+    work=simulate,
+    inputs=(Input("network", kind="train", optional=True), Input("tuned", kind="tune", optional=True)),
+    shortcuts=("controller", "gains"),
+    examples=(
+        "wristctl simulate --controller smc --gains exchanged",
+        "wristctl simulate --set reference.kind=step --set loop.plant_segments=1",
+        "wristctl simulate --gains tuned --tuned latest:tune",
+    ),
+)

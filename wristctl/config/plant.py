@@ -1,0 +1,72 @@
+"""What stands between a controller's command and its measurement: wrist, disturbances, actuators, camera."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from wristctl.config.section import Section, choice, quantity
+
+
+class Plant(Section):
+    """How the simulated wrist differs from the one that its controller knows."""
+
+    stiffness_scale: float = quantity(1.0, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
+    damping_scale: float = quantity(1.0, "", "damping over the controller's", gt=0)
+    payload: float = quantity(0.0, "kg", "mass added to the hand, which the controller does not know", ge=0)
+
+
+class Push(Section):
+    """A person's push on the last disc: half a sine in time."""
+
+    force: float = quantity(2.0, "N", "largest force, across the straight wrist; + is the direction of theta > 0")
+    start: float = quantity(2.5, "s", "time at which it begins", "assumed", ge=0)
+    duration: float = quantity(0.5, "s", "how long it lasts", "assumed", gt=0)
+
+
+class Drift(Section):
+    """Stiffness that changes linearly in time, then stays."""
+
+    scale: float = quantity(0.8, "", "final stiffness over the first", "paper: springs lose stiffness", gt=0)
+    start: float = quantity(0.0, "s", "time at which it begins", "assumed", ge=0)
+    duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
+
+
+class Disturbances(Section):
+    """What acts on the wrist unknown to its controller."""
+
+    push: Push | None = None
+    load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
+    drift: Drift | None = None
+
+
+class Actuator(Section):
+    """Motors and tendons. ideal: tension = command; lagged: first-order lag, in steps; tendon: stepper, elastic."""
+
+    level: Literal["ideal", "lagged", "tendon"] = choice("ideal", "how much of motors and tendons is simulated")
+    lag: float = quantity(5e-3, "s", "time constant of the motor's force (lagged)", "assumed", gt=0)
+    tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed; sweep 2-50 kN/m", gt=0)
+    friction: float = quantity(0.1, "", "capstan friction: coefficient times bend (tendon)", "assumed", ge=0)
+    motor_steps: int = choice(200, "full steps per revolution", "assumed", gt=0)
+    microstep: int = choice(16, "microsteps per full step", "assumed", gt=0)
+    pulley_radius: float = quantity(7.5e-3, "m", "radius of the pulley", "assumed", gt=0)
+    step_rate: float = quantity(20_000.0, "1/s", "largest rate of microsteps", "assumed", gt=0)
+    step_acceleration: float = quantity(50_000.0, "1/s^2", "largest change of that rate (tendon)", "assumed", gt=0)
+
+    @property
+    def step_length(self) -> float:
+        """Tendon moved by one microstep [m]."""
+        return 2.0 * math.pi * self.pulley_radius / (self.motor_steps * self.microstep)
+
+
+class Sensor(Section):
+    """ideal: angle and rate as they are; camera: late, noisy, dropped frames, and an observer for every controller."""
+
+    level: Literal["ideal", "camera"] = choice("ideal", "how the angle is measured")
+    frame_rate: float = quantity(60.0, "1/s", "frames per second", "assumed", gt=0)
+    delay_frames: float = quantity(2.0, "", "frames between capture and use", "assumed", ge=0, le=20)
+    noise_deg: float = quantity(0.1, "deg", "standard deviation of the angle", "measured on rendered markers", ge=0)
+    dropped: float = quantity(0.05, "", "share of frames without a result", "assumed", ge=0, lt=1)
+    seed: int = choice(0, "stream of noise and dropped frames", ge=0)
+    torque_noise: float = quantity(5e-4, "N m s^0.5", "observer: white torque that its model does not know", gt=0)
+    load_drift: float = quantity(0.03, "N m/s^0.5", "observer: random walk of the load that it estimates", gt=0)

@@ -1,0 +1,145 @@
+"""A trained multilayer perceptron as plain arrays, with exact derivatives along a path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wristctl.config.learning import Activation
+from wristctl.learning.domain import Domain
+from wristctl.wrist.kinematics import AnglePath, Array, TipPath
+
+BLOCK = 12
+"""Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine
+the threads of a linear algebra library wait for each other, ten times longer than the product takes on one."""
+
+LEAK = 0.01
+"""Slope of leaky ReLU below zero."""
+
+
+def _sigmoid(z: Array) -> tuple[Array, Array, Array]:
+    s = 0.5 + 0.5 * np.tanh(0.5 * z)  # cannot overflow
+    slope = s * (1.0 - s)
+    return s, slope, slope * (1.0 - 2.0 * s)
+
+
+def _tanh(z: Array) -> tuple[Array, Array, Array]:
+    t = np.tanh(z)
+    slope = 1.0 - t * t
+    return t, slope, -2.0 * t * slope
+
+
+def _silu(z: Array) -> tuple[Array, Array, Array]:
+    s, slope, bend = _sigmoid(z)
+    return z * s, s + z * slope, 2.0 * slope + z * bend
+
+
+def _relu(z: Array) -> tuple[Array, Array, Array]:
+    return np.maximum(z, 0.0), np.where(z > 0.0, 1.0, 0.0), np.zeros_like(z)
+
+
+def _leaky_relu(z: Array) -> tuple[Array, Array, Array]:
+    slope = np.where(z > 0.0, 1.0, LEAK)
+    return z * slope, slope, np.zeros_like(z)
+
+
+ACTIVATIONS: dict[Activation, Callable[[Array], tuple[Array, Array, Array]]] = {
+    "sigmoid": _sigmoid,
+    "relu": _relu,
+    "leaky-relu": _leaky_relu,
+    "tanh": _tanh,
+    "silu": _silu,
+}
+"""Each activation with its first and second derivative. At its kink ReLU takes the slope from below."""
+
+
+@dataclass(frozen=True)
+class Scaler:
+    """Maps values to (values - mean) / deviation, per column."""
+
+    mean: Array
+    """(D,)"""
+    deviation: Array
+    """(D,)"""
+
+    @staticmethod
+    def of(values: Array) -> Scaler:
+        """Zero mean and unit deviation for the rows of `values` (N, D); a constant column is only shifted."""
+        deviation = values.std(axis=0)
+        return Scaler(values.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
+
+    @staticmethod
+    def none(columns: int) -> Scaler:
+        """Leaves values as they are."""
+        return Scaler(np.zeros(columns), np.ones(columns))
+
+    def scale(self, values: Array) -> Array:
+        """Scaled values, (..., D)."""
+        return (values - self.mean) / self.deviation
+
+    def restore(self, scaled: Array) -> Array:
+        """Values of scaled ones, (..., D)."""
+        return scaled * self.deviation + self.mean
+
+
+@dataclass(frozen=True)
+class Network:
+    """Tip position (x, y) [m] to bending angle [rad]: scaled inputs, hidden layers, one linear output."""
+
+    weights: tuple[Array, ...]
+    """per layer (neurons, inputs)"""
+    biases: tuple[Array, ...]
+    """per layer (neurons,)"""
+    activation: Activation
+    """applied after every layer but the last"""
+    input_scaler: Scaler
+    output_scaler: Scaler
+    domain: Domain
+    """the region of tips it was trained on"""
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Inputs, neurons of each hidden layer, outputs."""
+        return (self.weights[0].shape[1], *(len(bias) for bias in self.biases))
+
+    def angle(self, tip: Array) -> Array:
+        """Bending angles (...) [rad] of tips (..., 2) [m]; `domain.contains` says which can be trusted."""
+        rows = tip.reshape(-1, 2)
+        blocks = [self._forward(rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
+        return np.concatenate(blocks or [np.empty(0)]).reshape(tip.shape[:-1])
+
+    def along(self, path: TipPath) -> AnglePath:
+        """Angles along a path with their exact first and second time derivatives.
+
+        Every layer passes on its value and both derivatives (a second-order Taylor expansion in time), so
+        nothing is differenced. Tips outside the trained domain are flagged. A ReLU network's angle
+        is piecewise linear in the tip: at its kinks the rate jumps, which the acceleration does not show.
+        """
+        count = len(path.position)
+        columns = np.empty((3, count))
+        for start in range(0, count, BLOCK):
+            rows = slice(start, start + BLOCK)
+            columns[:, rows] = self._expand(path.position[rows], path.velocity[rows], path.acceleration[rows])
+        return AnglePath(columns[0], columns[1], columns[2], ~self.domain.contains(path.position))
+
+    def _forward(self, tip: Array) -> Array:
+        activate = ACTIVATIONS[self.activation]
+        value = self.input_scaler.scale(tip)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            value = activate(value @ weight.T + bias)[0]
+        return self.output_scaler.restore(value @ self.weights[-1].T + self.biases[-1])[:, 0]
+
+    def _expand(self, tip: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array, Array]:
+        activate = ACTIVATIONS[self.activation]
+        value = self.input_scaler.scale(tip)
+        rate, bend = velocity / self.input_scaler.deviation, acceleration / self.input_scaler.deviation
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            rate, bend = rate @ weight.T, bend @ weight.T
+            value, slope, curvature = activate(value @ weight.T + bias)
+            rate, bend = slope * rate, curvature * rate * rate + slope * bend
+        last = self.weights[-1].T
+        deviation = self.output_scaler.deviation
+        theta = self.output_scaler.restore(value @ last + self.biases[-1])
+        return theta[:, 0], (rate @ last * deviation)[:, 0], (bend @ last * deviation)[:, 0]

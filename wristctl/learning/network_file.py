@@ -1,0 +1,135 @@
+"""Network files: safetensors whose header says what the numbers mean and where they come from."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from wristctl.config.errors import UserError
+from wristctl.config.learning import Activation
+from wristctl.config.section import Section
+from wristctl.learning.domain import Domain
+from wristctl.learning.network import Network, Scaler
+from wristctl.wrist.kinematics import Array
+
+ENTRY = "wristctl"
+"""The one entry of the file's metadata: of several, safetensors writes the order at random."""
+
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class _Input(Section):
+    names: tuple[Literal["x"], Literal["y"]] = ("x", "y")
+    unit: Literal["m"] = "m"
+    mean: tuple[float, float]
+    deviation: tuple[Positive, Positive]
+
+
+class _Output(Section):
+    names: tuple[Literal["theta"]] = ("theta",)
+    unit: Literal["rad"] = "rad"
+    mean: tuple[float]
+    deviation: tuple[Positive]
+
+
+class _Region(Section):
+    theta: tuple[float, float]
+    arc_length: tuple[float, float]
+
+
+class _Header(Section):
+    format: Literal["wristctl.network/1"] = "wristctl.network/1"
+    hidden: tuple[int, ...]
+    activation: Activation
+    input: _Input
+    output: _Output
+    domain: _Region
+    training: dict[str, object]
+
+
+def save_network(network: Network, path: Path, training: dict[str, object]) -> None:
+    """Write a network and `training`, its record: settings, seed, the data's hash, whatever JSON can hold."""
+    header = _Header(
+        hidden=network.sizes[1:-1],
+        activation=network.activation,
+        input=_Input.model_validate(_columns(network.input_scaler)),
+        output=_Output.model_validate(_columns(network.output_scaler)),
+        domain=_Region(theta=network.domain.theta, arc_length=network.domain.arc_length),
+        training=training,
+    )
+    tensors = {}
+    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        tensors[f"{layer}.weight"], tensors[f"{layer}.bias"] = np.ascontiguousarray(weight), bias
+    path.write_bytes(save(tensors, {ENTRY: header.model_dump_json()}))
+
+
+def load_network(path: Path) -> Network:
+    """Read a network. Raises UserError for anything that `save_network` would not have written."""
+    header, tensors = _read(path)
+    weights, biases = [], []
+    for layer, (inputs, neurons) in enumerate(pairwise((2, *header.hidden, 1))):
+        weights.append(_tensor(path, tensors, f"{layer}.weight", (neurons, inputs)))
+        biases.append(_tensor(path, tensors, f"{layer}.bias", (neurons,)))
+    return Network(
+        tuple(weights),
+        tuple(biases),
+        header.activation,
+        _scaler(header.input),
+        _scaler(header.output),
+        Domain(header.domain.theta, header.domain.arc_length),
+    )
+
+
+def training_record(path: Path) -> dict[str, object]:
+    """What `save_network` was told about the training. Raises UserError like `load_network`."""
+    return _read(path)[0].training
+
+
+def _read(path: Path) -> tuple[_Header, dict[str, Array]]:
+    if not path.is_file():
+        raise UserError("there is no such network file", where=str(path), fix="train one with `wristctl train`")
+    try:
+        with safe_open(path, "numpy") as file:
+            text = (file.metadata() or {}).get(ENTRY)
+            names = file.keys()
+            tensors = {name: file.get_tensor(name) for name in names}
+    except (SafetensorError, OSError) as error:
+        raise _broken(path, f"not a readable safetensors file: {error}") from error
+    if text is None:
+        raise _broken(path, "a safetensors file, but not one of wristctl's networks")
+    try:
+        return _Header.model_validate_json(text), tensors
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise _broken(path, f"the header's {where or 'text'} is wrong: {first['msg']}") from error
+
+
+def _tensor(path: Path, tensors: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array:
+    tensor = tensors.get(name)
+    if tensor is None:
+        raise _broken(path, f"the array {name} is missing")
+    if tensor.shape != shape or tensor.dtype != np.float64:
+        raise _broken(path, f"the array {name} is {tensor.shape} of {tensor.dtype}, the header says {shape} of float64")
+    if not np.isfinite(tensor).all():
+        raise _broken(path, f"the array {name} holds numbers that are not finite")
+    return tensor
+
+
+def _columns(scaler: Scaler) -> dict[str, tuple[float, ...]]:
+    return {"mean": tuple(scaler.mean.tolist()), "deviation": tuple(scaler.deviation.tolist())}
+
+
+def _scaler(columns: _Input | _Output) -> Scaler:
+    return Scaler(np.array(columns.mean), np.array(columns.deviation))
+
+
+def _broken(path: Path, what: str) -> UserError:
+    return UserError(what, where=str(path), fix="use a file from models/ of a sealed train run, or train again")

@@ -1,0 +1,1 @@
+"""Figures and tables of results; knows results, not where they are stored."""

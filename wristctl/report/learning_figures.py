@@ -1,0 +1,112 @@
+"""Figures of data sets and trainings. Positions are drawn as on an upright wrist: x goes up, y to the right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import ArrayLike
+
+from wristctl.report.style import BLACK, BLUE, VERMILLION, figure, legend
+from wristctl.wrist.kinematics import Array
+
+ANGLES, ERRORS = "PuOr", "cividis"
+"""Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright."""
+
+MOST_PATHS = 5000
+"""More dots than this are drawn as pixels, or an SVG would hold a path for each."""
+
+
+def coverage(samples: pd.DataFrame) -> Figure:
+    """Tip positions of a data set, coloured by bending angle; a table with x, y [m] and theta [rad]."""
+    made, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{len(samples)} samples of the tip")
+    bend = float(np.degrees(samples["theta"].abs().max()))
+    dots = axes.scatter(
+        1e3 * samples["y"],
+        1e3 * samples["x"],
+        c=np.degrees(samples["theta"]),
+        s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
+        cmap=_darkened(ANGLES),
+        vmin=-bend,
+        vmax=bend,
+        linewidths=0.0,
+        rasterized=len(samples) > MOST_PATHS,
+    )
+    made.colorbar(dots, ax=axes, label="bending angle [deg]")
+    return made
+
+
+def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
+    """Errors over the epochs, the kept trial bold; a table with trial, epoch, train_loss, validation_loss [rad^2]."""
+    made, ((axes,),) = figure()
+    lines = (("train_loss", BLUE, "training"), ("validation_loss", VERMILLION, "validation"))
+    for trial, rows in curves.groupby("trial"):
+        bold = trial == kept
+        for column, colour, label in lines:
+            rmse = np.degrees(np.sqrt(rows[column]))
+            style = {"label": label, "zorder": 3} if bold else {"linewidth": 0.8, "alpha": 0.35}
+            axes.plot(rows["epoch"], rmse, color=colour, **style)
+    if curves["trial"].nunique() > 1:
+        axes.set_title(f"trial {kept} was kept; faint: trials that were not", loc="left")
+    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]", yscale="log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    legend(axes, loc="upper right")
+    return made
+
+
+def predicted_angles(predictions: pd.DataFrame) -> Figure:
+    """The network's angle over the true one, and its error; a table with theta and theta_network [rad]."""
+    true, network = (np.degrees(predictions[name]) for name in ("theta", "theta_network"))
+    made, axes = figure(1, 2, height=3.2)
+    left, right = axes[0]
+    ends = [true.min(), true.max()]
+    left.plot(ends, ends, color=BLACK, linewidth=0.8, label="equal")
+    dots: Any = {"color": BLUE, "marker": ".", "markersize": 4, "linestyle": "", "rasterized": len(true) > MOST_PATHS}
+    left.plot(true, network, label="test samples", **dots)
+    left.set(xlabel="true angle [deg]", ylabel="network's angle [deg]")
+    left.set_box_aspect(1)
+    legend(left, loc="upper left")
+    right.axhline(0.0, color=BLACK, linewidth=0.8)
+    right.plot(true, network - true, **dots)
+    right.set(xlabel="true angle [deg]", ylabel="error of the network [deg]")
+    right.set_box_aspect(1)
+    return made
+
+
+def error_over_workspace(tip: Array, error: Array) -> Figure:
+    """Absolute error of a network on a grid of tips (A, L, 2) [m]; errors (A, L) [rad]."""
+    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[..., 0], 1e3 * tip[..., 1]
+    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, at the circle")
+    image = axes.pcolormesh(y, x, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
+    worst = np.unravel_index(degrees.argmax(), degrees.shape)
+    axes.plot(y[worst], x[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
+    made.colorbar(image, ax=axes, label="absolute error [deg]")
+    return made
+
+
+def _workspace(across: ArrayLike, up: ArrayLike, title: str) -> tuple[Figure, Axes]:
+    """A figure as tall as a map of these positions [mm] needs at equal scales."""
+    low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
+    width, height = high - low
+    made, ((axes,),) = figure(height=float(np.clip(5.6 * height / width + 1.1, 2.4, 7.0)))
+    edge = 0.04 * width
+    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
+    axes.set(xlabel="y [mm]", ylabel="x [mm]")
+    axes.set_title(title, loc="left")
+    return made, axes
+
+
+def _darkened(name: str) -> Colormap:
+    """A diverging map whose middle is not lost on white paper."""
+    colours = mpl.colormaps[name](np.linspace(0.0, 1.0, 256))
+    middle = 1.0 - 0.45 * np.exp(-((np.linspace(-1.0, 1.0, 256) / 0.35) ** 2))
+    colours[:, :3] *= middle[:, None]
+    return ListedColormap(colours)

@@ -1,0 +1,113 @@
+"""Figures of closed loops over time: angle, error, tensions and torque."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wristctl.report.style import BLACK, GREY, ORANGE, PURPLE, figure, legend, legend_below, line, title
+from wristctl.simulation.trajectory import Trajectory
+
+_SMALLEST = 1e-8
+"""Errors below this [rad] are not shown on a logarithmic axis."""
+_LAST = 20
+"""Samples in the close-up of tensions."""
+_BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
+_DOTS: Any = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
+
+
+def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
+    """Desired and obtained bending angle [deg] over time [s], one line for each trajectory.
+
+    The reference is drawn on its own where it differs from the desired angle (a network's error).
+    """
+    made, ((axes,),) = figure(height=3.4)
+    for course in trajectories:
+        axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
+    draw_desired(axes, trajectories)
+    within_half_a_move(axes, trajectories)
+    axes.set(xlabel="time [s]", ylabel="bending angle [deg]")
+    title(axes, heading)
+    legend_below(made)
+    return made
+
+
+def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = False) -> Figure:
+    """Error e = theta - theta_ref [rad] over time [s], as in the paper's figures of SMC and PID; `log` for |e|."""
+    made, ((axes,),) = figure(height=3.4)
+    for course in trajectories:
+        error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
+        axes.plot(course.time, error, label=label(course), **line(course.label))
+    if log:
+        axes.set_yscale("log")
+    else:
+        axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+        size = max(float(np.abs(course.theta_ref).max()) for course in trajectories)
+        _at_most(axes, -2.0 * size - 0.01, 2.0 * size + 0.01)
+    axes.set(xlabel="time [s]", ylabel="|error| [rad]" if log else "error [rad]")
+    title(axes, heading)
+    legend_below(made)
+    return made
+
+
+def tensions(trajectory: Trajectory) -> Figure:
+    """Tension per tendon [N] of both sides, and the torque [N m] that the law wants and that the tendons give.
+
+    On the right the last samples alone, so that tensions which jump at every tick can be told from a filled area.
+    """
+    made, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
+    end = float(trajectory.time[-1])
+    close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
+    for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
+        for each, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
+            each.step(time[part], tension[part], color=colour, linewidth=1.0, where="post")
+        wanted = {"color": GREY, "label": "wanted by the law"}
+        given = {"color": BLACK, "label": "given by the tendons"}
+        for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
+            column[2].step(time[part], torque[part], linewidth=1.0, where="post", **style)
+    for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
+        each.set_ylabel(name)
+    for each in axes[:2, 0]:
+        each.set_ylim(0.0, 1.05 * float(np.nanmax(trajectory.tension)))
+    size = 2.0 * float(np.nanmax(np.abs(trajectory.torque), initial=1e-3))
+    _at_most(axes[2, 0], -size, size)
+    axes[2, 0].set_xlabel("time [s]")
+    axes[2, 1].set_xlabel(f"time - {end:.4g} s [ms]")
+    title(axes[0, 0], f"{label(trajectory)}: tension per tendon, torque")
+    title(axes[0, 1], f"last {_LAST} samples")
+    legend(axes[2, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    return made
+
+
+def label(trajectory: Trajectory) -> str:
+    """The trajectory's label, saying so if it diverged."""
+    return trajectory.label if np.isfinite(trajectory.theta).all() else f"{trajectory.label} (diverged)"
+
+
+def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+    """Draw the desired angle [deg] as a band behind the lines, and each other reference dotted."""
+    wanted = trajectories[0].theta_desired
+    axes.plot(trajectories[0].time, np.degrees(wanted), label="desired", **_BAND)
+    drawn = [wanted]
+    for course in trajectories:
+        if not any(np.allclose(course.theta_ref, other, atol=1e-6) for other in drawn):
+            drawn.append(course.theta_ref)
+            axes.plot(course.time, np.degrees(course.theta_ref), label="reference", **_DOTS)
+
+
+def within_half_a_move(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+    """Let the axis of angles [deg] end half a move beyond what is desired, so that a diverging loop hides no other."""
+    wanted = np.degrees([course.theta_desired for course in trajectories])
+    low, high = wanted.min(initial=0.0), wanted.max(initial=0.0)
+    margin = max(5.0, 0.5 * (high - low))
+    _at_most(axes, low - margin, high + margin)
+
+
+def _at_most(axes: Axes, low: float, high: float) -> None:
+    """Keep the y axis within low to high."""
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, low), min(top, high))

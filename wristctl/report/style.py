@@ -1,0 +1,107 @@
+"""One look for all figures: plain axes, units on every axis, colours that colour-blind readers tell apart.
+
+Figures are made without pyplot, so drawing leaves no state behind and needs no display.
+"""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+BLACK, GREY, LIGHT = "#000000", "#7F7F7F", "#D9D9D9"
+ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+"""Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
+INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
+"""From Tol's muted scheme, for what Okabe and Ito's eight do not reach."""
+
+WIDTH = 7.0
+"""Width of a figure [in]; text is 9 to 10 points."""
+
+_CONTROLLERS = {
+    "smc": BLUE,
+    "pid": VERMILLION,
+    "mrac": ORANGE,
+    "gvsc": SKY,
+    "nc": PURPLE,
+    "smc-tracking": INDIGO,
+    "super-twisting": WINE,
+    "computed-torque": GREEN,
+    "feedforward": GREY,
+}
+_OTHERS = (OLIVE, FOREST, ROSE)
+_DASHES: dict[str, Any] = {
+    "tuned": "-",
+    "default": "-",
+    "exchanged": (0, (5, 1.5)),
+    "printed": (0, (1.2, 1.2)),
+    "initial": (0, (5, 1.5, 1.2, 1.5)),
+}
+_OTHER_DASHES = (0, (8, 1.5, 1.2, 1.5, 1.2, 1.5))
+_LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.4}
+
+
+def figure(
+    rows: int = 1, cols: int = 1, *, width: float = WIDTH, height: float | None = None, **subplots: Any
+) -> tuple[Figure, NDArray[np.object_]]:
+    """A figure of width x height [in] and its axes, always as an array (rows, cols).
+
+    `subplots` goes to Figure.subplots: sharex, sharey, width_ratios, height_ratios. Without a height every
+    row gets 0.55 of its axes' width, at least 1.8 in.
+    """
+    tall = rows * max(1.8, 0.55 * width / cols) if height is None else height
+    made = Figure(figsize=(width, tall), layout="constrained")
+    axes = made.subplots(rows, cols, squeeze=False, **subplots)
+    for each in axes.flat:
+        dress(each)
+    return made, axes
+
+
+def dress(axes: Axes) -> None:
+    """Open frame and pale grid, set on the axes itself: ticks are made when drawn, outside any rc context."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(which="both", labelsize=9.0)
+    axes.grid(True, color=LIGHT, linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def undress(axes: Axes) -> None:
+    """No grid, frame or tick marks: for drawings and images."""
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(which="both", length=0.0)
+
+
+def title(axes: Axes, text: str) -> None:
+    """A title at the left edge, no larger than the labels."""
+    axes.set_title(text, loc="left", fontsize=10.0)
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """A frameless legend inside the axes."""
+    axes.legend(**_LEGEND | options)
+
+
+def legend_below(figure: Figure, columns: int = 3) -> None:
+    """One legend for all axes of a figure, below them, each label once."""
+    found = [axes.get_legend_handles_labels() for axes in figure.axes]
+    handles = {label: handle for pair in found for handle, label in zip(*pair, strict=True)}
+    if handles:
+        place = {"loc": "outside lower center", "ncols": min(columns, len(handles))}
+        figure.legend(list(handles.values()), list(handles), **_LEGEND | place)
+
+
+def colour(controller: str) -> str:
+    """The controller's colour, the same in every figure; one without its own gets a colour by its name."""
+    return _CONTROLLERS.get(controller) or _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
+
+
+def line(label: str) -> dict[str, Any]:
+    """Line style of "controller/gains": colour by controller, dashes by gains."""
+    controller, _, gains = label.partition("/")
+    return {"color": colour(controller), "linestyle": _DASHES.get(gains or "default", _OTHER_DASHES)}

@@ -1,0 +1,54 @@
+"""Which code ran: version, commit, uncommitted changes, and a hash of the package that needs no git."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import wristctl
+from wristctl.runs.files import files_below, sha256_of, sha256_of_list
+from wristctl.runs.manifest import Code
+
+_PACKAGE = Path(wristctl.__file__).resolve().parent
+
+
+def code_state() -> tuple[Code, bytes]:
+    """The state of the running package, and the patch onto its commit where there are uncommitted changes."""
+    sources = [name for name in files_below(_PACKAGE) if "__pycache__" not in name]
+    tree = sha256_of_list([(name, sha256_of(_PACKAGE / name)) for name in sources])
+    code = Code(version=wristctl.__version__, tree_sha256=tree)
+    commit = _git("rev-parse", "HEAD")
+    if not commit or not _git("ls-files", "--", "__init__.py"):
+        return code, b""
+    patch = _patch()
+    branch = (_git("rev-parse", "--abbrev-ref", "HEAD") or b"").decode().strip()
+    return code.model_copy(
+        update={"commit": commit.decode().strip(), "branch": branch, "dirty": bool(patch)}
+    ), patch
+
+
+def _patch() -> bytes:
+    """Changes of the package against HEAD, new files included; the user's index is not touched."""
+    index = _git("rev-parse", "--git-path", "index")
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = Path(scratch) / "index"
+        if index and (_PACKAGE / index.decode().strip()).is_file():
+            shutil.copyfile(_PACKAGE / index.decode().strip(), copy)
+        _git("add", "--intent-to-add", "--", ".", index=copy)
+        return _git("diff", "--binary", "HEAD", "--", ".", index=copy) or b""
+
+
+def _git(*arguments: str, index: Path | None = None) -> bytes | None:
+    environment = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
+    if index:
+        environment["GIT_INDEX_FILE"] = str(index)
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(_PACKAGE), *arguments], capture_output=True, env=environment, timeout=30
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout if done.returncode == 0 else None

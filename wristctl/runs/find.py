@@ -1,0 +1,85 @@
+"""Find runs by path, id, the beginning of an id, or `latest:<kind>`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wristctl.config.errors import UserError, meant
+from wristctl.runs.manifest import MANIFEST
+from wristctl.runs.run import Run
+
+RESULTS = Path("results")
+
+
+def list_runs(results: Path = RESULTS) -> list[Run]:
+    """All runs of a results folder, oldest first; broken ones are among them and raise nothing."""
+    try:
+        return [
+            Run(path) for path in sorted(results.iterdir()) if path.is_dir() and not path.name.startswith(".")
+        ]
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise UserError(
+            f"cannot read the results folder: {error.strerror}", str(results), "name it with --out"
+        ) from error
+
+
+def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
+    """The run that `ref` names: a path, an id in `results` or its beginning, `latest:<kind>` (that ended ok).
+
+    Raises UserError where there is none, more than one, or what is there is not a run.
+    """
+    if str(ref).startswith("latest:"):
+        return _latest(str(ref), results)
+    path = Path(ref)
+    if path.name == MANIFEST:
+        path = path.parent
+    if str(ref) and path.exists():
+        return _readable(path)
+    if len(path.parts) != 1:
+        raise UserError("no such run", repr(str(ref)), "name a run that `wristctl runs ls` shows")
+    runs = {run.id: run for run in list_runs(results)}
+    if path.name in runs:
+        return _readable(runs[path.name].path)
+    begun = [run for run in runs.values() if run.id.startswith(path.name)]
+    if len(begun) == 1:
+        return _readable(begun[0].path)
+    if begun:
+        raise UserError(
+            f"{len(begun)} runs begin like this",
+            str(ref),
+            f"write more of it: {', '.join(run.id for run in begun[:3])}",
+        )
+    fix = meant(path.name, runs) if len(runs) > 0 else "name a path, or the results folder with --out"
+    raise UserError("no such run", f"{ref} in {results}", fix)
+
+
+def require(ref: str | Path, kind: str, results: Path = RESULTS) -> Run:
+    """The run `ref` if it is of the kind, has ended ok, and holds the very files sealed; else UserError."""
+    run = open_run(ref, results)
+    if run.kind != kind:
+        raise UserError(
+            f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
+        )
+    if run.state != "ok":
+        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {kind}` again")
+    run.check()
+    return run
+
+
+def _readable(path: Path) -> Run:
+    run = Run(path)
+    run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+    return run
+
+
+def _latest(ref: str, results: Path) -> Run:
+    kind = ref.removeprefix("latest:")
+    ended = [run for run in list_runs(results) if run.state == "ok"]
+    found = [run for run in ended if run.kind == kind]
+    if not found:
+        kinds = {run.kind for run in ended}
+        fix = meant(kind, kinds) if kinds else f"run `wristctl {kind}` first"
+        raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
+    return max(found, key=lambda run: run.manifest.timing.started)

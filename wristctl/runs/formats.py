@@ -1,0 +1,60 @@
+"""Tables, arrays and figures as files whose bytes depend on their content alone."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wristctl.runs.files import replacing
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def write_table(path: Path, frame: pd.DataFrame) -> None:
+    """A DataFrame as CSV without its index; floats are written so that they read back exactly."""
+    with replacing(path) as temporary:
+        frame.to_csv(temporary, index=False, lineterminator="\n")
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A CSV file with floats exactly as they were written."""
+    import pandas as pd
+
+    return pd.read_csv(path)
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Arrays as npz, uncompressed and with fixed dates."""
+    import numpy as np
+
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for name, array in arrays.items():
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            with archive.open(entry, "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asarray(array), allow_pickle=False)
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of an npz file by name."""
+    import numpy as np
+
+    with np.load(path, allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
+    """A figure as PNG and SVG without date or program version; closes it."""
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
+    nothing: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+    with mpl.rc_context({"svg.hashsalt": stem.name}):
+        for suffix, metadata in nothing.items():
+            with replacing(stem.with_name(f"{stem.name}.{suffix}")) as temporary:
+                figure.savefig(temporary, format=suffix, metadata=metadata, dpi=dpi)
+    plt.close(figure)

@@ -1,0 +1,69 @@
+"""What happens during a run as lines: events.jsonl for programs, console.log for people."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import threading
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+
+def now() -> str:
+    """The time in UTC, ISO 8601 to the microsecond."""
+    return datetime.now(UTC).isoformat(timespec="microseconds")
+
+
+def plain(value: Any) -> Any:
+    """`value` in JSON's terms: NumPy scalars and arrays become numbers and lists, NaN and infinities None."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    return plain(value.tolist()) if hasattr(value, "tolist") else str(value)
+
+
+class Journal(logging.Handler):
+    """Appends to a run's events and console log; listens to wristctl's log messages while open."""
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__()
+        self._events = (directory / "events.jsonl").open("a", encoding="utf-8", newline="\n")
+        self._console = (directory / "console.log").open("a", encoding="utf-8", newline="\n")
+        self._writing = threading.RLock()
+        logging.getLogger("wristctl").addHandler(self)
+
+    def event(self, name: str, /, **fields: Any) -> None:
+        """One line of events.jsonl, on its way to the disk when this returns."""
+        with self._writing:
+            self._events.write(
+                json.dumps({"time": now(), "event": name, **plain(fields)}, allow_nan=False) + "\n"
+            )
+            self._events.flush()
+
+    def console(self, text: str) -> None:
+        """Lines of console.log."""
+        with self._writing:
+            self._console.write(text.rstrip("\n") + "\n")
+            self._console.flush()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """A message of the program: to the console log, and from warnings on to the events too."""
+        message = record.getMessage()
+        warning = record.levelno >= logging.WARNING
+        self.console(f"{record.levelname.lower()}: {message}" if warning else message)
+        if warning:
+            self.event(record.levelname.lower(), message=message, logger=record.name)
+
+    def close(self) -> None:
+        """Stop listening and close the files."""
+        logging.getLogger("wristctl").removeHandler(self)
+        self._events.close()
+        self._console.close()
+        super().close()

@@ -1,0 +1,162 @@
+"""A run while it is going on: what it writes, and how it ends."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import resource
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any, Literal
+
+from wristctl.runs import formats
+from wristctl.runs.files import files_below, replacing, sha256_of, sha256_of_list, sync, write_text
+from wristctl.runs.journal import Journal, now, plain
+from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Column, Error, Manifest, Outcome, Output
+from wristctl.runs.readme import readme
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+_RESULTS = ("data", "models", "figures")
+_RECORDS = {
+    MANIFEST,
+    SUMS,
+    CONFIG,
+    "events.jsonl",
+    "console.log",
+    "environment.txt",
+    "code.patch",
+    "README.md",
+}
+
+
+def stream(seed: int, name: str) -> tuple[int, int]:
+    """Entropy of the named random stream under a root seed, for `numpy.random.default_rng`."""
+    return seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
+
+
+class LiveRun:
+    """The writing side of a run directory, handed out by `start_run`."""
+
+    def __init__(self, path: Path, manifest: Manifest) -> None:
+        self.path, self.id = path, manifest.id
+        self._manifest = manifest
+        self._metrics: dict[str, dict[str, Any]] = {}
+        self._columns: dict[str, list[Column]] = {}
+        self._volatile: set[str] = set()
+        self._summary: list[str] = []
+        self._began = time.perf_counter(), time.process_time()
+        self._journal = Journal(path)
+        self.event, self.console = self._journal.event, self._journal.console
+        self._write_manifest()
+        self.event("start", kind=manifest.kind)
+
+    def stream(self, name: str) -> tuple[int, int]:
+        """Entropy of the random stream `name` for `numpy.random.default_rng`, noted in the manifest."""
+        self._manifest.streams[name] = stream(self._manifest.seed, name)
+        return self._manifest.streams[name]
+
+    def table(
+        self,
+        name: str,
+        frame: pd.DataFrame,
+        units: Mapping[str, str] | None = None,
+        meaning: Mapping[str, str] | None = None,
+    ) -> None:
+        """Write a DataFrame as CSV (exact round trip); the columns' units and meaning are noted."""
+        formats.write_table(self.file(name), frame)
+        units, meaning = units or {}, meaning or {}
+        self._columns[name] = [
+            Column(name=str(each), unit=units.get(str(each), ""), meaning=meaning.get(str(each), ""))
+            for each in frame.columns
+        ]
+
+    def arrays(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Write arrays as npz."""
+        formats.write_arrays(self.file(name), arrays)
+
+    def file(self, name: str) -> Path:
+        """Where to write an output of any format; it becomes part of the run when the run ends."""
+        relative = PurePosixPath(name)
+        if relative.is_absolute() or ".." in relative.parts or name in _RECORDS:
+            raise ValueError(f"{name!r} is no name for an output of a run")
+        path = self.path / relative
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Write figures/<name>.png and .svg and close the figure."""
+        formats.write_figure(self.file(f"figures/{name}"), figure)
+
+    def metric(
+        self,
+        name: str,
+        value: float | None,
+        unit: str = "",
+        better: Literal["lower", "higher", ""] = "",
+        n: int = 1,
+        interval: tuple[float, float] | None = None,
+        meaning: str = "",
+    ) -> None:
+        """A number of metrics.json (None: there is none): unit, better direction, sample size, interval."""
+        self._metrics[name] = plain(
+            {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
+        )
+
+    def numerics(self, **facts: Any) -> None:
+        """Note how numbers were computed (dtype, integrator, step, threads) in the manifest."""
+        self._manifest.numerics.update(plain(facts))
+
+    def volatile(self, name: str) -> None:
+        """Keep an output outside the result hash because it holds wall times or the like."""
+        self._volatile.add(name)
+
+    def summary(self, markdown: str) -> None:
+        """Add to the result in words and tables that README.md shows."""
+        self._summary.append(markdown)
+
+    def end(self, state: Outcome, exit_code: int = 0, error: Error | None = None) -> Manifest:
+        """Seal the run: hashes of all outputs, README, manifest, SHA256SUMS last. Called by `start_run`."""
+        self.event("end", state=state)
+        self._journal.close()
+        if self._metrics:
+            write_text(self.path / METRICS, json.dumps(self._metrics, indent=2, allow_nan=False) + "\n")
+        manifest = self._manifest
+        manifest.state, manifest.exit_code, manifest.error = state, exit_code, error
+        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in _RECORDS]
+        manifest.result_sha256 = sha256_of_list(
+            [(each.path, each.sha256) for each in manifest.outputs if not each.volatile]
+        )
+        wall, cpu = self._began
+        manifest.timing.ended = now()
+        manifest.timing.wall_s, manifest.timing.cpu_s = time.perf_counter() - wall, time.process_time() - cpu
+        unit = 2**20 if sys.platform == "darwin" else 2**10
+        manifest.timing.max_rss_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+        write_text(self.path / "README.md", readme(manifest, "\n\n".join(self._summary)))
+        self._write_manifest()
+        known = {each.path: each.sha256 for each in manifest.outputs}
+        sums = {name: known.get(name) or sha256_of(self.path / name) for name in files_below(self.path)}
+        write_text(self.path / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sums.items()))
+        return manifest
+
+    def _output(self, name: str) -> Output:
+        path = self.path / name
+        sync(path)
+        result = name == METRICS or name.split("/")[0] in _RESULTS
+        return Output(
+            path=name,
+            sha256=sha256_of(path),
+            bytes=path.stat().st_size,
+            volatile=not result or name in self._volatile,
+            columns=self._columns.get(name, []),
+        )
+
+    def _write_manifest(self) -> None:
+        with replacing(self.path / MANIFEST) as temporary:
+            text = self._manifest.model_dump_json(by_alias=True, indent=2)
+            temporary.write_text(text + "\n", encoding="utf-8")

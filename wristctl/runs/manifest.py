@@ -1,0 +1,112 @@
+"""run.json: what was run, on what, by which code, where, and what came out."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+MANIFEST, SUMS, CONFIG, METRICS = "run.json", "SHA256SUMS", "config.yaml", "metrics.json"
+
+Outcome = Literal["running", "ok", "failed", "interrupted"]
+
+
+class Record(BaseModel):
+    """A part of the manifest."""
+
+    model_config = ConfigDict(extra="forbid", validate_by_alias=True, validate_by_name=True)
+
+
+class Column(Record):
+    """A column of a table."""
+
+    name: str
+    unit: str = ""
+    meaning: str = ""
+
+
+class Output(Record):
+    """A file that the run wrote; volatile ones (wall times, reports) stand outside the result hash."""
+
+    path: str
+    sha256: str
+    bytes: int
+    volatile: bool = False
+    columns: list[Column] = []
+
+
+class Input(Record):
+    """An earlier run that this one read; `result_sha256` says what was in it."""
+
+    role: str
+    kind: str
+    run: str
+    path: str
+    result_sha256: str
+
+
+class Code(Record):
+    """The code that ran: version, state of its checkout (null outside one), hash of the package's files."""
+
+    version: str
+    commit: str | None = None
+    branch: str | None = None
+    dirty: bool | None = None
+    patch_sha256: str | None = None
+    tree_sha256: str
+
+
+class Environment(Record):
+    """The machine and the packages that computed; `threads` are the environment's limits on threads."""
+
+    python: str
+    os: str
+    machine: str
+    cpu: str
+    cores: int
+    threads: dict[str, str]
+    packages: dict[str, str]
+    packages_sha256: str
+
+
+class Timing(Record):
+    """UTC times; wall and processor time [s], largest resident memory [MB]."""
+
+    started: str
+    ended: str | None = None
+    wall_s: float | None = None
+    cpu_s: float | None = None
+    max_rss_mb: float | None = None
+
+
+class Error(Record):
+    """Why a run failed."""
+
+    type: str
+    what: str
+    where: str = ""
+    fix: str = ""
+
+
+class Manifest(Record):
+    """Everything about one run but its results."""
+
+    schema_: Literal["wristctl.run/1"] = Field(default="wristctl.run/1", alias="schema")
+    id: str
+    kind: str
+    label: str
+    state: Outcome = "running"
+    exit_code: int | None = None
+    error: Error | None = None
+    argv: list[str]
+    config_sha256: str
+    seed: int
+    streams: dict[str, tuple[int, int]] = {}
+    code: Code
+    environment: Environment
+    inputs: list[Input] = []
+    outputs: list[Output] = []
+    numerics: dict[str, Any] = {}
+    timing: Timing
+    result_sha256: str | None = None
+    fingerprint: str

@@ -1,0 +1,40 @@
+"""README.md of a run: what a stranger needs to read it."""
+
+from __future__ import annotations
+
+import shlex
+
+from wristctl.runs.manifest import Manifest
+
+
+def readme(manifest: Manifest, summary: str) -> str:
+    """The run in a page: command, inputs, result, files with their columns, how to repeat and to check it."""
+    lines = [
+        f"# {manifest.id}",
+        "",
+        f"`{shlex.join(manifest.argv)}`: {manifest.state}, wristctl {manifest.code.version}, "
+        f"seed {manifest.seed}, started {manifest.timing.started}, {manifest.timing.wall_s or 0:.1f} s.",
+        *(
+            f"\nInput `{each.role}`: {each.kind} run {each.run} (result {each.result_sha256[:12]})."
+            for each in manifest.inputs
+        ),
+        *([f"\nError: {manifest.error.what} {manifest.error.where}".rstrip()] if manifest.error else []),
+        *(["", "## Result", "", summary.strip()] if summary else []),
+        *(["", "## Files", ""] if manifest.outputs else []),
+    ]
+    for output in manifest.outputs:
+        lines.append(f"- `{output.path}`" + " (outside the result hash)" * output.volatile)
+        for column in output.columns:
+            unit = f" [{column.unit}]" if column.unit else ""
+            lines.append(f"  - `{column.name}`{unit}" + f": {column.meaning}" * bool(column.meaning))
+    lines += [
+        "",
+        "## Repeat and check",
+        "",
+        f"- again, from the folder above: `wristctl {manifest.kind} {manifest.id}/config.yaml`",
+        f"- result hash: `{manifest.result_sha256}`",
+        "- unchanged since: `sha256sum -c SHA256SUMS`",
+        "- code, machine, hashes: `run.json`; packages: `environment.txt`"
+        + "; uncommitted changes: `code.patch`" * bool(manifest.code.dirty),
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,116 @@
+"""A run directory as read: manifest, state, data, and whether its files are still those sealed."""
+
+from __future__ import annotations
+
+import json
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import ValidationError
+
+from wristctl.config.errors import UserError, meant
+from wristctl.config.load import load_study
+from wristctl.config.study import Study
+from wristctl.runs.files import files_below, sha256_of
+from wristctl.runs.formats import read_arrays, read_table
+from wristctl.runs.lock import is_locked
+from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+_FIX = "name a run that `wristctl runs ls` shows"
+
+State = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
+
+
+class Run:
+    """An existing run directory, read when asked; every error is a UserError that names the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.resolve()
+
+    @property
+    def id(self) -> str:
+        """The directory's name."""
+        return self.path.name
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """run.json."""
+        file = self.path / MANIFEST
+        try:
+            return Manifest.model_validate_json(file.read_bytes())
+        except OSError as error:
+            raise UserError("not a run directory: it has no run.json", str(self.path), _FIX) from error
+        except ValidationError as error:
+            raise UserError("not a manifest of a wristctl run", str(file), _FIX) from error
+
+    @property
+    def kind(self) -> str:
+        """The command that made it."""
+        return self.manifest.kind
+
+    @property
+    def state(self) -> State:
+        """How it ended: `crashed` if running by its word but without a lock, `broken` without a manifest."""
+        if is_locked(self.path):
+            return "running"
+        self.__dict__.pop("manifest", None)
+        try:
+            state = self.manifest.state
+        except UserError:
+            return "broken"
+        return "crashed" if state == "running" or not (self.path / SUMS).is_file() else state
+
+    @property
+    def config(self) -> Study:
+        """The resolved study it ran."""
+        return load_study([self.path / CONFIG])
+
+    @property
+    def metrics(self) -> dict[str, dict[str, Any]]:
+        """metrics.json: value, unit, better, n, interval and meaning by name; empty without one."""
+        file = self.path / METRICS
+        try:
+            found: dict[str, dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else {}
+        except ValueError as error:
+            raise UserError("not valid JSON", str(file), "run `wristctl " + self.kind + "` again") from error
+        return found
+
+    @property
+    def result_hash(self) -> str:
+        """One hash over everything the run found; empty where it was not sealed."""
+        return self.manifest.result_sha256 or ""
+
+    def data(self, name: str) -> pd.DataFrame:
+        """The table data/<name>.csv."""
+        return read_table(self.file(f"data/{name}.csv"))
+
+    def array(self, name: str) -> dict[str, np.ndarray]:
+        """The arrays of data/<name>.npz."""
+        return read_arrays(self.file(f"data/{name}.npz"))
+
+    def file(self, name: str) -> Path:
+        """The path of one of its files."""
+        path = self.path / name
+        if not path.is_file():
+            raise UserError(
+                f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path))
+            )
+        return path
+
+    def check(self) -> None:
+        """Hash every file again; UserError naming the first that is missing or not as it was sealed."""
+        try:
+            lines = (self.path / SUMS).read_text(encoding="utf-8").splitlines()
+        except OSError as error:
+            raise UserError("run is not sealed", str(self.path), "use a run that has ended") from error
+        for line in lines:
+            digest, _, name = line.partition("  ")
+            path = self.path / name
+            if not path.is_file() or sha256_of(path) != digest:
+                what = "hash does not match what was sealed" if path.is_file() else "sealed file is missing"
+                raise UserError(what, str(path), f"restore it or run `wristctl {self.kind}` again")

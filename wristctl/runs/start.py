@@ -1,0 +1,159 @@
+"""Begin a run and see to its end, whichever way it ends."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from wristctl.config.errors import UserError
+from wristctl.config.resolved import config_hash, resolved_yaml
+from wristctl.config.study import Study
+from wristctl.runs.code import code_state
+from wristctl.runs.environment import environment_state
+from wristctl.runs.files import replacing, sha256_of, write_text
+from wristctl.runs.interrupt import sigterm_as_interrupt, undisturbed
+from wristctl.runs.journal import now
+from wristctl.runs.live import LiveRun
+from wristctl.runs.lock import RunLock
+from wristctl.runs.manifest import CONFIG, Error, Input, Manifest, Timing
+from wristctl.runs.run import Run
+
+
+@dataclass(frozen=True)
+class InputRun:
+    """An earlier run and the part it plays in this one."""
+
+    role: str
+    run: Run
+
+
+@contextmanager
+def start_run(
+    kind: str,
+    study: Study,
+    label: str = "",
+    out: Path = Path("results"),
+    argv: Sequence[str] = (),
+    inputs: Sequence[InputRun] = (),
+) -> Iterator[LiveRun]:
+    """A new run directory under `out`, locked while the block runs and sealed at its end.
+
+    The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
+    exception, which is raised again. What was written is kept. Raises UserError where the directory cannot be
+    created.
+    """
+    digest = config_hash(study, kind)
+    path = _new_directory(out, kind, label, digest)
+    lock = RunLock(path)
+    try:
+        with sigterm_as_interrupt():
+            run = _begin(path, kind, study, label, argv, inputs, digest)
+            try:
+                yield run
+            except BaseException as error:
+                with undisturbed():
+                    _end_badly(run, error)
+                raise
+            with undisturbed():
+                run.end("ok")
+    finally:
+        lock.release()
+
+
+def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
+    if not re.fullmatch(r"[A-Za-z0-9_.-]{0,60}", label):
+        raise UserError(
+            "a label holds letters, digits, dots, dashes and underscores",
+            f"--label {label}",
+            "shorten or respell it",
+        )
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    name = "-".join(part for part in (stamp, kind, label, digest[:6]) if part)
+    attempt = 1
+    while True:
+        path = out / (name if attempt == 1 else f"{name}-{attempt}")
+        try:
+            path.mkdir(parents=True)
+            return path
+        except FileExistsError:
+            if not path.is_dir():
+                raise UserError(
+                    "cannot create a run directory: a file is in the way", str(path), "choose another --out"
+                ) from None
+            attempt += 1
+        except OSError as error:
+            what = f"cannot create a run directory: {error.strerror}"
+            raise UserError(what, str(out), "choose a folder you can write to with --out") from error
+
+
+def _begin(
+    path: Path,
+    kind: str,
+    study: Study,
+    label: str,
+    argv: Sequence[str],
+    inputs: Sequence[InputRun],
+    digest: str,
+) -> LiveRun:
+    code, patch = code_state()
+    environment, packages = environment_state()
+    write_text(path / CONFIG, resolved_yaml(study, kind))
+    write_text(path / "environment.txt", packages)
+    if patch:
+        with replacing(path / "code.patch") as temporary:
+            temporary.write_bytes(patch)
+        code.patch_sha256 = sha256_of(path / "code.patch")
+    read = [
+        Input(
+            role=each.role,
+            kind=each.run.kind,
+            run=each.run.id,
+            path=str(each.run.path),
+            result_sha256=each.run.result_hash,
+        )
+        for each in inputs
+    ]
+    numeric = (
+        environment.python,
+        environment.machine,
+        environment.cpu,
+        environment.threads,
+        environment.packages,
+    )
+    decisive = (digest, code.tree_sha256, sorted((each.role, each.result_sha256) for each in read), numeric)
+    return LiveRun(
+        path,
+        Manifest(
+            id=path.name,
+            kind=kind,
+            label=label,
+            argv=list(argv or sys.argv),
+            config_sha256=digest,
+            seed=study.seed,
+            code=code,
+            environment=environment,
+            inputs=read,
+            timing=Timing(started=now()),
+            fingerprint=hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest(),
+        ),
+    )
+
+
+def _end_badly(run: LiveRun, error: BaseException) -> None:
+    if isinstance(error, KeyboardInterrupt):
+        run.end("interrupted", 130)
+    elif isinstance(error, UserError):
+        run.end(
+            "failed",
+            error.exit_code,
+            Error(type="UserError", what=error.what, where=error.where, fix=error.fix),
+        )
+    else:
+        run.end("failed", 1, Error(type=type(error).__name__, what=str(error)))

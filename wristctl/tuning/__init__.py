@@ -1,0 +1,1 @@
+"""Search for gains: optimisers with one ask/tell face, and the objective."""

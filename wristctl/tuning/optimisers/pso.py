@@ -1,0 +1,46 @@
+"""Particle swarm optimisation, the paper's method, with constriction.
+
+Clerc and Kennedy, IEEE Trans. Evolutionary Computation 6 (2002) 58; with clamped velocities as in Eberhart and Shi,
+Congress on Evolutionary Computation 2000, 84. The whole swarm knows the best point.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wristctl.tuning.optimisers.base import Array, Optimiser
+
+_PULL = 2.05
+"""Acceleration towards either best; the two together must exceed 4."""
+_CONSTRICTION = 2.0 / (2.0 * _PULL - 2.0 + math.sqrt(4.0 * _PULL**2 - 8.0 * _PULL))
+"""0.7298: the swarm converges for any pull (Clerc and Kennedy, eq. 4)."""
+_FASTEST = 0.2
+"""Largest step of a coordinate, a fifth of the box: on smooth and rippled test functions better than all of it."""
+
+
+class ParticleSwarm(Optimiser):
+    """Particles that remember their own best point and are drawn to it and to the swarm's."""
+
+    name = "pso"
+
+    def __init__(self, dim: int, candidates: int, start: Array, rng: np.random.Generator) -> None:
+        super().__init__(dim, candidates, start, rng)
+        self.velocity = rng.uniform(-_FASTEST, _FASTEST, self.points.shape)
+        self.own, self.own_values = self.points.copy(), np.full(candidates, np.inf)
+
+    def propose(self) -> Array:
+        """Move every particle; at a wall it stops, so that an optimum on the wall can be met exactly."""
+        to_own, to_swarm = self.rng.random((2, *self.points.shape))
+        pull = _PULL * (to_own * (self.own - self.points) + to_swarm * (self.best.point - self.points))
+        self.velocity = np.clip(_CONSTRICTION * (self.velocity + pull), -_FASTEST, _FASTEST)
+        moved = self.points + self.velocity
+        inside = np.clip(moved, 0.0, 1.0)
+        self.velocity[moved != inside] = 0.0
+        return inside
+
+    def learn(self, values: Array) -> None:
+        """Remember each particle's own best point."""
+        better = values < self.own_values
+        self.own[better], self.own_values[better] = self.points[better], values[better]

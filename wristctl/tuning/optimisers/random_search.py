@@ -1,0 +1,18 @@
+"""Random search: what every other method has to beat at the same budget."""
+
+from __future__ import annotations
+
+from wristctl.tuning.optimisers.base import Array, Optimiser
+
+
+class RandomSearch(Optimiser):
+    """Candidates drawn evenly from the box, without memory."""
+
+    name = "random"
+
+    def propose(self) -> Array:
+        """Draw anew."""
+        return self.rng.random(self.points.shape)
+
+    def learn(self, values: Array) -> None:
+        """Nothing to remember."""
