@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench clean venv
+.PHONY: run test lint bench bench-peers clean venv
 
 run: .venv/run
 	@set -e; \
@@ -25,6 +25,9 @@ lint: .venv/dev
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
+
+bench-peers: .venv/run
+	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
 
 venv: .venv/dev
 

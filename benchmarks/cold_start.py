@@ -38,8 +38,9 @@ def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
     out = [] if command == "--help" else ["--out", str(folder / "results")]
     start = time.time()
     begun = time.perf_counter()
+    program = [sys.executable, "-c", "from wristctl.cli.app import main; main()"]
     process = subprocess.Popen(
-        [sys.executable, "-c", "from wristctl.cli.app import main; main()", command, *arguments, *out], cwd=folder, text=True,
+        [*program, command, *arguments, *out], cwd=folder, text=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env={**os.environ, "XDG_CACHE_HOME": str(cache)},
     )  # fmt: skip
     assert process.stderr is not None

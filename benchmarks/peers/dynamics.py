@@ -1,4 +1,4 @@
-"""Dynamics of the n-segment wrist for arrays of lanes, formulas as wristctl.wrist.dynamics and wristctl.wrist.jacobian."""
+"""Dynamics of the n-segment wrist for arrays of lanes, as wristctl.wrist.dynamics and wristctl.wrist.jacobian."""
 
 from __future__ import annotations
 

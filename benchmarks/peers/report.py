@@ -8,14 +8,15 @@ from typing import Any
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 OURS = "wristctl"
 
 
 def _rate(result: dict[str, Any], side: str, segments: int, threads: int, lanes: int) -> float | None:
     """Median rate; where a side was measured with fewer lanes only, the rate of those."""
-    rows = [row for row in result["speeds"] if (row["side"], row["segments"], row["threads"]) == (side, segments, threads)]
+    wanted = (side, segments, threads)
+    rows = [row for row in result["speeds"] if (row["side"], row["segments"], row["threads"]) == wanted]
     rows = [row for row in rows if row["lanes"] <= lanes]
     return max(rows, key=lambda row: row["lanes"])["rate"] if rows else None
 
@@ -36,7 +37,8 @@ def markdown(result: dict[str, Any]) -> str:
         for threads in _axes(result, "threads"):
             head = "one thread" if threads == 1 else f"{threads} threads"
             parts.append(f"### n = {n}, {head}\n")
-            columns = ["side", "steps per ms", "error [rad]", *(f"{count:,} lanes" for count in lanes), "wristctl is faster by"]
+            counts = [f"{count:,} lane{'s' if count > 1 else ''}" for count in lanes]
+            columns = ["side", "steps per ms", "error [rad]", *counts, "wristctl over it"]
             parts.append("| " + " | ".join(columns) + " |\n|" + "---|" * len(columns))
             for side, error in ((side, found["error"]) for side, found in result["errors"][str(n)].items()):
                 steps = {int(key): value for key, value in result["sides"][side]["steps"].items()}[n]

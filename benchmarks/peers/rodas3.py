@@ -50,8 +50,8 @@ def step(s: Segment, theta: list[Any], omega: list[Any], plus: Any, minus: Any, 
     lu = factorise([[mass[i][j] / hg + by_rate[i][j] + slope[i][j] for j in each] for i in each])
 
     def stage(u: list[Any], w: list[Any]) -> Any:
-        l = solve(lu, [sum(mass[i][j] * w[j] - slope[i][j] * u[j] for j in each) for i in each])
-        return [hg * (u[i] + l[i]) for i in each], l
+        rate = solve(lu, [sum(mass[i][j] * w[j] - slope[i][j] * u[j] for j in each) for i in each])
+        return [hg * (u[i] + rate[i]) for i in each], rate
 
     k1, l1 = stage(omega, a0)
     k2, l2 = stage([omega[i] + 4.0 / h * k1[i] for i in each], [a0[i] + 4.0 / h * l1[i] for i in each])

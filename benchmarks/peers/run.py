@@ -25,7 +25,8 @@ from venvs import CACHE, HERE, python_of
 def machine() -> dict[str, Any]:
     """What the numbers depend on."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    model = next(names, platform.processor())
     flags = next((line for line in lines if line.startswith("flags")), "")
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True).stdout
     compiler = subprocess.run(["g++", "--version"], capture_output=True, text=True).stdout.splitlines()[:1]
@@ -54,7 +55,8 @@ def main() -> None:
     for venv in {side.venv for side in sides}:
         python_of(venv)
     options.out.mkdir(parents=True, exist_ok=True)
-    result: dict[str, Any] = {"machine": machine(), "task": {"period": truth.PERIOD, "gains": truth.GAINS, "move": truth.MOVE}}
+    task_values = {"period": truth.PERIOD, "gains": truth.GAINS, "move": truth.MOVE}
+    result: dict[str, Any] = {"machine": machine(), "task": task_values}
     result["sides"] = {side.name: {"problem": side.problem, "steps": side.steps} for side in sides}
     result["errors"], result["speeds"] = {}, []
     for n in options.segments:

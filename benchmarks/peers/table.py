@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 SAME = "the same equations"
-RIGID = "easier: rigid links, one hinge a segment, no arcs; RK4 at n = 1, implicit in damping at n = 4"
+RIGID = "easier: rigid links, one hinge a segment, no arcs"
+FIRST = "first order, implicit in damping"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Side:
 
 SIDES = (
     Side("wristctl", "wristctl_side", None),
+    Side("wristctl, small steps", "wristctl_side", None, steps={1: 5, 4: 5}),
     Side("C, 16 lanes", "c_side", None, width=16),
     Side("C, 8 lanes", "c_side", None, width=8),
     Side("JAX, lane layout", "jax_lanes", "jax"),
@@ -37,11 +39,15 @@ SIDES = (
     Side("NumPy", "numpy_side", None),
     Side(
         "soromox", "soromox_arm", "soromox",
-        "another rod: mass spread along it, hand as a rigid rod with rotary inertia; RODAS3, Jacobian by differentiation",
+        "another rod: mass spread along it, hand a rigid rod with rotary inertia; RODAS3, Jacobian by differentiation",
         fine={1: 8, 4: 8},
     ),
-    Side("MuJoCo, chain", "mujoco_chain", "mujoco", RIGID, fine={1: 16, 4: 2048}),
-    Side("MuJoCo, chain, small steps", "mujoco_chain", "mujoco", RIGID, {4: 256}, {4: 2048}),
+    Side("MuJoCo, chain", "mujoco_chain", "mujoco", f"{RIGID}; {FIRST}", fine={1: 2048, 4: 2048}),
+    Side("MuJoCo, chain, small steps", "mujoco_chain", "mujoco", f"{RIGID}; {FIRST}", {4: 256}, {4: 2048}),
+    Side("MuJoCo, chain, RK4", "mujoco_rk4", "mujoco", f"{RIGID}; unstable for n = 4", {1: 1}, {1: 16}),
     Side("MuJoCo, tendons", "mujoco_tendons", "mujoco", f"{RIGID}; spatial tendons", {4: 1}, {4: 2048}),
-    Side("Pinocchio", "pinocchio_chain", "pinocchio", f"{RIGID}; Python loop", fine={1: 16, 4: 256}, most_lanes=1),
+    Side(
+        "Pinocchio", "pinocchio_chain", "pinocchio", f"{RIGID}; RK4 at n = 1, else implicit Euler, in Python",
+        fine={1: 16, 4: 256}, most_lanes=1,
+    ),
 )  # fmt: skip

@@ -6,10 +6,10 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
-from scipy.integrate import solve_ivp
-
 from equations import Segment, pulls
+from scipy.integrate import solve_ivp
 from task import Task
+
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import motion
@@ -34,7 +34,8 @@ def make_task(n: int) -> Task:
 
 def implicit(task: Task, cache: Path) -> np.ndarray:
     """Tip angle at the first ticks, (COMPARED,) [rad]; kept in the cache folder under a hash of the task."""
-    values = [task.plant, task.model, task.gains, task.reference[:COMPARED], np.array([task.period, task.low, task.high])]
+    scalars = np.array([task.period, task.low, task.high])
+    values = [task.plant, task.model, task.gains, task.reference[:COMPARED], scalars]
     key = hashlib.sha256(b"".join(np.ascontiguousarray(v).tobytes() for v in values)).hexdigest()[:16]
     file = cache / f"implicit-{key}.npy"
     if not file.exists():

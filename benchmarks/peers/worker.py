@@ -1,8 +1,8 @@
 """One side in a process of its own: `worker.py MODULE TASK STEPS THREADS`; requests and answers are lines of JSON.
 
-A side is a module in sides/ with `prepare(task, lanes, threads, steps) -> run`, where `run(ticks)` does that many control
-periods of all lanes from rest and returns the first lane's tip angle at each tick. `steps` is the number of integration
-steps in one control period.
+A side is a module in sides/ with `prepare(task, lanes, threads, steps) -> run`, where `run(ticks)` does that many
+control periods of all lanes from rest and returns the first lane's tip angle at each tick (wristctl: only where one
+lane runs). `steps` is the number of integration steps in one control period.
 """
 
 from __future__ import annotations

@@ -33,7 +33,8 @@ INLINE void accelerate(const segment *s, const lane *theta, const lane *omega, l
     EACH(i) a[i] = -a[i];
 }
 
-INLINE void stage(lane mass[N][N], lane by_theta[N][N], lane lu[N][N], lane hg, const lane *u, const lane *w, lane *k, lane *l)
+INLINE void stage(lane mass[N][N], lane by_theta[N][N], lane lu[N][N], lane hg, const lane *u, const lane *w,
+                  lane *k, lane *l)
 {
     EACH(i) {
         lane total = 0.0;

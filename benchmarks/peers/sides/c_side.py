@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-
 from equations import SERIES2, SERIES3
 from task import Task
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
-
 from equations import Segment, pulls
 from rodas3 import step
 from task import Task

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 import numpy as np
-
 from dynamics import bias, mass_matrix, posture
 from equations import Segment
 from rosenbrock import closed_loop

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
 from equations import Segment, pulls
 from rodas3 import step
 from task import Task

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
-
 from equations import Segment, pulls
 from task import Task
 
@@ -15,7 +14,7 @@ jax.config.update("jax_enable_x64", True)
 
 
 def closed_loop(task: Task, lanes: int, steps: int, rates: Callable) -> Callable[[int], np.ndarray]:
-    """`rates(state, theta, plus, minus)`, angles before angular rates, one rollout; `theta` is the tip angle at the tick."""
+    """`rates(state, theta, plus, minus)` of one rollout, angles before their rates; `theta`: tip angle at the tick."""
     model, n, h = Segment(*map(float, task.model)), task.segments, task.period / steps
     gains, wanted = [float(g) for g in task.gains], jnp.asarray(task.reference[:, 0])
 

@@ -1,7 +1,8 @@
 """soromox: its planar constant-strain rod, bending only; the hand is one more link, rigid.
 
-Mass is spread along the rod and the hand is a rod of twice the offset: the same masses and centres, but rotary inertia that
-the wrist's model leaves out, by quadrature (5 points a link). Springs, dampers, gravity, law and limits are the task's.
+Mass is spread along the rod and the hand is a rod of twice the offset: the same masses and centres, but rotary inertia
+that the wrist's model leaves out, by quadrature (5 points a link). Springs, dampers, gravity, law and limits are the
+task's.
 """
 
 from __future__ import annotations
@@ -14,12 +15,11 @@ jax.config.update("jax_enable_x64", True)
 
 import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
+from equations import Segment, torque  # noqa: E402
 from rosenbrock import closed_loop  # noqa: E402
 from soromox.systems.components.links import LinkSpec  # noqa: E402
 from soromox.systems.pcs.planar_pcs import PlanarPCS  # noqa: E402
 from soromox.systems.pcs.structures import PlanarPCSStructure  # noqa: E402
-
-from equations import Segment, torque  # noqa: E402
 from task import Task  # noqa: E402
 
 RADIUS = 1e-3

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-
 from task import Task
+
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
@@ -16,10 +16,11 @@ from wristctl.simulation.rollout import rollout
 
 
 def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int], np.ndarray]:
-    """Rollouts with records of nothing; the tip angle comes from one more lane, recorded in a run of its own."""
+    """One lane is recorded, as `simulate` does it; many are not, as in `tune`."""
     loop = Loop(plant_segments=task.segments, control_period=task.period, substeps=steps)
     time, nothing = np.arange(task.ticks) * task.period, np.zeros((task.ticks, 2))
     whole = Motion(time, *task.reference.T, task.reference[:, 0], nothing, task.rest, task.ticks * task.period)
+    law, wrist = controller("smc"), WristParameters()
     gains, which = np.tile(task.gains, (lanes, 1)), np.zeros(lanes, np.int64)
 
     def run(ticks: int) -> np.ndarray:
@@ -27,7 +28,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
                  ("time", "theta_ref", "rate_ref", "acceleration_ref", "theta_desired", "tip_desired")}
         motion = replace(whole, **parts, horizon=ticks * task.period)
         record = lanes == 1
-        done = rollout(controller("smc"), gains, [motion], which, loop, WristParameters(), record=record, threads=threads)
+        done = rollout(law, gains, [motion], which, loop, wrist, record=record, threads=threads)
         return done.column("theta", 0) if record else done.metrics["rmse"]
 
     run(10)
