@@ -66,11 +66,11 @@ def _plan(running: Running, lanes: int, budget: float) -> tuple[float, int, int]
     """Seconds to prepare, and the ticks and repeats that fill the budget [s]."""
     whole = round(truth.HORIZON / truth.PERIOD)
     prepare = running.ask(lanes, FEWEST_TICKS)["prepare"]
-    each = running.ask(lanes, FEWEST_TICKS)["seconds"] / FEWEST_TICKS
-    ticks = int(np.clip(budget / each, FEWEST_TICKS, whole))
-    if ticks > FEWEST_TICKS:
+    ticks, longer = 0, FEWEST_TICKS
+    while longer > 1.5 * ticks:  # what a call costs beside its ticks must not count for short runs
+        ticks = longer
         each = running.ask(lanes, ticks)["seconds"] / ticks
-        ticks = int(np.clip(budget / each, FEWEST_TICKS, whole))
+        longer = int(np.clip(budget / each, FEWEST_TICKS, whole))
     return prepare, ticks, max(1, round(budget / (each * ticks)))
 
 
