@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware clean venv
+.PHONY: run test lint bench bench-peers firmware test-firmware test-trust clean venv
 
 run: .venv/run
 	@set -e; \
@@ -39,6 +39,10 @@ test-firmware: .venv/dev firmware
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
+
+# Runs killed at 50 random moments, 10,000 runs listed.
+test-trust: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/runs/test_query.py
 
 venv: .venv/dev
 

@@ -101,7 +101,7 @@ def course_maker() -> Callable[..., Trajectory]:
     return course
 
 
-@pytest.fixture(name="results")
+@pytest.fixture(name="results", scope="session")
 def results_of_a_comparison() -> list[Result]:
     return results()
 

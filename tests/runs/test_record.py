@@ -172,7 +172,7 @@ def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
         subprocess.run([*git, *command], check=True, capture_output=True)
     ask = (
         "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.runs.code import code_state; "
-        "code, patch = code_state(); print(code.commit, code.dirty); sys.stdout.write(patch.decode())"
+        "code, patch, _ = code_state(); print(code.commit, code.dirty); sys.stdout.write(patch.decode())"
     )
 
     def state() -> list[str]:

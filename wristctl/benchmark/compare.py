@@ -162,7 +162,10 @@ def _in_order(results: Sequence[Result], chosen: CompareSettings) -> list[Result
 
 
 def series(results: Sequence[Result], every: int = 5) -> dict[str, NDArray[np.float64]]:
-    """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units."""
+    """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
+
+    segment_theta (results, T, segments) is for drawing, hence in single precision; nan beyond a plant's segments.
+    """
     courses = [result.simulation.trajectory for result in results]
     columns = {
         "theta": [c.theta for c in courses],
@@ -172,7 +175,13 @@ def series(results: Sequence[Result], every: int = 5) -> dict[str, NDArray[np.fl
         "tension_minus": [c.tension[:, 1] for c in courses],
         "time": [c.time for c in courses],
     }
-    return {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
+    most = max(c.segment_theta.shape[1] for c in courses)
+    columns["segment_theta"] = [
+        np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan)
+        for c in courses
+    ]
+    stacked = {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
+    return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
 
 
 def frame(results: Sequence[Result]) -> pd.DataFrame:

@@ -29,7 +29,7 @@ COMMANDS = {
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
     "hw": ("wristctl.cli.hw", _HARDWARE, "Find, check, flash, emulate and stop the motor board."),
-    "runs": ("wristctl.cli.runs", _RESULTS, "List and show run directories."),
+    "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""
 

@@ -27,6 +27,7 @@ from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
 from wristctl.runs import InputRun, LiveRun, Run, require, start_run
 from wristctl.runs.journal import plain
+from wristctl.runs.manifest import TABLES, Manifest
 
 __all__ = ["Input", "Session", "Table", "study_command"]
 
@@ -118,7 +119,8 @@ def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> N
         read = [InputRun(role, run) for role, run in inputs.items()]
         run = None
         try:
-            with start_run(command.kind, study, label, options.out, ["wristctl", *sys.argv[1:]], read) as run:
+            argv = ["wristctl", *sys.argv[1:]]
+            with start_run(command.kind, study, label, options.out, argv, read, _page) as run:
                 session = Session(study, command.section(study), inputs, run, console, options.quiet)
                 tables = _worked(command, session)
         except KeyboardInterrupt:
@@ -163,7 +165,18 @@ def _worked(command: _Command, session: Session) -> Sequence[Table]:
     if text:
         run.console(text)
         run.summary(f"```\n{text}\n```")
+    run.file(TABLES).write_text(json.dumps(_as_data(tables), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return tables
+
+
+def _as_data(tables: Sequence[Table]) -> Any:
+    return plain([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
+
+
+def _page(path: Path, manifest: Manifest) -> str:
+    from wristctl.report.page import page
+
+    return page(Run(path), manifest)
 
 
 def _print_plan(kind: str, study: Study, plan: str, options: Options) -> None:
@@ -188,7 +201,7 @@ def _print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
             "state": run.state,
             "result_sha256": run.result_hash,
             "metrics": run.metrics,
-            "tables": [{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables],
+            "tables": _as_data(tables),
         }
         print(json.dumps(plain(result), indent=2, allow_nan=False))
         return

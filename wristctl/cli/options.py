@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from wristctl.cli.completion import controllers, run_ids, study_files
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,11 +18,14 @@ class Options:
     """The shared options; each field's annotation is the option as typed."""
 
     files: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILE", help="Study files (YAML); later ones win.")
+        list[Path] | None,
+        typer.Argument(metavar="FILE", help="Study files (YAML); later ones win.", autocompletion=study_files),
     ] = None
     config: Annotated[
         list[Path] | None,
-        typer.Option("--config", "-c", metavar="FILE", help="Study file, after the others."),
+        typer.Option(
+            "--config", "-c", metavar="FILE", help="Study file, after the others.", autocompletion=study_files
+        ),
     ] = None
     override: Annotated[
         list[str] | None,
@@ -40,6 +45,14 @@ class Options:
     debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False
 
 
+_COMPLETED: dict[str, Callable[..., list[str]]] = {
+    "controller": controllers,
+    "data": run_ids,
+    "network": run_ids,
+    "tuned": run_ids,
+}
+
+
 def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
     """The parameters of a command: the shared ones, then its own, given as (leaf, help)."""
     shared = inspect.signature(Options, eval_str=True).parameters.values()
@@ -48,7 +61,10 @@ def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
             leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[str | None, typer.Option(f"--{leaf.replace('_', '-')}", help=text)],
+            annotation=Annotated[
+                str | None,
+                typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf)),
+            ],
         )
         for leaf, text in own
     ]

@@ -15,19 +15,21 @@ from wristctl.runs.manifest import Code
 _PACKAGE = Path(wristctl.__file__).resolve().parent
 
 
-def code_state() -> tuple[Code, bytes]:
-    """The state of the running package, and the patch onto its commit where there are uncommitted changes."""
-    sources = [name for name in files_below(_PACKAGE) if "__pycache__" not in name]
-    tree = sha256_of_list([(name, sha256_of(_PACKAGE / name)) for name in sources])
-    code = Code(version=wristctl.__version__, tree_sha256=tree)
+def code_state() -> tuple[Code, bytes, str]:
+    """The state of the running package, the patch onto its commit where there are uncommitted changes, and its files.
+
+    The files are lines of hash and path as sha256sum writes them.
+    """
+    sources = [(name, sha256_of(_PACKAGE / name)) for name in files_below(_PACKAGE) if "__pycache__" not in name]
+    listing = "".join(f"{digest}  {name}\n" for name, digest in sources)
+    code = Code(version=wristctl.__version__, tree_sha256=sha256_of_list(sources))
     commit = _git("rev-parse", "HEAD")
     if not commit or not _git("ls-files", "--", "__init__.py"):
-        return code, b""
+        return code, b"", listing
     patch = _patch()
     branch = (_git("rev-parse", "--abbrev-ref", "HEAD") or b"").decode().strip()
-    return code.model_copy(
-        update={"commit": commit.decode().strip(), "branch": branch, "dirty": bool(patch)}
-    ), patch
+    update = {"commit": commit.decode().strip(), "branch": branch, "dirty": bool(patch)}
+    return code.model_copy(update=update), patch, listing
 
 
 def _patch() -> bytes:

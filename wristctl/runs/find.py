@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
@@ -13,10 +14,14 @@ RESULTS = Path("results")
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
     """All runs of a results folder, oldest first; broken ones are among them and raise nothing."""
+    return [Run(results / name) for name in run_names(results)]
+
+
+def run_names(results: Path) -> list[str]:
+    """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
     try:
-        return [
-            Run(path) for path in sorted(results.iterdir()) if path.is_dir() and not path.name.startswith(".")
-        ]
+        with os.scandir(results) as found:
+            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith("."))
     except FileNotFoundError:
         return []
     except OSError as error:

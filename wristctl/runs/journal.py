@@ -6,6 +6,7 @@ import json
 import logging
 import math
 import threading
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,10 @@ def plain(value: Any) -> Any:
 
 
 class Journal(logging.Handler):
-    """Appends to a run's events and console log; listens to wristctl's log messages while open."""
+    """Appends to a run's events and console log; listens to wristctl's log messages while open.
+
+    A line that the disk cannot take is lost: the run's outputs are what says that the disk is full.
+    """
 
     def __init__(self, directory: Path) -> None:
         super().__init__()
@@ -41,15 +45,14 @@ class Journal(logging.Handler):
 
     def event(self, name: str, /, **fields: Any) -> None:
         """One line of events.jsonl, on its way to the disk when this returns."""
-        with self._writing:
-            self._events.write(
-                json.dumps({"time": now(), "event": name, **plain(fields)}, allow_nan=False) + "\n"
-            )
+        line = json.dumps({"time": now(), "event": name, **plain(fields)}, allow_nan=False) + "\n"
+        with self._writing, suppress(OSError, ValueError):  # ValueError: closed
+            self._events.write(line)
             self._events.flush()
 
     def console(self, text: str) -> None:
         """Lines of console.log."""
-        with self._writing:
+        with self._writing, suppress(OSError, ValueError):  # ValueError: closed
             self._console.write(text.rstrip("\n") + "\n")
             self._console.flush()
 
@@ -64,6 +67,7 @@ class Journal(logging.Handler):
     def close(self) -> None:
         """Stop listening and close the files."""
         logging.getLogger("wristctl").removeHandler(self)
-        self._events.close()
-        self._console.close()
+        for file in (self._events, self._console):
+            with suppress(OSError):
+                file.close()
         super().close()

@@ -7,14 +7,25 @@ import json
 import resource
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.runs import formats
 from wristctl.runs.files import files_below, replacing, sha256_of, sha256_of_list, sync, write_text
 from wristctl.runs.journal import Journal, now, plain
-from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Column, Error, Manifest, Outcome, Output
+from wristctl.runs.manifest import (
+    CONFIG,
+    MANIFEST,
+    METRICS,
+    REPORT,
+    SUMS,
+    Column,
+    Error,
+    Manifest,
+    Outcome,
+    Output,
+)
 from wristctl.runs.readme import readme
 
 if TYPE_CHECKING:
@@ -22,6 +33,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+Page = Callable[[Path, Manifest], str]
+"""Makes report.html of a run directory and its finished manifest."""
+
+_RESERVE, _RESERVED = ".reserve", 512 * 1024
+"""Space kept from the start, so that a run on a full disk can still say that it failed."""
 _RESULTS = ("data", "models", "figures")
 _RECORDS = {
     MANIFEST,
@@ -31,7 +47,9 @@ _RECORDS = {
     "console.log",
     "environment.txt",
     "code.patch",
+    "code.txt",
     "README.md",
+    REPORT,
 }
 
 
@@ -43,8 +61,10 @@ def stream(seed: int, name: str) -> tuple[int, int]:
 class LiveRun:
     """The writing side of a run directory, handed out by `start_run`."""
 
-    def __init__(self, path: Path, manifest: Manifest) -> None:
-        self.path, self.id = path, manifest.id
+    def __init__(self, path: Path, manifest: Manifest, page: Page | None = None) -> None:
+        self.path, self.id, self._page = path, manifest.id, page
+        with (path / _RESERVE).open("wb") as file:
+            file.write(bytes(_RESERVED))
         self._manifest = manifest
         self._metrics: dict[str, dict[str, Any]] = {}
         self._columns: dict[str, list[Column]] = {}
@@ -121,9 +141,11 @@ class LiveRun:
         self._summary.append(markdown)
 
     def end(self, state: Outcome, exit_code: int = 0, error: Error | None = None) -> Manifest:
-        """Seal the run: hashes of all outputs, README, manifest, SHA256SUMS last. Called by `start_run`."""
+        """Seal the run: hashes of all outputs, README, report, manifest, SHA256SUMS last. Called by `start_run`."""
+        reserve = self.path / _RESERVE
+        if state != "ok":
+            reserve.unlink(missing_ok=True)
         self.event("end", state=state)
-        self._journal.close()
         if self._metrics:
             write_text(self.path / METRICS, json.dumps(self._metrics, indent=2, allow_nan=False) + "\n")
         manifest = self._manifest
@@ -137,12 +159,25 @@ class LiveRun:
         manifest.timing.wall_s, manifest.timing.cpu_s = time.perf_counter() - wall, time.process_time() - cpu
         unit = 2**20 if sys.platform == "darwin" else 2**10
         manifest.timing.max_rss_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+        self._write_report(manifest)
+        self._journal.close()
         write_text(self.path / "README.md", readme(manifest, "\n\n".join(self._summary)))
         self._write_manifest()
+        reserve.unlink(missing_ok=True)
         known = {each.path: each.sha256 for each in manifest.outputs}
         sums = {name: known.get(name) or sha256_of(self.path / name) for name in files_below(self.path)}
         write_text(self.path / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sums.items()))
         return manifest
+
+    def _write_report(self, manifest: Manifest) -> None:
+        """report.html, a picture of results that stand: whatever is wrong with it must not cost the run."""
+        if self._page is None:
+            return
+        try:
+            write_text(self.path / REPORT, self._page(self.path, manifest))
+        except Exception as error:
+            self.event("warning", message=f"no report.html: {type(error).__name__}: {error}")
+            self.console(f"warning: no report.html: {type(error).__name__}: {error}")
 
     def _output(self, name: str) -> Output:
         path = self.path / name

@@ -6,7 +6,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-MANIFEST, SUMS, CONFIG, METRICS = "run.json", "SHA256SUMS", "config.yaml", "metrics.json"
+MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
+TABLES = "tables.json"
+"""What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
 Outcome = Literal["running", "ok", "failed", "interrupted"]
 

@@ -31,7 +31,8 @@ def readme(manifest: Manifest, summary: str) -> str:
         "",
         "## Repeat and check",
         "",
-        f"- again, from the folder above: `wristctl {manifest.kind} {manifest.id}/config.yaml`",
+        f"- again, with a verdict on each file: `wristctl runs replay {manifest.id}`",
+        f"- again as a new run, from the folder above: `wristctl {manifest.kind} {manifest.id}/config.yaml`",
         f"- result hash: `{manifest.result_sha256}`",
         "- unchanged since: `sha256sum -c SHA256SUMS`",
         "- code, machine, hashes: `run.json`; packages: `environment.txt`"

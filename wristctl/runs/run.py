@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _FIX = "name a run that `wristctl runs ls` shows"
 
+ADDED = "file was added after sealing"
+
 State = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
 
 
@@ -104,13 +106,21 @@ class Run:
 
     def check(self) -> None:
         """Hash every file again; UserError naming the first that is missing or not as it was sealed."""
+        for path, what in self.problems():
+            if what != ADDED:
+                raise UserError(what, str(self.path / path), f"restore it or run `wristctl {self.kind}` again")
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed."""
         try:
-            lines = (self.path / SUMS).read_text(encoding="utf-8").splitlines()
+            lines = (self.path / SUMS).read_text(encoding="utf-8", errors="replace").splitlines()
         except OSError as error:
             raise UserError("run is not sealed", str(self.path), "use a run that has ended") from error
-        for line in lines:
-            digest, _, name = line.partition("  ")
-            path = self.path / name
-            if not path.is_file() or sha256_of(path) != digest:
-                what = "hash does not match what was sealed" if path.is_file() else "sealed file is missing"
-                raise UserError(what, str(path), f"restore it or run `wristctl {self.kind}` again")
+        sealed = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+        found = [(name, "sealed file is missing") for name in sealed if not (self.path / name).is_file()]
+        for name in files_below(self.path):
+            if name != SUMS and name not in sealed:
+                found.append((name, ADDED))
+            elif name != SUMS and sha256_of(self.path / name) != sealed[name]:
+                found.append((name, "hash does not match what was sealed"))
+        return sorted(found)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import re
+import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,9 +22,9 @@ from wristctl.runs.environment import environment_state
 from wristctl.runs.files import replacing, sha256_of, write_text
 from wristctl.runs.interrupt import sigterm_as_interrupt, undisturbed
 from wristctl.runs.journal import now
-from wristctl.runs.live import LiveRun
+from wristctl.runs.live import LiveRun, Page
 from wristctl.runs.lock import RunLock
-from wristctl.runs.manifest import CONFIG, Error, Input, Manifest, Timing
+from wristctl.runs.manifest import CONFIG, Code, Environment, Error, Input, Manifest, Timing
 from wristctl.runs.run import Run
 
 
@@ -42,27 +44,35 @@ def start_run(
     out: Path = Path("results"),
     argv: Sequence[str] = (),
     inputs: Sequence[InputRun] = (),
+    page: Page | None = None,
 ) -> Iterator[LiveRun]:
     """A new run directory under `out`, locked while the block runs and sealed at its end.
 
     The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
-    exception, which is raised again. What was written is kept. Raises UserError where the directory cannot be
-    created.
+    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Raises
+    UserError where the directory cannot be created or the disk is full.
     """
     digest = config_hash(study, kind)
     path = _new_directory(out, kind, label, digest)
     lock = RunLock(path)
     try:
         with sigterm_as_interrupt():
-            run = _begin(path, kind, study, label, argv, inputs, digest)
+            try:
+                run = _begin(path, kind, study, label, argv, inputs, digest, page)
+            except BaseException as error:
+                shutil.rmtree(path)  # no manifest yet: nothing that could be read
+                raise _of_the_disk(error, path) from error
             try:
                 yield run
-            except BaseException as error:
                 with undisturbed():
-                    _end_badly(run, error)
+                    run.end("ok")
+            except BaseException as error:
+                told = _of_the_disk(error, path)
+                with undisturbed():
+                    _end_badly(run, told)
+                if told is not error:
+                    raise told from error
                 raise
-            with undisturbed():
-                run.end("ok")
     finally:
         lock.release()
 
@@ -101,11 +111,13 @@ def _begin(
     argv: Sequence[str],
     inputs: Sequence[InputRun],
     digest: str,
+    page: Page | None,
 ) -> LiveRun:
-    code, patch = code_state()
+    code, patch, sources = code_state()
     environment, packages = environment_state()
     write_text(path / CONFIG, resolved_yaml(study, kind))
     write_text(path / "environment.txt", packages)
+    write_text(path / "code.txt", sources)
     if patch:
         with replacing(path / "code.patch") as temporary:
             temporary.write_bytes(patch)
@@ -120,14 +132,6 @@ def _begin(
         )
         for each in inputs
     ]
-    numeric = (
-        environment.python,
-        environment.machine,
-        environment.cpu,
-        environment.threads,
-        environment.packages,
-    )
-    decisive = (digest, code.tree_sha256, sorted((each.role, each.result_sha256) for each in read), numeric)
     return LiveRun(
         path,
         Manifest(
@@ -141,9 +145,25 @@ def _begin(
             environment=environment,
             inputs=read,
             timing=Timing(started=now()),
-            fingerprint=hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest(),
+            fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in read}),
         ),
+        page,
     )
+
+
+def fingerprint(config: str, code: Code, environment: Environment, inputs: Mapping[str, str]) -> str:
+    """One hash over what decides a result: configuration, code, inputs by their results, machine and packages."""
+    machine = (environment.python, environment.machine, environment.cpu, environment.threads, environment.packages)
+    decisive = (config, code.tree_sha256, sorted(inputs.items()), machine)
+    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
+
+
+def _of_the_disk(error: BaseException, path: Path) -> BaseException:
+    """The user's error behind a full or read-only disk, wherever it was met; any other error as it is."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
+        fix = "free space or choose another --out"
+        return UserError(f"cannot write: {error.strerror}", str(error.filename or path), fix)
+    return error
 
 
 def _end_badly(run: LiveRun, error: BaseException) -> None:

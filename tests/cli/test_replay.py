@@ -1,0 +1,133 @@
+"""A run repeated is the same to the byte, or the verdict says where it differs and why."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.study import Study
+from wristctl.runs import InputRun, Run, start_run
+from wristctl.runs.replay import causes, verdicts
+
+ROOT = Path(__file__).parents[2]
+Command = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture(scope="module")
+def code(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package, to be changed."""
+    folder = tmp_path_factory.mktemp("code")
+    shutil.copytree(ROOT / "wristctl", folder / "wristctl", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wristctl(code: Path, tmp_path_factory: pytest.TempPathFactory) -> Command:
+    """Runs `wristctl ...` from the copy in a folder of its own: exit code, stdout."""
+    folder = tmp_path_factory.mktemp("work")
+
+    def run(*arguments: str, before: Path | None = None) -> tuple[int, str]:
+        paths = [str(path) for path in (before, code) if path]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "TMPDIR": str(folder)}
+        command = [sys.executable, "-P", "-m", "wristctl", *arguments]
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+        assert "Traceback" not in done.stderr, done.stderr
+        return done.returncode, done.stdout
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def data(wristctl: Command) -> str:
+    """The id of a gen-data run made by the copy."""
+    status, out = wristctl("gen-data", "--samples", "10", "--set", "sampling=uniform")
+    assert status == 0
+    return Path(out.splitlines()[-1]).name
+
+
+def _verdict(wristctl: Command, *arguments: str, before: Path | None = None) -> tuple[int, dict[str, Any]]:
+    status, out = wristctl("runs", "replay", *arguments, "--json", before=before)
+    return status, json.loads(out)
+
+
+def test_a_repetition_is_identical_to_the_byte(wristctl: Command, data: str) -> None:
+    status, found = _verdict(wristctl, data)
+    assert status == 0 and found["same"] and found["causes"] == [] and found["scratch"] is None
+    each = {file["path"]: file["verdict"] for file in found["files"]}
+    assert each.pop("tables.json") == "volatile"
+    assert set(each.values()) == {"identical"} and {"data/samples.npz", "figures/coverage.svg"} <= set(each)
+
+
+def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
+    status, found = _verdict(wristctl, data, "--set", "samples=11")
+    assert status == 3 and found["causes"] == ["config: gen-data.samples: 10 -> 11"]
+    samples = next(file for file in found["files"] if file["path"] == "data/samples.csv")
+    assert samples["verdict"] == "differs" and samples["detail"].startswith("10 rows")
+    assert Path(found["scratch"]).is_dir()
+
+
+def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Path, data: str) -> None:
+    file = code / "wristctl" / "cli" / "gen_data.py"
+    text = file.read_text()
+    file.write_text(text.replace("count = len(samples.theta)", "count = len(samples.theta) + 1"))
+    status, found = _verdict(wristctl, data)
+    file.write_text(text)
+    assert status == 3 and all(cause.startswith("code: ") for cause in found["causes"])
+    assert any(cause.startswith("code: cli/gen_data.py: ") for cause in found["causes"])
+    differing = {each["path"]: each["detail"] for each in found["files"] if each["verdict"] == "differs"}
+    assert differing["metrics.json"].endswith("10 before, 11 now") and "data/samples.csv" not in differing
+
+
+def test_a_changed_package_is_named_with_its_version(wristctl: Command, data: str, tmp_path: Path) -> None:
+    (tmp_path / "numpy-9.9.9.dist-info").mkdir()
+    (tmp_path / "numpy-9.9.9.dist-info" / "METADATA").write_text("Name: numpy\nVersion: 9.9.9\n")
+    (tmp_path / "sitecustomize.py").write_text(
+        "import numpy.random as r; first = r.default_rng; r.default_rng = lambda seed: first([*seed, 9])"
+    )
+    status, found = _verdict(wristctl, data, before=tmp_path)
+    assert status == 3 and found["causes"] == [f"environment: numpy: {np.__version__} -> 9.9.9"]
+
+
+def test_a_changed_input_is_named_by_its_file_and_nothing_is_run(wristctl: Command, data: str) -> None:
+    results = Path(wristctl("runs", "show", data)[1].splitlines()[-1]).parent
+    with start_run("train", Study(), "", results, inputs=[InputRun("data", Run(results / data))]) as live:
+        live.metric("rmse", 1.0)
+    file = results / data / "data" / "samples.npz"
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+    status, found = _verdict(wristctl, live.id)
+    file.write_bytes(whole)
+    assert status == 3 and found["files"] == []
+    assert found["causes"] == [f"input: data: hash does not match what was sealed ({file})"]
+
+
+def test_without_another_cause_a_difference_is_nondeterminism(tmp_path: Path) -> None:
+    runs = []
+    for value in (1.0, 2.0):
+        with start_run("train", Study(), "", tmp_path) as live:
+            live.metric("rmse", value)
+            if value == 1.0:
+                live.file("data/first.txt").write_text("only then")
+        runs.append(Run(live.path))
+    assert causes(*runs) == ["nondeterminism: configuration, code, inputs and environment are the same"]
+    assert [each[:2] for each in verdicts(*runs)] == [("data/first.txt", "missing"), ("metrics.json", "differs")]
+
+
+def test_another_result_of_an_input_is_a_cause(tmp_path: Path) -> None:
+    runs = []
+    for value in (1.0, 2.0):
+        with start_run("gen-data", Study(), "", tmp_path) as data:
+            data.metric("rmse", value)
+        with start_run("train", Study(), "", tmp_path, inputs=[InputRun("data", Run(data.path))]) as live:
+            live.metric("rmse", value)
+        runs.append(Run(live.path))
+    assert causes(*runs) == ["input: data"]

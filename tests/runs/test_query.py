@@ -1,0 +1,99 @@
+"""Runs are found by what they are, and quickly."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.runs import Run, start_run
+from wristctl.runs.query import INDEX, entries, in_order, select
+from wristctl.runs.tags import change_tags
+
+Make = Callable[..., Run]
+COUNT = 10_000 if os.environ.get("WRISTCTL_THOROUGH") else 1_000
+
+
+def _labels(found: list) -> list[str]:
+    return [each.label for each in found]
+
+
+def test_filters_and_order_choose_what_they_say(make: Make, results: Path) -> None:
+    make("train", 3e-3, "a")
+    make("train", 5e-4, "b")
+    make("tune", 1e-5, "c")
+    with pytest.raises(RuntimeError), start_run("tune", Study(), "failed", results):
+        raise RuntimeError("by hand")
+    found = entries(results)
+    assert _labels(select(found, kind="train")) == ["a", "b"]
+    assert _labels(select(found, label="f*")) == _labels(select(found, state="failed")) == ["failed"]
+    assert _labels(select(found, where=["rmse<1e-3"])) == ["b", "c"]
+    assert _labels(select(found, where=["rmse < 1e-3", "rmse>=5e-4"])) == ["b"]
+    assert _labels(in_order(found, "rmse")) == ["c", "b", "a", "failed"]
+    assert len(select(found, newer="1h")) == 4 and len(select(found, older="1h")) == 0
+
+
+@pytest.mark.parametrize(
+    ("condition", "said"),
+    [("rmse", "not a condition"), ("rmse<small", "not a condition"), ("rmes<1", "did you mean 'rmse'")],
+)
+def test_a_condition_that_cannot_be_meant_is_an_error(make: Make, results: Path, condition: str, said: str) -> None:
+    make()
+    with pytest.raises(UserError, match=said):
+        select(entries(results), where=[condition])
+    with pytest.raises(UserError, match="not an age"):
+        select(entries(results), newer="yesterday")
+
+
+def test_the_index_changes_no_answer_and_may_be_lost_or_damaged(make: Make, results: Path) -> None:
+    make(label="a")
+    first = entries(results)
+    assert (results / INDEX).is_file()
+    for content in (None, b"", b"{", b'{"schema": "other"}', b"[]"):
+        (results / INDEX).unlink() if content is None else (results / INDEX).write_bytes(content)
+        assert entries(results) == first
+    (results / INDEX).unlink()
+    (results / INDEX).mkdir()
+    assert entries(results) == first
+
+
+def test_a_run_that_is_damaged_after_it_was_indexed_is_seen_as_damaged(make: Make, results: Path) -> None:
+    run, torn = make(label="a"), make(label="b")
+    entries(results)
+    (run.path / "SHA256SUMS").unlink()
+    (torn.path / "run.json").write_text("{")
+    assert [each.state for each in entries(results)] == ["crashed", "broken"]
+
+
+def test_many_runs_list_in_the_time_a_person_waits(make: Make, results: Path) -> None:
+    run = make()
+    texts = {name: run.file(name).read_text() for name in ("run.json", "SHA256SUMS", "metrics.json")}
+    for number in range(1, COUNT):
+        path = results / f"20260101T000000Z-gen-data-{number:06d}"
+        path.mkdir()
+        for name, text in texts.items():
+            (path / name).write_text(text)
+    took = []
+    for _ in range(2):
+        began = time.perf_counter()
+        assert len(entries(results)) == COUNT
+        took.append(time.perf_counter() - began)
+    print(f"{COUNT} runs: {took[0]:.2f} s without the index, {took[1]:.2f} s with it")
+    assert took[0] < 20.0 * COUNT / 10_000 and took[1] < 2.0 * COUNT / 10_000
+
+
+def test_tags_stand_beside_the_sealed_run(make: Make, results: Path) -> None:
+    run = make()
+    assert change_tags(results, run.id, ["paper", "best"]) == ["best", "paper"]
+    assert change_tags(results, run.id, remove=["best"]) == ["paper"]
+    assert [each.tags for each in select(entries(results), tag="paper")] == [["paper"]]
+    assert run.problems() == []
+    assert json.loads((results / "tags.json").read_text()) == {run.id: ["paper"]}
+    with pytest.raises(UserError, match="a tag holds"):
+        change_tags(results, run.id, ["two words"])

@@ -1,0 +1,24 @@
+"""The options and arguments that the `runs` commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wristctl.cli.completion import run_ids
+
+RESULTS = Path("results")
+
+Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
+Ref = Annotated[
+    str,
+    typer.Argument(metavar="RUN", help="Path, id, beginning of an id, or latest:KIND.", autocompletion=run_ids),
+]
+Refs = Annotated[
+    list[str],
+    typer.Argument(metavar="RUN...", help="Paths, ids, beginnings of ids, or latest:KIND.", autocompletion=run_ids),
+]

@@ -1,0 +1,85 @@
+"""`wristctl runs replay`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wristctl.cli.runs.options import RESULTS, Debug, Json, Out, Ref
+from wristctl.cli.tables import Table
+from wristctl.config.errors import UserError
+from wristctl.runs import Run, list_runs, open_run
+from wristctl.runs.lineage import input_run
+from wristctl.runs.manifest import CONFIG
+from wristctl.runs.replay import Verdict, causes, changed_inputs, verdicts
+
+_SAME = ("identical", "within tolerance", "volatile")
+
+
+def replay(
+    ref: Ref,
+    out: Out = RESULTS,
+    override: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Repeat it with another setting.")
+    ] = None,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run a run again in a scratch folder, and say of each file whether it came out the same (exit code 3 if not).
+
+    The scratch folder is kept where something differs.
+    """
+    run = open_run(ref, out)
+    if run.state != "ok":
+        raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
+    blocked = changed_inputs(run)
+    if any("gone" in cause or "hash" in cause or "missing" in cause for cause in blocked):
+        return _conclude(run, None, [], blocked, as_json)
+    scratch = Path(tempfile.mkdtemp(prefix="wristctl-replay-"))
+    code = _again(run, scratch, override or [])
+    ended = list_runs(scratch)
+    if code or not ended:
+        why = causes(run, ended[0]) if ended else []
+        said = f"the repetition ended with exit code {code} ({scratch})"
+        return _conclude(run, scratch, [], [said, *blocked, *why], as_json)
+    found = verdicts(run, ended[0])
+    alike = all(each.verdict in _SAME for each in found)
+    _conclude(run, scratch, found, [] if alike else [*blocked, *causes(run, ended[0])], as_json)
+
+
+def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
+    """The same command on the same configuration and inputs, in a process of its own; its messages pass through."""
+    inputs = {each.role: input_run(run, each).path for each in run.manifest.inputs}
+    named = [f"{run.kind}.{role}={json.dumps(str(path))}" for role, path in inputs.items()]
+    options = [part for text in [*named, *overrides] for part in ("--set", text)]
+    command = [sys.executable, "-P", "-m", "wristctl", run.kind, str(run.path / CONFIG), "--out", str(scratch)]
+    return subprocess.run([*command, *options, "--label", "replay"], stdout=subprocess.DEVNULL).returncode
+
+
+def _conclude(run: Run, scratch: Path | None, found: list[Verdict], why: list[str], as_json: bool) -> None:
+    """Print the verdicts; where there is a cause to name, fail and keep the scratch folder."""
+    if as_json:
+        files = [each._asdict() for each in found]
+        kept = str(scratch) if why and scratch else None
+        shown: dict[str, Any] = {"schema": "wristctl.replay/1", "run": run.id, "same": not why, "causes": why}
+        print(json.dumps({**shown, "files": files, "scratch": kept}, indent=2))
+    else:
+        if found:
+            print(Table("", ("file", "verdict", "where"), found).text(), end="\n\n")
+        for cause in why:
+            print(f"cause: {cause}")
+    if why:
+        kept = f"the repetition is in {scratch}" if scratch else "mend the input, or run its command again"
+        raise UserError("the repetition differs" if found else "the run was not repeated", run.id, kept, exit_code=3)
+    if scratch:
+        shutil.rmtree(scratch)
+    if not as_json:
+        exact = all(each.verdict in ("identical", "volatile") for each in found)
+        print(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

@@ -1,0 +1,30 @@
+"""`wristctl runs report`."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wristctl.cli.runs.options import RESULTS, Debug, Out, Refs
+from wristctl.runs import open_run
+from wristctl.runs.files import write_text
+
+
+def report(
+    refs: Refs,
+    out: Out = RESULTS,
+    to: Annotated[Path | None, typer.Option("--to", help="The file to write; by default beside the runs.")] = None,
+    debug: Debug = False,
+) -> None:
+    """Write a page about one run, or about several beside each other: one HTML file that needs no network."""
+    from wristctl.report.page import page
+    from wristctl.report.several import several_page
+
+    runs = [open_run(ref, out) for ref in refs]
+    name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
+    file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
+    write_text(file, page(runs[0], runs[0].manifest) if len(runs) == 1 else several_page(runs))
+    print(file)

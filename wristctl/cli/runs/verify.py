@@ -1,0 +1,49 @@
+"""`wristctl runs verify`."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from wristctl.cli.completion import run_ids
+from wristctl.cli.runs.options import RESULTS, Debug, Json, Out
+from wristctl.config.errors import UserError
+from wristctl.runs import Run, list_runs, open_run
+
+
+def verify(
+    refs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[RUN...]", help="Runs to check; all where none is named.", autocompletion=run_ids),
+    ] = None,
+    out: Out = RESULTS,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Hash every file of runs again and name each that is not as it was sealed (exit code 3)."""
+    runs = [open_run(ref, out) for ref in refs] if refs else list_runs(out)
+    found = {run.id: _problems(run) for run in runs}
+    if as_json:
+        shown = {name: [{"file": file, "problem": what} for file, what in each] for name, each in found.items()}
+        print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
+    else:
+        for name, problems in found.items():
+            print(f"{name}  {'changed' if problems else 'as sealed'}")
+            for file, what in problems:
+                print(f"  {file}: {what}")
+    changed = sum(bool(problems) for problems in found.values())
+    if changed:
+        fix = "restore the files named, or run the command again"
+        raise UserError(f"{changed} of {len(found)} runs are not as they were sealed", str(out), fix, exit_code=3)
+
+
+def _problems(run: Run) -> list[tuple[str, str]]:
+    """What is wrong with a run; one that is still running has nothing to be checked."""
+    if run.state == "running":
+        return []
+    try:
+        return run.problems()
+    except UserError:
+        return [("SHA256SUMS", f"missing: the run is {run.state}")]

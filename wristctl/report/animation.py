@@ -1,0 +1,93 @@
+"""What the page's animation plays: the wrist's segment angles over time, as logged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from wristctl.config.wrist import WristParameters
+from wristctl.runs.run import Run
+
+if TYPE_CHECKING:
+    import numpy as np
+
+FRAMES = 25.0
+"""Pictures a second; the page interpolates between them."""
+_PLACES = 1e4
+"""Angles are whole numbers of 0.1 mrad: an eighth of a pixel at the tip."""
+
+
+def animation(run: Run) -> dict[str, Any] | None:
+    """Wrist, time step and one course per closed loop of the run, grouped by what it had to follow; None without any.
+
+    A course holds its group, its name, its colour, and per picture the angle of each segment [0.1 mrad] and the wanted
+    angle; pictures end where it diverged.
+    """
+    if (run.path / "data/trajectories.npz").is_file():
+        courses, time = _compared(run)
+    elif (run.path / "data/trajectory.csv").is_file():
+        courses, time = _single(run)
+    else:
+        return None
+    step = max(1, round(1.0 / FRAMES / float(time[1] - time[0])))
+    wrist = run.config.wrist
+    return {
+        "wrist": _wrist(wrist),
+        "step": float(time[step] - time[0]),
+        "duration": float(time[-1] - time[0]),
+        "courses": [_course(*course, step) for course in courses],
+    }
+
+
+def _wrist(wrist: WristParameters) -> dict[str, float]:
+    return {
+        "length": wrist.length,
+        "discs": wrist.discs,
+        "offset": wrist.tendon_offset,
+        "radius": wrist.tendon_radius,
+        "hand": wrist.hand_offset,
+    }
+
+
+Named = tuple[str, str, str, Any, Any]
+
+
+def _compared(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+    table, series = run.data("comparison"), run.array("trajectories")
+    bent = series.get("segment_theta", series["theta"][..., None])
+    many = table["inverse"].nunique() > 1
+    names = [
+        (
+            f"{row.loop}, {row.reference}" + (f", {row.inverse} inverse" if many else ""),
+            f"{row.controller}/{row.gains}",
+            str(row.controller),
+        )
+        for row in table.itertuples()
+    ]
+    return [(*n, bent[k], series["theta_desired"][k]) for k, n in enumerate(names)], series["time"][0]
+
+
+def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+    table, settings = run.data("trajectory"), getattr(run.config, run.kind.replace("-", "_"))
+    own = [name for name in table.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
+    gains = settings.gains if isinstance(settings.gains, str) else "own gains"
+    name = ("", f"{settings.controller}/{gains}", settings.controller)
+    return [(*name, table[own].to_numpy(), table["theta_desired"].to_numpy())], table["time"].to_numpy()
+
+
+def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np.ndarray, step: int) -> dict[str, Any]:
+    import numpy as np
+
+    from wristctl.report.style import colour
+
+    shown = bent[::step, ~np.isnan(bent[0])]
+    whole = np.isfinite(shown).all(axis=1) & (np.abs(shown.sum(axis=1)) < np.pi)
+    shown = shown[: len(shown) if whole.all() else int(np.argmin(whole))]
+    return {
+        "group": group,
+        "name": name,
+        "colour": colour(controller),
+        "diverged": not whole.all(),
+        "theta": np.round(_PLACES * shown).astype(int).tolist(),
+        "wanted": np.round(_PLACES * wanted[::step]).astype(int).tolist(),
+    }

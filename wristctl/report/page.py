@@ -1,0 +1,116 @@
+"""report.html: one run on one page that needs nothing but a browser."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wristctl import __version__
+from wristctl.report.animation import animation
+from wristctl.report.inline_svg import inline_figure
+from wristctl.report.lineage_picture import lineage_picture
+from wristctl.runs.lineage import ancestry
+from wristctl.runs.manifest import CONFIG, TABLES, Manifest
+from wristctl.runs.run import Run
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_CARDS, _FEW = 6, 12
+"""Headline numbers shown, and how many metrics a run may have for the first ones to be the headline."""
+
+Figures = list[tuple[str, str]]
+
+
+def page(run: Run, manifest: Manifest) -> str:
+    """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed."""
+    return render(
+        "run.html",
+        heading=run.id,
+        manifest=manifest,
+        headline=_headline(run.metrics),
+        metrics=_metrics(run),
+        tables=_tables(run),
+        figures=figures(run),
+        animation=animation(run),
+        lineage=lineage_picture(ancestry(run, state=manifest.state)),
+        provenance=_provenance(manifest),
+        files=[(each.path, each.bytes, each.sha256, not each.volatile) for each in manifest.outputs],
+        config=(run.path / CONFIG).read_text(encoding="utf-8"),
+    )
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from one of the templates; everything is escaped but what they mark as markup."""
+    return _templates().get_template(template).render(version=__version__, **content)
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, FileSystemLoader
+
+    folder = Path(__file__).parent / "templates"
+    made = Environment(loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    made.filters["cell"] = _cell
+    return made
+
+
+def figures(run: Run, prefix: str = "") -> Figures:
+    """Name and markup of each figure of a run, in alphabetical order."""
+    files = sorted((run.path / "figures").glob("*.svg"))
+    return [(file.stem.replace("-", " "), inline_figure(file, f"{prefix}f{k}-")) for k, file in enumerate(files)]
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}" if math.isfinite(value) else "-"
+    return str(value)
+
+
+def _headline(metrics: dict[str, dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
+    """The first metrics, or of many the best ones of the first one's direction and unit."""
+    known = [(name, each) for name, each in metrics.items() if each["value"] is not None]
+    if len(known) > _FEW:
+        first = known[0][1]
+        alike = [pair for pair in known if (pair[1]["unit"], pair[1]["better"]) == (first["unit"], first["better"])]
+        if first["better"]:
+            known = sorted(alike, key=lambda pair: pair[1]["value"], reverse=first["better"] == "higher")
+    return known[:_CARDS]
+
+
+def _metrics(run: Run) -> list[tuple[Any, ...]]:
+    kept = ("value", "unit", "better", "n", "meaning")
+    return [(name, *(each.get(key) for key in kept)) for name, each in run.metrics.items()]
+
+
+def _tables(run: Run) -> list[dict[str, Any]]:
+    file = run.path / TABLES
+    found: list[dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else []
+    return found
+
+
+def _provenance(manifest: Manifest) -> list[tuple[str, str]]:
+    code, machine = manifest.code, manifest.environment
+    commit = f", commit {code.commit[:12]}{' with uncommitted changes' if code.dirty else ''}" if code.commit else ""
+    packages = ", ".join(f"{name} {version}" for name, version in machine.packages.items())
+    return [
+        ("command", shlex.join(manifest.argv)),
+        ("code", f"wristctl {code.version}{commit}, tree {code.tree_sha256[:12]}"),
+        *((f"input {each.role}", f"{each.run}, result {each.result_sha256[:12]}") for each in manifest.inputs),
+        ("configuration", manifest.config_sha256),
+        ("fingerprint", manifest.fingerprint),
+        ("result", manifest.result_sha256 or ""),
+        ("machine", f"{machine.cpu}, {machine.cores} cores, {machine.os}"),
+        ("python", machine.python),
+        ("packages", packages),
+        ("numerics", ", ".join(f"{name} {value}" for name, value in manifest.numerics.items()) or "-"),
+        ("memory, processor time", f"{manifest.timing.max_rss_mb or 0:.0f} MB, {manifest.timing.cpu_s or 0:.1f} s"),
+    ]

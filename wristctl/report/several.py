@@ -1,0 +1,59 @@
+"""Several runs on one page: only what differs, and the figures of one name together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.report.page import figures, render
+from wristctl.runs.difference import difference
+from wristctl.runs.run import Run
+
+_TITLES = {
+    "config": "Configuration",
+    "metrics": "Metrics",
+    "code": "Code",
+    "environment": "Environment",
+    "inputs": "Inputs",
+}
+
+
+def several_page(runs: list[Run]) -> str:
+    """The page of several runs, each of them against the first."""
+    rows = [
+        (run.id, run.kind, run.state, run.manifest.timing.started[:19], run.manifest.timing.wall_s) for run in runs
+    ]
+    return render(
+        "several.html",
+        heading=" | ".join(run.manifest.label or run.id for run in runs),
+        runs=runs,
+        rows=rows,
+        differences=_differences(runs),
+        pictures=_pictures(runs),
+    )
+
+
+def _differences(runs: list[Run]) -> list[dict[str, Any]]:
+    """A table for each part that differs: a row per leaf or metric, a column per run."""
+    first, *others = runs
+    found = [vars(difference(first, other)) for other in others]
+    tables = []
+    for part, title in _TITLES.items():
+        names = list(dict.fromkeys(change.name for each in found for change in each[part]))
+        rows = []
+        for name in names:
+            changes = [next((change for change in each[part] if change.name == name), None) for each in found]
+            before = next(change.before for change in changes if change)
+            values = [before, *(change.after if change else before for change in changes)]
+            rows.append((name, *(value if part == "metrics" else str(value) for value in values)))
+        if rows:
+            tables.append({"title": title, "columns": ["what", *(run.id for run in runs)], "rows": rows})
+    return tables
+
+
+def _pictures(runs: list[Run]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The figures by name, each with one picture per run that has it."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for number, run in enumerate(runs):
+        for name, markup in figures(run, f"r{number}"):
+            found.setdefault(name, []).append((run.id, markup))
+    return list(found.items())

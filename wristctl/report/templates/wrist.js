@@ -1,0 +1,122 @@
+"use strict";
+// Plays the wrist's bending from the logged segment angles; x along the base goes up, +y to the right, lengths in mm.
+{
+  const { wrist, step, duration, courses } = JSON.parse(document.getElementById("courses").textContent);
+  const UNIT = 1e-4, SPACE = "http://www.w3.org/2000/svg", GREY = "#7F7F7F", PLOT = 34;
+  const length = 1e3 * wrist.length, rim = 1250 * wrist.radius, reach = length + 2e3 * wrist.hand, half = 0.72 * reach;
+  const play = document.getElementById("play"), slider = document.getElementById("instant");
+  const clock = document.getElementById("clock"), speed = document.getElementById("speed");
+  const groups = document.getElementById("group"), place = document.getElementById("wrists");
+  let panels = [], instant = 0, last = null;
+
+  const element = (name, attributes) => {
+    const made = document.createElementNS(SPACE, name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    return made;
+  };
+
+  // Points, with their directions, at equal arc lengths of a chain of arcs.
+  function frames(theta, pieces) {
+    const found = [], fine = 8;
+    let x = 0, y = 0, heading = 0;
+    for (let k = 0; k <= pieces; k++) {
+      found.push([x, y, heading]);
+      for (let j = 0; j < fine; j++) {
+        const along = (k + j / fine) / pieces * theta.length;
+        const bend = theta[Math.min(theta.length - 1, Math.floor(along + 1e-9))] * theta.length / (pieces * fine);
+        x += length / (pieces * fine) * Math.cos(heading + bend / 2);
+        y += length / (pieces * fine) * Math.sin(heading + bend / 2);
+        heading += bend;
+      }
+    }
+    return found;
+  }
+  const spot = ([x, y, heading], across, along = 0) =>
+    `${(y + across * Math.cos(heading) + along * Math.sin(heading)).toFixed(2)} ${(-x + across * Math.sin(heading) - along * Math.cos(heading)).toFixed(2)}`;
+  const line = points => "M" + points.join("L");
+
+  // The angles at a time, between the two pictures beside it; where a course has ended, its last.
+  function at(pictures, time) {
+    const place = Math.min(time / step, pictures.length - 1), low = Math.floor(place), share = place - low;
+    const high = Math.min(low + 1, pictures.length - 1);
+    const mix = (a, b) => UNIT * (a + share * (b - a));
+    return Array.isArray(pictures[0]) ? pictures[low].map((a, k) => mix(a, pictures[high][k])) : mix(pictures[low], pictures[high]);
+  }
+
+  function panel(course) {
+    const box = document.createElement("div"), title = document.createElement("p"), said = document.createElement("p");
+    box.dataset.course = course.name;
+    title.textContent = course.name;
+    const height = reach + 20 + PLOT + 8, svg = element("svg", { viewBox: `${-half} ${-reach - 6} ${2 * half} ${height}`, role: "img", "aria-label": course.name });
+    const part = style => svg.appendChild(element("path", { fill: "none", "stroke-linejoin": "round", ...style }));
+    const shapes = {
+      hand: part({ stroke: course.colour, "stroke-width": 1.5 * rim, "stroke-opacity": 0.18, "stroke-linecap": "round" }),
+      wanted: part({ stroke: GREY, "stroke-width": 1.5, "stroke-dasharray": "4 3" }),
+      tendons: part({ stroke: GREY, "stroke-width": 1 }),
+      backbone: part({ stroke: course.colour, "stroke-width": 2.5 }),
+      discs: part({ stroke: "#000", "stroke-width": 3.5, "stroke-linecap": "round" }),
+    };
+    const sums = course.theta.map(angles => angles.reduce((a, b) => a + b, 0));
+    const all = [...course.wanted, ...course.wanted.map(angle => 1.5 * angle), 0];
+    const low = Math.min(...all), high = Math.max(...all, low + 1);
+    const across = k => -half + 4 + (2 * half - 8) * k * step / duration;
+    const up = angle => 16 + PLOT * (1 - (Math.max(low, Math.min(high, angle)) - low) / (high - low));
+    const curve = angles => line(angles.map((angle, k) => `${across(k).toFixed(1)} ${up(angle).toFixed(1)}`));
+    part({ stroke: GREY, "stroke-dasharray": "4 3", "stroke-width": 1, d: curve(course.wanted) });
+    part({ stroke: course.colour, "stroke-width": 1.5, d: curve(sums.length ? sums : [0]) });
+    const cursor = part({ stroke: "#000", "stroke-width": 0.8 });
+    const drawn = document.createElement("div");
+    drawn.className = "drawn";
+    drawn.append(svg);
+    box.append(title, drawn, said);
+    place.append(box);
+
+    return time => {
+      const ended = course.diverged && time > (course.theta.length - 1) * step;
+      const theta = course.theta.length ? at(course.theta, time) : [0], wanted = at(course.wanted, time);
+      const bent = frames(theta, 4 * (wrist.discs - 1)), plates = bent.filter((_, k) => k % 4 === 0), tip = bent.at(-1);
+      shapes.backbone.setAttribute("d", line(bent.map(frame => spot(frame, 0))));
+      shapes.discs.setAttribute("d", plates.map(frame => line([spot(frame, -rim), spot(frame, rim)])).join(""));
+      shapes.tendons.setAttribute("d", [-1, 1].map(side => line(plates.map(frame => spot(frame, side * 1e3 * wrist.offset)))).join(""));
+      shapes.hand.setAttribute("d", line([spot(tip, 0, 0.8 * rim), spot(tip, 0, Math.max(0.8 * rim, 2e3 * wrist.hand - 0.8 * rim))]));
+      const goal = frames([wanted], 16);
+      shapes.wanted.setAttribute("d", line([...goal.map(frame => spot(frame, 0)), spot(goal.at(-1), 0, 2e3 * wrist.hand)]));
+      cursor.setAttribute("d", `M${across(time / step)} 14V${20 + PLOT}`);
+      const degrees = theta.reduce((a, b) => a + b, 0) * 180 / Math.PI;
+      said.textContent = ended ? "diverged" : `${degrees.toFixed(1)}°, wanted ${(wanted * 180 / Math.PI).toFixed(1)}°`;
+    };
+  }
+
+  function show() {
+    for (const draw of panels) draw(instant);
+    slider.value = 1000 * instant / duration;
+    clock.textContent = `${instant.toFixed(2)} s`;
+  }
+  function tick(now) {
+    if (last === null) return;
+    instant += (now - last) / 1e3 * Number(speed.value);
+    last = now;
+    if (instant >= duration) { instant = duration; stop(); }
+    show();
+    requestAnimationFrame(tick);
+  }
+  function stop() { last = null; play.textContent = "Play"; }
+  play.addEventListener("click", () => {
+    if (last !== null) return stop();
+    if (instant >= duration) instant = 0;
+    play.textContent = "Pause";
+    last = performance.now();
+    requestAnimationFrame(tick);
+  });
+  slider.addEventListener("input", () => { instant = duration * slider.value / 1000; show(); });
+  groups.addEventListener("change", fill);
+
+  function fill() {
+    place.replaceChildren();
+    panels = courses.filter(course => course.group === groups.value).map(panel);
+    show();
+  }
+  for (const name of new Set(courses.map(course => course.group))) groups.append(new Option(name, name));
+  groups.hidden = groups.options.length < 2;
+  fill();
+}

@@ -1,0 +1,98 @@
+"""What differs between two runs, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wristctl.config.strict_yaml import parse_yaml
+from wristctl.runs.manifest import CONFIG
+from wristctl.runs.run import Run
+
+_FACTS = ("python", "os", "machine", "cpu", "cores")
+
+
+class Change(NamedTuple):
+    """A named thing and what it is in the one run and in the other; None where it is absent."""
+
+    name: str
+    before: Any
+    after: Any
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Changes from one run to another, by what changed."""
+
+    config: list[Change]
+    metrics: list[Change]
+    code: list[Change]
+    environment: list[Change]
+    inputs: list[Change]
+
+
+def difference(a: Run, b: Run) -> Difference:
+    """Compare configuration leaves, metrics, code (its files too), packages and machine, inputs by their results."""
+    inputs = [{each.role: each.result_sha256 for each in run.manifest.inputs} for run in (a, b)]
+    roles = {f"{run.kind}.{each.role}" for run in (a, b) for each in run.manifest.inputs}
+    config = [each for each in changes(leaves_of(a), leaves_of(b)) if each.name not in roles]
+    metrics = changes(*({name: each["value"] for name, each in run.metrics.items()} for run in (a, b)))
+    return Difference(config, metrics, _code(a, b), _environment(a, b), changes(*inputs))
+
+
+def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Change]:
+    """Where two mappings differ, in their order."""
+    names = dict.fromkeys([*before, *after])
+    pairs = (Change(name, before.get(name), after.get(name)) for name in names)
+    return [each for each in pairs if each.before != each.after or type(each.before) is not type(each.after)]
+
+
+def leaves_of(run: Run) -> dict[str, Any]:
+    """The configuration as written, by dotted key path."""
+    file = run.file(CONFIG)
+    return dict(_leaves(parse_yaml(file.read_bytes(), str(file)).data, ""))
+
+
+def _leaves(value: Any, path: str) -> list[tuple[str, Any]]:
+    if isinstance(value, dict) and value:
+        return [leaf for key, item in value.items() for leaf in _leaves(item, f"{path}.{key}" if path else str(key))]
+    if isinstance(value, tuple) and any(isinstance(item, dict) for item in value):
+        return [leaf for number, item in enumerate(value) for leaf in _leaves(item, f"{path}[{number}]")]
+    return [(path, value)]
+
+
+def _code(a: Run, b: Run) -> list[Change]:
+    if a.manifest.code.tree_sha256 == b.manifest.code.tree_sha256:
+        return []
+    facts = []
+    for run in (a, b):
+        code = run.manifest.code
+        commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
+        facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
+    files = changes(*(_listing(run.path / "code.txt", "  ", 1) for run in (a, b)))
+    return [*changes(*facts), *(Change(each.name, _short(each.before), _short(each.after)) for each in files)]
+
+
+def _environment(a: Run, b: Run) -> list[Change]:
+    facts = [
+        {name: getattr(run.manifest.environment, name) for name in _FACTS} | run.manifest.environment.threads
+        for run in (a, b)
+    ]
+    packages = [
+        run.manifest.environment.packages | _listing(run.path / "environment.txt", "==", 0) for run in (a, b)
+    ]
+    return changes(*facts) + changes(*packages)
+
+
+def _listing(file: Path, separator: str, key: int) -> dict[str, str]:
+    """Lines of two parts as a mapping; empty where an older run has no such file."""
+    if not file.is_file():
+        return {}
+    pairs = [line.split(separator, 1) for line in file.read_text(encoding="utf-8").splitlines() if separator in line]
+    return {pair[key]: pair[1 - key] for pair in pairs}
+
+
+def _short(digest: str | None) -> str | None:
+    return digest[:12] if digest else None

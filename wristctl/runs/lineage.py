@@ -1,0 +1,59 @@
+"""Where a run comes from and what was built on it, read from the manifests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from wristctl.config.errors import UserError
+from wristctl.runs.manifest import Input
+from wristctl.runs.query import entries
+from wristctl.runs.run import Run
+
+
+@dataclass(frozen=True)
+class Ancestor:
+    """A run and what it was made from; `role` is the part it plays in the run it was read by."""
+
+    id: str
+    kind: str
+    state: str
+    role: str = ""
+    inputs: tuple[Ancestor, ...] = field(default=())
+
+    def lines(self, head: str = "", rest: str = "") -> Iterator[str]:
+        """The tree as text, the run itself first."""
+        role = f"{self.role}: " if self.role else ""
+        yield f"{head}{role}{self.id} ({self.state})"
+        for number, each in enumerate(self.inputs, 1):
+            last = number == len(self.inputs)
+            yield from each.lines(rest + ("└─ " if last else "├─ "), rest + ("   " if last else "│  "))
+
+
+def ancestry(run: Run, role: str = "", state: str = "") -> Ancestor:
+    """The tree of runs behind a run; inputs that are gone or are not what was read say so as their state."""
+    inputs = []
+    for each in run.manifest.inputs:
+        try:
+            found = input_run(run, each)
+            changed = found.result_hash != each.result_sha256
+            inputs.append(ancestry(found, each.role, "another result than was read" if changed else ""))
+        except UserError:
+            inputs.append(Ancestor(each.run, each.kind, "gone", each.role))
+    return Ancestor(run.id, run.kind, state or run.state, role, tuple(inputs))
+
+
+def input_run(run: Run, record: Input) -> Run:
+    """The run behind an input: beside the run that read it, or else where it was then. UserError if it is gone."""
+    for path in (run.path.parent / record.run, Path(record.path)):
+        if path.is_dir():
+            found = Run(path)
+            found.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+            return found
+    raise UserError(f"the {record.role} run is gone", record.path, "bring it back beside the run that read it")
+
+
+def dependents(run: Run, results: Path) -> list[str]:
+    """Ids of the runs in `results` that read this one."""
+    return [each.id for each in entries(results) if run.id in each.inputs]

@@ -1,0 +1,75 @@
+"""A run and its repetition: a verdict on each file, and what may have caused a difference."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from wristctl.config.errors import UserError
+from wristctl.runs.difference import Change, difference
+from wristctl.runs.likeness import likeness
+from wristctl.runs.lineage import input_run
+from wristctl.runs.manifest import CONFIG
+from wristctl.runs.run import Run
+
+
+class Verdict(NamedTuple):
+    """What became of one file; volatile ones (wall times) are not compared."""
+
+    path: str
+    verdict: Literal["identical", "within tolerance", "differs", "missing", "added", "volatile"]
+    detail: str = ""
+
+
+def verdicts(original: Run, again: Run) -> list[Verdict]:
+    """A verdict on each output of either run."""
+    before = {each.path: each for each in original.manifest.outputs}
+    after = {each.path: each for each in again.manifest.outputs}
+    found = []
+    for path in dict.fromkeys([*before, *after]):
+        if (before.get(path) or after[path]).volatile:
+            found.append(Verdict(path, "volatile", "not compared"))
+        elif path not in after:
+            found.append(Verdict(path, "missing", "not written this time"))
+        elif path not in before:
+            found.append(Verdict(path, "added", "not written then"))
+        else:
+            found.append(Verdict(path, *likeness(original.path / path, again.path / path)))
+    return found
+
+
+def changed_inputs(run: Run) -> list[str]:
+    """What is wrong with the inputs as they are now; empty where each is sealed as it was read."""
+    found = []
+    for each in run.manifest.inputs:
+        try:
+            now = input_run(run, each)
+            problems = now.problems()
+        except UserError as error:
+            found.append(f"input: {each.role}: {error.what} ({error.where})")
+            continue
+        found += [f"input: {each.role}: {what} ({now.path / path})" for path, what in problems]
+        if not problems and now.result_hash != each.result_sha256:
+            found.append(f"input: {each.role}: another result than was read ({now.path})")
+    return found
+
+
+def causes(original: Run, again: Run) -> list[str]:
+    """What differs between the run and its repetition, as likely causes; nondeterminism where nothing does."""
+    changed = difference(original, again)
+    found = [f"input: {each.name}" for each in changed.inputs]
+    found += [f"config: {_said(each)}" for each in changed.config]
+    if any(path == CONFIG for path, _ in original.problems()):
+        found.append("config: config.yaml was changed after the run")
+    found += _summed("code", changed.code)
+    found += _summed("environment", changed.environment)
+    return found or ["nondeterminism: configuration, code, inputs and environment are the same"]
+
+
+def _summed(what: str, changed: list[Change], most: int = 6) -> list[str]:
+    more = [f"{what}: and {len(changed) - most} more"] if len(changed) > most else []
+    return [f"{what}: {_said(each)}" for each in changed[:most]] + more
+
+
+def _said(change: Change) -> str:
+    before, after = ("absent" if value is None else value for value in change[1:])
+    return f"{change.name}: {before} -> {after}"
