@@ -23,6 +23,13 @@ STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 WIRE_RANGE = {"u8": (0, 2**8), "u16": (0, 2**16), "u32": (0, 2**32), "i16": (-(2**15), 2**15), "i32": (-(2**31), 2**31)}
 CODES = {"State": "states", "Result": "results", "Command": "commands"}
 BITS = {"Fault": "faults", "Flag": "flags"}
+_KINDS = {
+    "State": "What the board is doing.",
+    "Result": "What it answers to a command.",
+    "Command": "What a host may ask.",
+    "Fault": "Why it stopped, one bit each.",
+    "Flag": "What its status says besides, one bit each.",
+}
 MARK = "Made from messages.toml by dictionary.py: change that file, not this one."
 
 Table = dict[str, Any]
@@ -127,7 +134,7 @@ def python_module(table: Table) -> str:
     for name, entry in table["constants"].items():
         out += [f"{name} = {entry['value']}  # {entry['unit']}: {entry['meaning']}"]
     for kind, group in (CODES | BITS).items():
-        out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):"]
+        out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):", f'    """{_KINDS[kind]}"""', ""]
         out += [f"    {name} = {_number(entry)}  # {entry['meaning']}" for name, entry in table[group].items()]
     out += ["", ""]
     for kind, prose in (("Result", "meaning"), ("Result", "fix"), ("Fault", "meaning"), ("Fault", "fix")):

@@ -24,6 +24,8 @@ MAX_PAYLOAD = 48  # bytes: of any message, either way
 
 
 class State(IntEnum):
+    """What the board is doing."""
+
     DISABLED = 0  # drives off, nothing moves; from here ENABLE
     ENABLED = 1  # drives on, motion commands are obeyed
     STOPPING = 2  # ramping down on the way to DISABLED or FAULT
@@ -31,6 +33,8 @@ class State(IntEnum):
 
 
 class Result(IntEnum):
+    """What it answers to a command."""
+
     OK = 0  # done
     LENGTH = 1  # the message has the wrong length
     UNKNOWN = 2  # the board does not know this command
@@ -44,6 +48,8 @@ class Result(IntEnum):
 
 
 class Command(IntEnum):
+    """What a host may ask."""
+
     HELLO = 1  # who are you? Its answer's first three fields keep their place in every version
     PING = 2  # are you there? Keeps the link watchdog fed while nothing moves
     STATUS = 3  # state, positions and rates
@@ -62,6 +68,8 @@ class Command(IntEnum):
 
 
 class Fault(IntFlag):
+    """Why it stopped, one bit each."""
+
     LINK = 1  # no command arrived within the watchdog time
     ESTOP_COMMAND = 2  # the host sent an emergency stop
     ESTOP_INPUT = 4  # the emergency stop button is pressed or its wire is broken
@@ -70,6 +78,8 @@ class Fault(IntFlag):
 
 
 class Flag(IntFlag):
+    """What its status says besides, one bit each."""
+
     HOMED = 1  # positions are trusted
     MOVING = 2  # some axis is moving or waiting for its next step
     DRIVES_ON = 4  # the drives are energised
