@@ -40,16 +40,18 @@ class Options:
     debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False
 
 
-def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help)."""
+def signature(own: Iterable[tuple[str, str, bool]]) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch)."""
     shared = inspect.signature(Options, eval_str=True).parameters.values()
     named = [
         inspect.Parameter(
             leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[str | None, typer.Option(f"--{leaf.replace('_', '-')}", help=text)],
+            annotation=Annotated[
+                (bool if switch else str) | None, typer.Option(f"--{leaf.replace('_', '-')}", help=text)
+            ],
         )
-        for leaf, text in own
+        for leaf, text, switch in own
     ]
     return inspect.Signature([*shared, *named])
