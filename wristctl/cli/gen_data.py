@@ -20,7 +20,8 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
     if "run" in inputs and settings.source != "run":
         raise UserError("a run is given, but source is " + settings.source, "gen-data.source", "--source run")
     if settings.source == "run":
-        return f"at most {settings.samples} samples of {_source(inputs).id}"
+        courses = _courses(_source(inputs))
+        return f"at most {settings.samples} of {sum(map(len, courses))} samples of {inputs['run'].id}"
     begin = f"{settings.samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
     if settings.source == "plant":
         tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))

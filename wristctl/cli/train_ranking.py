@@ -116,7 +116,8 @@ def _ranked(session: Session, table: pd.DataFrame, label: str, names: list[str])
         rows.append((pair.better, pair.worse, pair.difference, pair.p, pair.p < LEVEL))
         said = "RMSE: Wilcoxon's signed-rank test over the seeds, Holm's correction"
         run.metric(f"p_{pair.better}_before_{pair.worse}", pair.p, n=count, meaning=said)
-    for name in (name for name in names if name.endswith("sigmoid")):
+    settings = {row.name: row for row in session.settings.rows}
+    for name in (name for name in names if settings[name].activation == "sigmoid"):
         said = f"C16: 1 where sigmoid's RMSE is below every other's of {label} at the 5 % level"
         run.metric(f"c16_{name}_is_best", int(found.supports_best(name)), n=count, meaning=said)
     heads = ("better", "worse", "median difference of RMSE [deg]", "p", "supported")

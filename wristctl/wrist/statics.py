@@ -85,7 +85,7 @@ def equilibria_at(parameters: Array, n: int, angle: Array, pretension: float) ->
         rest = np.concatenate([r, theta.sum(axis=1, keepdims=True) - angle[:, None]], axis=1)
         change = np.linalg.solve(bordered, -rest[..., None])[..., 0]
         theta, difference = theta + change[:, :n], difference + change[:, n]
-        if np.abs(change[:, :n]).max() < 1e-12:
+        if np.abs(change[:, :n]).max() < 1e-12 and np.abs(change[:, n]).max() < 1e-9:
             break
     pulls = _pulls(difference, pretension)
     r, tangent, _ = linearised(parameters, theta, still, still, pulls)
