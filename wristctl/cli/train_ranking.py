@@ -30,21 +30,25 @@ def write_rows(session: Session, trials: dict[str, list[Trial]], where: list[Pla
     table = pd.DataFrame(records).dropna(axis="columns", how="all")
     meaning = {name: text for name, (_, text) in MEASURES.items()}
     run.table("data/trials.csv", table, {name: unit for name, (unit, _) in MEASURES.items()}, meaning)
-    if count < 2:
+    if len(table) < 2:
         return []
     shown = [name for name in MEASURES if name in table]
-    cells, rows = {}, []
+    rows = []
     for name, own in table.groupby("row", sort=False):
         for measure in shown:
-            mean, low, high = cells[name, measure] = mean_interval(own[measure].to_numpy())
+            mean, low, high = mean_interval(own[measure].to_numpy())
             unit, text = MEASURES[measure]
             said = f"{name}: {text}; mean over the seeds with its 95 % interval"
-            run.metric(f"{name}_mean_{measure}", mean, unit, n=len(own), interval=(low, high), meaning=said)
+            ends = (low, high) if len(own) > 1 else None
+            run.metric(f"{name}_mean_{measure}", mean, unit, n=len(own), interval=ends, meaning=said)
             middle = float(own[measure].median())
             run.metric(f"{name}_median_{measure}", middle, unit, n=len(own), meaning=f"{name}: {text}; median")
             rows.append((name, measure, unit, mean, low, high, middle, _printed(session, str(name), measure)))
     heads = ("network", "measure", "unit", "mean", "95 % low", "95 % high", "median", "paper's T1")
-    tables = [Table(f"Over {count} seeds (initial weights and order of samples; one split)", heads, rows)]
+    title = f"Over {count} seed{'s' * (count > 1)} (initial weights and order of samples; one split)"
+    tables = [Table(title, heads, rows)]
+    if count < 2:
+        return tables
     return tables + [
         made for label, names in _groups(session, trials).items() for made in _ranked(session, table, label, names)
     ]
