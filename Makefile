@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench clean venv
+.PHONY: run test lint bench bench-peers firmware test-firmware clean venv
 
 run: .venv/run
 	@set -e; \
@@ -25,6 +25,20 @@ lint: .venv/dev
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
+	$(BIN)/python benchmarks/board.py
+
+# The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
+firmware:
+	$(MAKE) -C wristctl/hardware/firmware check
+
+# The image on simavr and on our own core, thoroughly, and flashed through the stock bootloader
+# (Debian 12: also simavr libsimavr-dev libelf-dev pkg-config gcc avrdude arduino-core-avr).
+test-firmware: .venv/dev firmware
+	$(MAKE) -C tests/firmware
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
+
+bench-peers: .venv/run
+	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
 
 venv: .venv/dev
 
@@ -39,5 +53,5 @@ venv: .venv/dev
 	touch $@
 
 clean:
-	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
+	rm -rf build .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

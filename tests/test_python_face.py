@@ -13,7 +13,8 @@ import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
-    "cli", "report", "benchmark", "tuning", "learning", "simulation", "control", "wrist", "lanes", "runs", "config",
+    "cli", "report", "benchmark", "tuning", "learning", "hardware", "simulation", "control", "wrist", "lanes", "runs",
+    "config",
 )  # fmt: skip
 
 

@@ -9,6 +9,8 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 
+ROOT = Path(__file__).parents[2]
+
 
 def _file(folder: Path, text: str, name: str = "study.yaml") -> Path:
     path = folder / name
@@ -100,3 +102,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         load_study([tmp_path / "absent.yaml"])
     with pytest.raises(UserError, match="Is a directory"):
         load_study([tmp_path])
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "experiments").glob("*.yaml")), ids=lambda file: file.name)
+def test_every_committed_experiment_is_valid(file: Path) -> None:
+    if file.name != "claims.yaml":
+        assert load_study([file]) != load_study([])

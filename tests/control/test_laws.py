@@ -108,6 +108,27 @@ def test_pid_holds_its_integral_in_saturation_and_lets_it_unwind(side: float) ->
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
+@settings(max_examples=40, deadline=None)
+@given(state, st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5), st.floats(-5.0, 5.0))
+def test_every_law_is_finite_for_any_state_and_gains_in_the_box(
+    name: str, at: tuple[float, float, float], share: list[float], rate_ref: float
+) -> None:
+    theta, rate, theta_ref = at
+    gains = tuple(g.low * (g.high / g.low) ** u for g, u in zip(controller(name).gains.values(), share, strict=False))
+    kept = np.zeros((max(1, controller(name).memory), 8))
+    for _ in range(3):
+        u = torque(name, gains, kept, theta=theta, rate=rate, theta_ref=theta_ref, rate_ref=rate_ref)
+        assert np.isfinite(u) and np.isfinite(kept).all()
+
+
+@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"feedforward"}))
+def test_every_gain_is_searched_over_six_decades_around_its_presets(name: str) -> None:
+    for number, gain in enumerate(controller(name).gains.values()):
+        assert gain.high / gain.low == pytest.approx(1e6)
+        assert gain.low <= controller(name).presets.get("default", (gain.low,) * 9)[number] <= gain.high
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
 def test_every_controller_states_units_boxes_and_presets_of_all_its_gains(name: str) -> None:
     chosen = controller(name)
     assert chosen.presets and chosen.law.__doc__

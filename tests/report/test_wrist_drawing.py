@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
-from wristctl.report.wrist_drawing import DIRECTIONS, TENDONS, directions, stroboscope
+from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.report.wrist_shape import backbone, beside, discs
 from wristctl.simulation.simulate import chain_tip
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.wrist.directions import DIRECTIONS, TENDONS
 
 WRIST = WristParameters()
 L, C = WRIST.length, WRIST.tendon_offset
@@ -46,9 +47,9 @@ def test_drawn_tendons_have_the_models_length(theta: float) -> None:
 
 
 def test_pulling_tendons_are_those_of_the_paper_and_lie_on_the_side_of_the_bend() -> None:
-    pulled = {each.name: each.tendons for each in DIRECTIONS}
+    pulled = {each.name: each.tendons for each in DIRECTIONS.values()}
     assert pulled == {"ulnar": (4, 5), "radial": (1, 2), "flexion": (2, 5), "extension": (1, 4)}
-    for each in DIRECTIONS:
+    for each in DIRECTIONS.values():
         axis = 0 if each.plane == "ulnar" else 1
         assert all(TENDONS[number][axis] == each.sign for number in each.tendons)
 

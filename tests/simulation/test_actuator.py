@@ -29,7 +29,7 @@ def _drive(drive, state, model, commands, out, h):
         result[0], result[1] = actuate(drive, motors, known, command[2], command[0], command[1], h)
 
 
-def delivered(drive: Drive, commands: np.ndarray) -> np.ndarray:
+def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
     """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
     state = np.repeat(at_rest(drive, WRIST, np.zeros(1))[:, None], 8, axis=1)
     out = np.zeros((len(commands), 2, 8))

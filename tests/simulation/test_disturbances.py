@@ -9,7 +9,7 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Disturbances, Drift, Plant, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.simulation.disturbances import disturb
+from wristctl.simulation.disturbances import course
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.wrist.model import linearised
@@ -21,20 +21,20 @@ TIME = np.arange(5000) * 1e-3
 
 def run(disturbances: Disturbances, plant: Plant | None = None, horizon: float = 6.0) -> Outcome:
     loop = Loop(disturbances=disturbances, plant=plant or Plant())
-    course = motion(Reference(angle_deg=10.0), WRIST, horizon, 1e-3)
+    move = motion(Reference(angle_deg=10.0), WRIST, horizon, 1e-3)
     law = controller("feedforward")
-    return rollout(law, np.zeros((1, 0)), [course], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
+    return rollout(law, np.zeros((1, 0)), [move], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
 
 
 def test_push_is_half_a_sine_with_its_impulse() -> None:
-    force = disturb(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)), TIME)[:, 0]
+    force = course(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)), TIME)[:, 0]
     assert force.sum() * 1e-3 == pytest.approx(-2.0 * 0.5 * 2 / np.pi, rel=1e-4)
     assert not force[TIME <= 1.0].any() and not force[TIME >= 1.5].any()
     assert force.min() == pytest.approx(-2.0, rel=1e-4)
 
 
 def test_drift_runs_linearly_between_its_ends() -> None:
-    scale = disturb(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)), TIME)[:, 1]
+    scale = course(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)), TIME)[:, 1]
     assert scale[[0, 1000, 2000, 3000, 4999]] == pytest.approx([1.0, 1.0, 0.8, 0.6, 0.6])
 
 
@@ -55,7 +55,7 @@ def test_a_wrist_that_has_drifted_rests_where_a_softer_one_does() -> None:
 
 def test_a_push_leaves_every_lane_of_a_batch_and_the_next_rollout_as_they_were() -> None:
     calm = run(Disturbances()).column("theta", 0)
-    pushed = run(Disturbances(push=Push())).column("theta", 0)
+    pushed = run(Disturbances(push=Push(force=2.0))).column("theta", 0)
     again = run(Disturbances()).column("theta", 0)
     assert (calm[:2500] == pushed[:2500]).all() and (calm == again).all()
     assert np.abs(pushed - calm).max() > 0.1

@@ -39,7 +39,7 @@ def test_an_exact_model_and_a_clean_camera_give_the_true_angle() -> None:
 
 
 def test_a_push_is_seen_no_earlier_than_its_first_frame_arrives() -> None:
-    push = Disturbances(push=Push(start=1.0))
+    push = Disturbances(push=Push(force=2.0, start=1.0))
     calm, pushed = (
         run("feedforward", "default", Loop(plant_segments=1, sensor=CLEAN, disturbances=d), horizon=2.0)
         for d in (Disturbances(), push)
@@ -113,7 +113,8 @@ def test_frames_are_taken_at_the_frame_rate_and_arrive_after_the_delay() -> None
 
 
 def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batch() -> None:
-    loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"), disturbances=Disturbances(push=Push(start=0.2)))
+    push = Disturbances(push=Push(force=2.0, start=0.2))
+    loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"), disturbances=push)
     law, course = controller("smc-tracking"), motion(Reference(), WRIST, 0.5, 1e-3)
     gains = np.tile(law.presets["camera"], (11, 1))
     which, seeds = np.zeros(11, np.int64), np.arange(11)
@@ -131,10 +132,11 @@ def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batc
 def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
     level: str, rmse: float, steady_state: float
 ) -> None:
-    """Medians of 20 seeds at -20 % stiffness unknown to the law."""
-    loop = Loop.model_validate({"sensor": CAMERA, "plant": SOFT, "actuator": {"level": level}})
+    """Medians of 20 seeds at -20 % stiffness unknown to the law; its gains were chosen on another stream of noise."""
+    other_noise = CAMERA.model_copy(update={"seed": 7})
+    loop = Loop.model_validate({"sensor": other_noise, "plant": SOFT, "actuator": {"level": level}})
     found = run("smc-tracking", "camera", loop, seeds=20, record=False).metrics
     assert np.median(found["rmse"]) <= rmse and np.median(found["steady_state"]) <= steady_state
-    pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(start=2.5, duration=0.5))})
+    pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(force=2.0, start=2.5, duration=0.5))})
     settled = run("smc-tracking", "camera", pushed, seeds=20, record=False).metrics["settling"]
     assert np.median(settled) <= 3.0 + 0.5

@@ -39,6 +39,14 @@ def test_smc_tracking_meets_its_targets_on_move_and_step_with_one_set_of_gains()
     assert found["chattering"][0] <= 3.0 * feedforward
 
 
+@pytest.mark.parametrize("plant", [Plant(), *UNKNOWN.values()], ids=["nominal", *UNKNOWN])
+def test_smc_tracking_settles_steps_of_any_size_within_a_tenth_of_a_second(plant: Plant) -> None:
+    """Small steps stay clear of saturation, large ones do not; the softer or heavier wrist is unknown to the law."""
+    steps = [Reference(kind="step", angle_deg=angle) for angle in (15.0, -30.0, 50.0)]
+    found = run("smc-tracking", plant, *steps, horizon=1.5).metrics
+    assert (found["settling"] <= 0.1).all() and (found["overshoot"] <= 2.0).all()
+
+
 @pytest.mark.parametrize("plant", UNKNOWN.values(), ids=UNKNOWN)
 @pytest.mark.parametrize("name", ["smc-tracking", "super-twisting", "mrac"])
 def test_integrating_laws_keep_their_accuracy_on_an_unknown_plant(name: str, plant: Plant) -> None:

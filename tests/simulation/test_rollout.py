@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
+from wristctl.simulation.stream import stream
 from wristctl.wrist.model import linearised
 from wristctl.wrist.segments import segments
 
@@ -113,3 +116,24 @@ def test_substeps_change_the_result_by_less_than_a_microradian() -> None:
     coarse = run("computed-torque", [(50.0, 1.0)], LOOPS["default"], MOVES[0])
     fine = run("computed-torque", [(50.0, 1.0)], Loop(substeps=10), MOVES[0])
     assert np.abs(coarse.column("theta", 0) - fine.column("theta", 0)).max() < 1e-6
+
+
+def test_a_stream_gives_the_same_metrics_as_one_batch_in_constant_memory() -> None:
+    rng = np.random.default_rng(2)
+    gains = 10.0 ** rng.uniform([0, -1, 0], [2, 0, 2], (200, 3))
+    loop = LOOPS["sampled"]
+    followed = motion(MOVES[0], WRIST, 0.2, sample_period(loop))
+    whole = rollout(controller("smc"), gains, [followed], np.zeros(200, np.int64), loop, WRIST)
+    parts = stream(controller("smc"), (gains[i : i + 64] for i in range(0, 200, 64)), followed, loop, WRIST)
+    streamed = np.concatenate([outcome.metrics["rmse"] for outcome in parts])
+    assert streamed.tobytes() == whole.metrics["rmse"].tobytes()
+
+    def peak(batches: int) -> int:
+        tracemalloc.start()
+        for _ in stream(controller("smc"), (gains for _ in range(batches)), followed, loop, WRIST):
+            pass
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    assert peak(20) < 2 * peak(2)

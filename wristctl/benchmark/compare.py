@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from wristctl.benchmark.paper import T2, verdict
 from wristctl.config.control import CompareSettings, Row, TuneSettings
 from wristctl.config.errors import UserError
-from wristctl.config.loop import Reference
+from wristctl.config.loop import Direction, Reference
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import rollout, sample_period
 from wristctl.simulation.simulate import Simulation, simulation
+from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
 if TYPE_CHECKING:
@@ -97,45 +99,56 @@ def compare(
     chosen = study.compare
     gains = [gains_of(controller(row.controller), row.gains, tuned) for row in chosen.rows]
     names = list(dict.fromkeys(row.controller for row in chosen.rows))
-    motions = {name: _motions(study, sample_period(loop), network) for name, loop in chosen.loops.items()}
+    planned = [
+        (loop_name, loop, wrist, _motions(study, wrist, direction, sample_period(loop), network))
+        for loop_name, loop in chosen.loops.items()
+        for direction in chosen.directions
+        for wrist in [in_plane(study.wrist, direction)]
+    ]
     results: list[Result] = []
-    for loop_number, (loop_name, loop) in enumerate(chosen.loops.items()):
-        labels, followed = zip(*motions[loop_name], strict=True)
+    for part, (loop_name, loop, wrist, motions) in enumerate(planned):
+        labels, followed = zip(*motions, strict=True)
         for number, name in enumerate(names):
             rows = [i for i, row in enumerate(chosen.rows) if row.controller == name]
             batch = np.array([gains[i] for i in rows for _ in followed]).reshape(len(rows) * len(followed), -1)
             which = np.tile(np.arange(len(followed)), len(rows))
-            base = (loop_number * len(names) + number) / (len(names) * len(chosen.loops))
+            base = (part * len(names) + number) / (len(names) * len(planned))
 
             def report(share: float, base: float = base) -> None:
                 if progress is not None:
-                    progress(base + share / (len(names) * len(chosen.loops)))
+                    progress(base + share / (len(names) * len(planned)))
 
-            outcome = rollout(controller(name), batch, followed, which, loop, study.wrist, record=True, progress=report)
+            outcome = rollout(controller(name), batch, followed, which, loop, wrist, record=True, progress=report)
             for index in range(len(batch)):
                 row = chosen.rows[rows[index // len(followed)]]
                 (reference, inverse), course = labels[which[index]], followed[which[index]]
-                done = simulation(outcome, index, course, study.wrist, f"{name}/{row_name(row)}")
+                done = simulation(outcome, index, course, wrist, f"{name}/{row_name(row)}")
                 results.append(Result(loop_name, reference, inverse, name, row_name(row), done))
     return _in_order(results, chosen)
 
 
-def _motions(study: Study, period: float, network: Inverse | None) -> list[tuple[tuple[str, str], Motion]]:
+def _motions(
+    study: Study, wrist: WristParameters, direction: Direction, period: float, network: Inverse | None
+) -> list[tuple[tuple[str, str], Motion]]:
     chosen = study.compare
-    return [
-        (
-            (reference_name(reference), inverse),
-            motion(reference.model_copy(update={"inverse": inverse}), study.wrist, chosen.horizon, period, network),
-        )
-        for reference in chosen.references
-        for inverse in chosen.inverses
-    ]
+    planned: list[tuple[tuple[str, str], Motion]] = []
+    for reference in chosen.references:
+        toward = reference.mirrored() if DIRECTIONS[direction].sign < 0 else reference
+        for inverse in chosen.inverses:
+            course = motion(toward.model_copy(update={"inverse": inverse}), wrist, chosen.horizon, period, network)
+            planned.append(((_course_name(reference, direction, chosen), inverse), course))
+    return planned
+
+
+def _course_name(reference: Reference, direction: Direction, chosen: CompareSettings) -> str:
+    """The reference's name, with the direction where there are several."""
+    return reference_name(reference) + (f", {direction}" if len(chosen.directions) > 1 else "")
 
 
 def _in_order(results: Sequence[Result], chosen: CompareSettings) -> list[Result]:
-    """By loop, reference, row of the study, inverse."""
+    """By loop, reference, direction, row of the study, inverse."""
     loops = list(chosen.loops)
-    references = [reference_name(reference) for reference in chosen.references]
+    references = [_course_name(r, direction, chosen) for r in chosen.references for direction in chosen.directions]
     rows = [(row.controller, row_name(row)) for row in chosen.rows]
     return sorted(
         results,

@@ -15,7 +15,7 @@ from typer.main import get_command
 from wristctl import __version__
 from wristctl.config.errors import UserError
 
-_REPRODUCE, _RESULTS = "Reproduce the paper", "Results"
+_REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
 
 COMMANDS = {
     "gen-data": (
@@ -28,6 +28,7 @@ COMMANDS = {
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
+    "hw": ("wristctl.cli.hw", _HARDWARE, "Find, check, flash, emulate and stop the motor board."),
     "runs": ("wristctl.cli.runs", _RESULTS, "List and show run directories."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""

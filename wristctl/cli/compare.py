@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from wristctl.benchmark.compare import Result
     from wristctl.benchmark.cost import StepTime
 
+_DETAILED = 3
+"""Comparisons of more loops than this draw the details of the first only."""
+
 _SHOWN = ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension", "saturation")
 _HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chattering [N/s]", "peak [N]", "saturated")
 
@@ -37,13 +40,17 @@ def compare(session: Session) -> list[Table]:
     from wristctl.benchmark.compare import frame, refuse_tuned_scenarios, row_name, series
     from wristctl.benchmark.cost import step_time
     from wristctl.cli.loops import network_of, tuned_of, tuned_study, warn_if_it_buckles
+    from wristctl.cli.tune import search_all
     from wristctl.control.table import controller, gains_of
 
     run, settings = session.run, session.settings
-    warn_if_it_buckles(session, max(loop.plant_segments for loop in settings.loops.values()))
+    warn_if_it_buckles(session, settings.loops.values())
     earlier, tuned = tuned_study(session), tuned_of(session)
-    if earlier is not None:
-        refuse_tuned_scenarios(settings, earlier.tune)
+    scenarios = earlier.tune if earlier is not None else settings.tuning
+    if scenarios is not None:
+        refuse_tuned_scenarios(settings, scenarios)
+    if settings.tuning is not None:
+        tuned = {name: found.gains for name, found in search_all(session, settings.tuning).items()}
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(session.study, network_of(session), tuned, lambda share: done(round(100 * share)))
     run.table("data/comparison.csv", frame(results), units=_units())
@@ -65,14 +72,23 @@ def compare(session: Session) -> list[Table]:
 
 
 def _draw(session: Session, results: list[Result]) -> None:
-    """For each loop: angles, RMSE, chattering, and the errors over time of each of the paper's controllers."""
+    """Over the loops RMSE for each reference, and angles; for each loop (of many only the first) the same over the
+    references, chattering, and the errors over time of each of the paper's controllers."""
     from wristctl.benchmark.paper import T2
     from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
     from wristctl.report.loop_figures import errors
     from wristctl.report.wrist_drawing import directions
 
     run, settings = session.run, session.settings
-    for loop in settings.loops:
+    loops = list(settings.loops)
+    if len(loops) > 1:
+        for number, reference in enumerate(dict.fromkeys(r.reference for r in results), start=1):
+            own = [r for r in results if r.reference == reference]
+            run.figure(f"robustness-{number}", rmse_map(own, reference, "loop"))
+        move = next((r.reference for r in results if not r.reference.startswith("step")), results[0].reference)
+        own = [r for r in results if r.reference == move and r.inverse == settings.inverses[0]]
+        run.figure("angles", angle_grid(own, move, "loop"))
+    for loop in loops if len(loops) <= _DETAILED else loops[:1]:
         here = [r for r in results if r.loop == loop]
         first = [r for r in here if r.inverse == settings.inverses[0]]
         run.figure(f"angles-{loop}", angle_grid(first, f"loop {loop}"))

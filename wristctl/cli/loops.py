@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Session
 from wristctl.config.errors import UserError
+from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
@@ -62,11 +63,13 @@ def tuned_study(session: Session) -> Study | None:
     return load_study([run.file("config.yaml")]) if run else None
 
 
-def warn_if_it_buckles(session: Session, n: int) -> None:
-    """Warn where the straight n-segment wrist has no stable equilibrium, and note it in the manifest."""
+def warn_if_it_buckles(session: Session, loops: Iterable[Loop]) -> None:
+    """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
+    from wristctl.simulation.plant import plant_of
     from wristctl.wrist.statics import least_stiffness
 
-    least = least_stiffness(session.study.wrist, n)
+    wrist = session.study.wrist
+    least = min(least_stiffness(plant_of(wrist, loop.plant), loop.plant_segments) for loop in loops)
     session.run.numerics(least_stiffness=least, buckles=least <= 0.0)
     if least <= 0.0:
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)

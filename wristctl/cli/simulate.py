@@ -15,7 +15,7 @@ def simulate(session: Session) -> Table:
     from wristctl.simulation.trajectory import COLUMNS
 
     run, wrist = session.run, session.study.wrist
-    warn_if_it_buckles(session, session.settings.loop.plant_segments)
+    warn_if_it_buckles(session, [session.settings.loop])
     with session.progress("compiling and simulating the loop"):
         done = run_simulation(session.study, network_of(session), tuned_of(session))
     course = done.trajectory

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.control import TuneSettings
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
@@ -27,31 +28,40 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
 def tune(session: Session) -> Table:
     """Search for gains by rollouts, a whole swarm as one batch."""
-    import numpy as np
+    from wristctl.cli.loops import warn_if_it_buckles
 
-    from wristctl.cli.loops import network_of, warn_if_it_buckles
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import search
-
-    warn_if_it_buckles(session, max(loop.plant_segments for loop in session.settings.loops.values()))
-    network, found = network_of(session), {}
-    try:
-        for name in session.settings.controllers:
-            rng = np.random.default_rng(session.run.stream(f"search {name}"))
-            with session.progress(f"tuning {name}", total=session.settings.iterations, unit="iterations") as done:
-
-                def so_far(result: Search, name: str = name, done: object = done) -> None:
-                    found[name] = result
-                    done(len(result.values), best=result.objective)  # type: ignore[operator]
-
-                found[name] = search(session.study, controller(name), rng, network, so_far)
-    finally:
-        _keep(session, found)
+    warn_if_it_buckles(session, session.settings.loops.values())
+    found = search_all(session, session.settings)
     rows = [
         (name, result.objective, result.evaluations, "  ".join(f"{k} = {v:.4g}" for k, v in result.gains.items()))
         for name, result in found.items()
     ]
     return Table("Tuned gains", ("controller", "objective", "evaluations", "gains"), rows)
+
+
+def search_all(session: Session, settings: TuneSettings) -> dict[str, Search]:
+    """Tune every controller of the settings and keep in the run what was found, also where it is cut short."""
+    import numpy as np
+
+    from wristctl.cli.loops import network_of
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import search
+
+    study = session.study.model_copy(update={"tune": settings})
+    network, found = network_of(session), {}
+    try:
+        for name in settings.controllers:
+            rng = np.random.default_rng(session.run.stream(f"search {name}"))
+            with session.progress(f"tuning {name}", total=settings.iterations, unit="iterations") as done:
+
+                def so_far(result: Search, name: str = name, done: object = done) -> None:
+                    found[name] = result
+                    done(len(result.values), best=result.objective)  # type: ignore[operator]
+
+                found[name] = search(study, controller(name), rng, network, so_far)
+    finally:
+        _keep(session, found)
+    return found
 
 
 def _keep(session: Session, found: dict[str, Search]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from wristctl.config.loop import LOOPS, Loop, Reference, Scenario
+from wristctl.config.loop import LOOPS, Direction, Loop, Reference, Scenario
 from wristctl.config.section import Section, choice, quantity
 
 Gains = str | dict[str, float]
@@ -66,9 +66,11 @@ class CompareSettings(Section):
     inverses: tuple[Literal["none", "exact", "network"], ...] = choice(
         ("network", "exact"), "how tip targets become angles; overrides the references' own", min_length=1
     )
+    directions: tuple[Direction, ...] = choice(("ulnar",), "directions of bending, each by its own plane", min_length=1)
     horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
+    tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
 
 
 class SimulateSettings(Section):
@@ -78,6 +80,7 @@ class SimulateSettings(Section):
     gains: Gains = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
+    direction: Direction = choice("ulnar", "direction of bending; the reference's angle counts toward it")
     start: Literal["straight", "equilibrium"] = choice(
         "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
     )

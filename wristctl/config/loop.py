@@ -10,6 +10,7 @@ from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import Section, choice, quantity
 
 Inverse = Literal["none", "exact", "network"]
+Direction = Literal["ulnar", "radial", "flexion", "extension"]
 
 
 class Loop(Section):
@@ -50,6 +51,17 @@ class Reference(Section):
     inverse: Inverse = choice(
         "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
     )
+
+    def mirrored(self) -> Reference:
+        """The same motion to the other side."""
+        return self.model_copy(
+            update={
+                "angle_deg": -(30.0 if self.angle_deg is None else self.angle_deg) if self.tip is None else None,
+                "tip": None if self.tip is None else (self.tip[0], -self.tip[1]),
+                "angles_deg": tuple(-angle for angle in self.angles_deg),
+                "tips": tuple((x, -y) for x, y in self.tips),
+            }
+        )
 
     @model_validator(mode="after")
     def _one_target(self) -> Self:

@@ -19,7 +19,7 @@ class Plant(Section):
 class Push(Section):
     """A person's push on the last disc: half a sine in time."""
 
-    force: float = quantity(2.0, "N", "largest force, across the straight wrist; + is the direction of theta > 0")
+    force: float = quantity(0.0, "N", "largest force, across the straight wrist; + is the direction of theta > 0")
     start: float = quantity(2.5, "s", "time at which it begins", "assumed", ge=0)
     duration: float = quantity(0.5, "s", "how long it lasts", "assumed", gt=0)
 
@@ -27,7 +27,7 @@ class Push(Section):
 class Drift(Section):
     """Stiffness that changes linearly in time, then stays."""
 
-    scale: float = quantity(0.8, "", "final stiffness over the first", "paper: springs lose stiffness", gt=0)
+    scale: float = quantity(1.0, "", "final stiffness over the first", "paper: springs lose stiffness", gt=0)
     start: float = quantity(0.0, "s", "time at which it begins", "assumed", ge=0)
     duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
 
@@ -35,9 +35,9 @@ class Drift(Section):
 class Disturbances(Section):
     """What acts on the wrist unknown to its controller."""
 
-    push: Push | None = None
+    push: Push = Push()
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
-    drift: Drift | None = None
+    drift: Drift = Drift()
 
 
 class Actuator(Section):

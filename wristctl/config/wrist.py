@@ -25,8 +25,9 @@ class WristParameters(Section):
     tension_limit: float = quantity(60.0, "N", "largest tension of each tendon", "assumed", gt=0)
     range_deg: float = quantity(50.0, "deg", "bending range to either side", "paper", gt=0, le=180)
     gravity: tuple[float, float] = quantity(
-        (-9.81, 0.0), "m/s^2", "gravity in the bending plane; upright is (-9.81, 0)", "assumed: the pose of the test"
+        (-9.81, 0.0), "m/s^2", "gravity along the base tangent and toward ulnar", "assumed: upright, as in the test"
     )
+    gravity_flexion: float = quantity(0.0, "m/s^2", "gravity toward flexion", "assumed: upright")
 
     @model_validator(mode="after")
     def _tensions_in_order(self) -> Self:

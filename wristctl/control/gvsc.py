@@ -90,7 +90,7 @@ def strain_model(wrist: Any, theta: Any) -> Any:
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """M theta_ref'' + D (1 + slope^2/3) rate_ref + K theta_ref + G - Kp e - Kd de/dt (PD+, all terms at theta_ref).
 
-    Spring and damper act as at the reference, so the wrist keeps its softness; the centrifugal torque, below 1 % of
+    Spring and damper act as at the reference, so the wrist keeps its softness; the centrifugal torque, below 0.1 % of
     gravity's at 1 rad/s, is left out.
     """
     inertia, slope, static, _ = strain_model(wrist, now.theta_ref)

@@ -40,7 +40,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """-Kv r + W^T phi(x) on r = de/dt + lambda e, W' = -Gamma (phi r + kappa |r| W) (e-modification).
 
     phi holds tanh units of x = (theta, rate, theta_ref, rate_ref, theta_ref'') and 1 (Lewis, Jagannathan and Yesildirek
-    1999, chapter 4). r is ultimately bounded; so is W, and by the implicit Euler rule used here for any r and any
+    1999). r is ultimately bounded; so is W, and by the implicit Euler rule used here for any r and any
     gains: |W_next| <= (|W| + a |phi|)/(1 + a kappa) with a = h Gamma |r|, never above the larger of |W| and
     |phi|/kappa <= sqrt(UNITS + 1)/kappa. Learning holds while a tendon saturates.
     """
@@ -62,7 +62,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
 NC = Controller(
     name="nc",
     law=law,
-    source="our design after Lewis, Jagannathan and Yesildirek (1999), chapter 4; the paper names an NC only",
+    source="our design after Lewis, Jagannathan and Yesildirek (1999); the paper names an NC only",
     gains={
         "lambda": Gain("1/s", "weight of the error in r", 1e-1, 1e5),
         "Kv": Gain("N m s/rad", "feedback of r", 1e-4, 1e2),

@@ -40,7 +40,7 @@ SMC_TRACKING = Controller(
         "k": Gain("1/s", "reaching gain within the boundary layer", 1e-1, 1e5),
         "phi": Gain("rad/s", "width of the boundary layer", 1e-2, 1e4),
     },
-    presets={"default": (110.0, 600.0, 230.0, 10.0), "camera": (20.0, 250.0, 100.0, 10.0)},
+    presets={"default": (140.0, 450.0, 280.0, 10.0), "camera": (20.0, 250.0, 100.0, 10.0)},
     memory=1,
     notes={
         "default": "chosen by trial on the four-segment plant at 1 kHz with ideal sensing",

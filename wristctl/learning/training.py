@@ -102,6 +102,8 @@ def train_one(
         mark = fingerprint(samples, job)
         if file and file.is_file():
             course.restore(read_checkpoint(file, mark))
+            if course.ended:
+                report(course.epochs[-1])
         saved, interrupted = time.monotonic(), False
         try:
             while not course.ended:

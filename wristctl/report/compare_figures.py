@@ -1,9 +1,10 @@
-"""Figures of a comparison: every controller on every reference of one loop."""
+"""Figures of a comparison: every controller on every reference of one loop, or on one reference of every loop."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,22 +17,28 @@ from numpy.typing import NDArray
 from wristctl.benchmark.compare import Result
 from wristctl.benchmark.paper import T2
 from wristctl.report.loop_figures import draw_desired, within_half_a_move
-from wristctl.report.style import GREY, colour, figure, line, title, undress
+from wristctl.report.style import GREY, WIDTH, colour, figure, line, title, undress
 
 Array = NDArray[np.float64]
+Across = Literal["reference", "loop"]
+"""What the columns of a figure are."""
+
+_EVERY = 10
+"""Small panels show every tenth sample."""
 
 _FAILED = "///"
 """Hatch of what diverged."""
 
 
-def angle_grid(results: Sequence[Result], heading: str = "") -> Figure:
-    """Desired and obtained angle [deg] over time [s]: rows of controllers with their gains, columns of references."""
-    rows, columns = _names(results)
-    made, axes = figure(len(rows), len(columns), height=1.0 + 1.05 * len(rows), sharex=True, sharey=True)
+def angle_grid(results: Sequence[Result], heading: str = "", across: Across = "reference") -> Figure:
+    """Desired and obtained angle [deg] over time [s]: rows of controllers and gains, columns as `across` says."""
+    rows, columns = _names(results, across)
+    size = {"width": max(WIDTH, 1.0 + 1.3 * len(columns)), "height": 1.0 + 1.05 * len(rows)}
+    made, axes = figure(len(rows), len(columns), sharex=True, sharey=True, **size)
     for result in results:
-        panel = axes[rows.index(_row(results, result)), columns.index(result.reference)]
+        panel = axes[rows.index(_row(results, result)), columns.index(getattr(result, across))]
         course = result.simulation.trajectory
-        panel.plot(course.time, np.degrees(course.theta), **line(course.label))
+        panel.plot(course.time[::_EVERY], np.degrees(course.theta[::_EVERY]), **line(course.label))
         draw_desired(panel, [course])
         if result.simulation.failed:
             panel.text(0.98, 0.06, "diverged", transform=panel.transAxes, ha="right", fontsize=9.0)
@@ -46,23 +53,24 @@ def angle_grid(results: Sequence[Result], heading: str = "") -> Figure:
     return made
 
 
-def rmse_map(results: Sequence[Result], heading: str = "") -> Figure:
-    """RMSE [rad] of each controller on each reference as number and colour (log), beside the paper's T2.
+def rmse_map(results: Sequence[Result], heading: str = "", across: Across = "reference") -> Figure:
+    """RMSE [rad] of each controller as number and colour (log), beside the paper's T2; columns as `across` says.
 
     What diverged is hatched and marked with an x.
     """
-    rows, columns = _names(results)
+    rows, columns = _names(results, across)
     values = np.full((len(rows), len(columns)), np.nan)
     printed = np.full((len(rows), 1), np.nan)
     for result in results:
         at = rows.index(_row(results, result))
-        values[at, columns.index(result.reference)] = result.simulation.metrics["rmse"]
+        values[at, columns.index(getattr(result, across))] = result.simulation.metrics["rmse"]
         printed[at] = T2[result.controller].rmse if result.controller in T2 else np.nan
     known = np.concatenate([values, printed], axis=1)
     positive = known[known > 0.0]
     norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
     widths = (len(columns), 1)
-    made, ((ours, paper),) = figure(1, 2, height=1.2 + 0.34 * len(rows), width_ratios=widths, sharey=True)
+    size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + 0.34 * len(rows)}
+    made, ((ours, paper),) = figure(1, 2, width_ratios=widths, sharey=True, **size)
     image = _cells(ours, values, norm)
     _cells(paper, printed, norm)
     for row, column in np.argwhere(np.isnan(values)):
@@ -82,7 +90,7 @@ def chattering_bars(results: Sequence[Result], heading: str = "") -> Figure:
 
     Dots are the single references; what diverged is hatched.
     """
-    rows, _ = _names(results)
+    rows, _ = _names(results, "reference")
     made, ((axes,),) = figure(height=1.1 + 0.3 * len(rows))
     for at, name in enumerate(rows):
         own = [result for result in results if _row(results, result) == name]
@@ -106,10 +114,10 @@ def _row(results: Sequence[Result], result: Result) -> str:
     return f"{result.label}, {result.inverse}" if several else result.label
 
 
-def _names(results: Sequence[Result]) -> tuple[list[str], list[str]]:
-    """Rows and references in the order of the results."""
+def _names(results: Sequence[Result], across: Across) -> tuple[list[str], list[str]]:
+    """Rows and columns in the order of the results."""
     rows = dict.fromkeys(_row(results, result) for result in results)
-    return list(rows), list(dict.fromkeys(result.reference for result in results))
+    return list(rows), list(dict.fromkeys(getattr(result, across) for result in results))
 
 
 def _cells(axes: Axes, values: Array, norm: LogNorm) -> AxesImage:

@@ -17,12 +17,24 @@ BLACK, GREY, LIGHT = "#000000", "#7F7F7F", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 """Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
+INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
+"""From Tol's muted scheme, for what Okabe and Ito's eight do not reach."""
 
 WIDTH = 7.0
 """Width of a figure [in]; text is 9 to 10 points."""
 
-_CONTROLLERS = {"smc": BLUE, "pid": VERMILLION, "computed-torque": GREEN, "feedforward": GREY}
-_OTHERS = (ORANGE, SKY, PURPLE)
+_CONTROLLERS = {
+    "smc": BLUE,
+    "pid": VERMILLION,
+    "mrac": ORANGE,
+    "gvsc": SKY,
+    "nc": PURPLE,
+    "smc-tracking": INDIGO,
+    "super-twisting": WINE,
+    "computed-torque": GREEN,
+    "feedforward": GREY,
+}
+_OTHERS = (OLIVE, FOREST, ROSE)
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",

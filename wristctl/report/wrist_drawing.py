@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -22,31 +22,12 @@ from wristctl.config.wrist import WristParameters
 from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
 from wristctl.report.wrist_shape import Planar, backbone, beside, coil, discs, hand
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
 
 Array = NDArray[np.float64]
 
 RIM = 1.25
 """Radius of the drawn discs over that of the circle of tendons."""
-
-
-class Direction(NamedTuple):
-    """One of the four anatomical directions: its bending plane, the sign of theta and the tendons that pull."""
-
-    name: str
-    plane: str
-    """Name of +y in the bending plane."""
-    sign: int
-    tendons: tuple[int, int]
-
-
-DIRECTIONS = (
-    Direction("ulnar", "ulnar", 1, (4, 5)),
-    Direction("radial", "ulnar", -1, (1, 2)),
-    Direction("flexion", "flexion", 1, (2, 5)),
-    Direction("extension", "flexion", -1, (1, 4)),
-)
-TENDONS = {1: (-1, -1), 2: (-1, 1), 3: (0, 0), 4: (1, -1), 5: (1, 1)}
-"""Places in the cross-section, +X ulnar and +Y flexion, in units of the tendon offset c."""
 
 
 def draw_wrist(
@@ -78,7 +59,7 @@ def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Fig
     """The wrist bent by `angle` [rad] in the four directions, with the tendons that pull; cross-sections below."""
     made, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
     reach = 1e3 * (wrist.length + 2.0 * wrist.hand_offset)
-    for direction, above, below in zip(DIRECTIONS, *axes, strict=True):
+    for direction, above, below in zip(DIRECTIONS.values(), *axes, strict=True):
         theta, (first, second) = direction.sign * angle, direction.tendons
         draw_wrist(above, np.array([theta]), wrist, direction.sign, direction.plane == "flexion")
         title(above, f"{direction.name}, {math.degrees(theta):+.3g} deg\ntendons {first} and {second} pull")

@@ -25,7 +25,7 @@ from wristctl.wrist.tendons import lengths, moment_arms
 
 Array = NDArray[np.float64]
 
-IDEAL, LAGGED, TENDON = 0, 1, 2
+LAGGED, TENDON = 1, 2
 
 _SLIDING = 5e-3
 """Speed [m/s] at which friction is fully developed."""
@@ -43,11 +43,13 @@ class Drive(NamedTuple):
     acceleration: float
 
 
-def drive_of(actuator: Actuator) -> Drive:
-    """The kernel's view of an actuator section."""
+def drive_of(actuator: Actuator) -> Drive | None:
+    """The kernel's view of an actuator section; None where tensions are as commanded, and nothing is compiled in."""
+    if actuator.level == "ideal":
+        return None
     step = actuator.step_length
     return Drive(
-        level=("ideal", "lagged", "tendon").index(actuator.level),
+        level={"lagged": LAGGED, "tendon": TENDON}[actuator.level],
         lag=actuator.lag,
         stiffness=TENDONS_PER_SIDE * actuator.tendon_stiffness,
         friction=actuator.friction,
@@ -57,10 +59,10 @@ def drive_of(actuator: Actuator) -> Drive:
     )
 
 
-def at_rest(drive: Drive, wrist: WristParameters, theta: Array) -> Array:
+def at_rest(drive: Drive | None, wrist: WristParameters, theta: Array) -> Array:
     """State of both sides at pretension with segments at theta (n,): pull or reeled length, then speed; (4,)."""
     pull, n = TENDONS_PER_SIDE * wrist.pretension, len(theta)
-    if drive.level != TENDON:
+    if drive is None or drive.level != TENDON:
         return np.array([pull, 0.0, pull, 0.0])
     taut = terms(segments(wrist, n), theta, 0.0 * theta).tendon_lengths.sum(axis=0)
     plus, minus = pull / drive.stiffness + wrist.length - taut
@@ -94,18 +96,21 @@ def _reel(drive: Any, state: Any, side: int, target: Any, h: float) -> Any:
 @compiled
 def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
     """What both sides deliver over one control period to commanded pulls [N]: pulls, or reeled lengths [m] (tendon)."""
+    if drive is None:
+        return plus, minus
     if drive.level == LAGGED:
-        plus, minus = _lag(drive, state, 0, plus, h), _lag(drive, state, 2, minus, h)
-    elif drive.level == TENDON:
-        path_plus, path_minus = lengths(theta_ref, known)
-        plus = _reel(drive, state, 0, plus / drive.stiffness + known.length - path_plus, h)
-        minus = _reel(drive, state, 2, minus / drive.stiffness + known.length - path_minus, h)
-    return plus, minus
+        return _lag(drive, state, 0, plus, h), _lag(drive, state, 2, minus, h)
+    path_plus, path_minus = lengths(theta_ref, known)
+    reeled_plus = _reel(drive, state, 0, plus / drive.stiffness + known.length - path_plus, h)
+    reeled_minus = _reel(drive, state, 2, minus / drive.stiffness + known.length - path_minus, h)
+    return reeled_plus, reeled_minus
 
 
 @compiled
-def pulls(drive: Any, segment: Any, theta: Any, omega: Any, friction: float, plus: Any, minus: Any) -> Any:
-    """Pulls [N] of both sides on a wrist at theta, omega from what they deliver."""
+def pulls(drive: Any, segment: Any, theta: Any, omega: Any, rubbing: float, plus: Any, minus: Any) -> Any:
+    """Pulls [N] of both sides on a wrist at theta, omega from what they deliver, with this share of the friction."""
+    if drive is None:
+        return plus, minus
     if drive.level != TENDON:
         return plus, minus
     zero = 0.0 * plus
@@ -118,9 +123,19 @@ def pulls(drive: Any, segment: Any, theta: Any, omega: Any, friction: float, plu
         bend = bend + abs(theta[k])
         slide_plus = slide_plus + arm_plus * omega[k]
         slide_minus = slide_minus + arm_minus * omega[k]
-    wrapped = 0.5 * friction * bend
+    wrapped = 0.5 * rubbing * drive.friction * bend
     x_plus, x_minus = wrapped * tanh(slide_plus / _SLIDING), wrapped * tanh(slide_minus / _SLIDING)
     # (1 - x/2)/(1 + x/2) is the capstan's exp(-x) to x^3/12
     plus = drive.stiffness * maximum(plus, zero) * (1.0 - x_plus) / (1.0 + x_plus)
     minus = drive.stiffness * maximum(minus, zero) * (1.0 - x_minus) / (1.0 + x_minus)
     return plus, minus
+
+
+@compiled
+def tendon_stiffness(drive: Any, segment: Any, theta: Any) -> Any:
+    """Stiffness [N m/rad] that elastic tendons on held spools add to one segment at theta; 0 without them."""
+    if drive is None:
+        return 0.0 * theta
+    arm_plus, arm_minus = moment_arms(theta, segment)
+    held = drive.stiffness if drive.level == TENDON else 0.0
+    return held * (arm_plus * arm_plus + arm_minus * arm_minus)

@@ -22,12 +22,10 @@ class Frames(NamedTuple):
 
 
 def frames(sensor: Sensor, period: float, horizon: float, seeds: NDArray[np.int64]) -> Frames:
-    """The frames of a rollout of `horizon` [s] with this control period [s]; none if the sensor is ideal.
+    """The frames of rollouts of `horizon` [s] with this control period [s].
 
     Every seed of `seeds` (count,) has its own stream beside the sensor's, whatever stands beside it in the batch.
     """
-    if sensor.level == "ideal":
-        return Frames(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2, len(seeds))))
     times = np.arange(int(horizon * sensor.frame_rate) + 1) / sensor.frame_rate
     captures = np.rint(times / period).astype(np.int64)
     delay = int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))

@@ -13,24 +13,22 @@ from wristctl.wrist.segments import Segments
 
 Array = NDArray[np.float64]
 
-_FORCE, _STIFFNESS = Segments._fields.index("force_y"), Segments._fields.index("stiffness")
 
-
-def disturb(disturbances: Disturbances, time: Array) -> Array:
-    """Tip force across the straight wrist [N] and stiffness over the plant's own, (T, 2); (0, 2) if nothing acts."""
-    if disturbances == Disturbances():
-        return np.zeros((0, 2))
-    force, scale = np.full_like(time, disturbances.load), np.ones_like(time)
-    if (push := disturbances.push) is not None:
-        phase = (time - push.start) / push.duration
-        force += np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
-    if (drift := disturbances.drift) is not None:
-        scale += (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
+def course(disturbances: Disturbances, time: Array) -> Array | None:
+    """Tip force across the straight wrist [N] and stiffness over the plant's own, (T, 2); None if nothing acts."""
+    push, load, drift = disturbances.push, disturbances.load, disturbances.drift
+    if push.force == load == 0.0 and drift.scale == 1.0:
+        return None
+    phase = (time - push.start) / push.duration
+    force = load + np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
+    scale = 1.0 + (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
     return np.stack([force, scale], axis=1)
 
 
 @compiled
-def apply(plant: Any, own_stiffness: Any, force: float, scale: float) -> None:
-    """Write one sample's disturbance into the plant's rows."""
-    plant[_FORCE] = force + 0.0 * own_stiffness
-    plant[_STIFFNESS] = scale * own_stiffness
+def disturb(own: Any, force: float, scale: float) -> Any:
+    """The plant under one sample's disturbance."""
+    return Segments(
+        own.length, own.mass, own.hand_mass, own.hand_offset, own.gravity_x, own.gravity_y, own.tendon_offset,
+        own.spans, scale * own.stiffness, own.damping, own.force_x, force + own.force_y,
+    )  # fmt: skip

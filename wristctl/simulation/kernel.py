@@ -12,8 +12,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import TENDON, actuate, pulls
-from wristctl.simulation.disturbances import apply
+from wristctl.simulation.actuator import actuate, pulls
+from wristctl.simulation.disturbances import disturb
 from wristctl.simulation.metrics import SUMS, gather, goals_of
 from wristctl.simulation.observer import expect, observe
 from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate, reach, torque_of
@@ -42,11 +42,12 @@ def run_block(
 
     `reference` is [sample, (angle, rate, acceleration), lane], continued between samples by its own derivatives;
     `state`, `memory` and `sums` carry the loop on, so that a long run may be done in pieces. `record` takes each
-    sample's values, or has no samples. `drive` and its state `motors` are the actuators, `observer` has no frames where
-    the sensor is ideal, `disturbed` holds (tip force, stiffness scale) of each sample or nothing. A lane leaves the
-    game when a segment bends beyond a full turn.
+    sample's values, or has no samples. `drive` with its state `motors` are the actuators, `observer` stands behind a
+    camera, `disturbed` holds (tip force, stiffness scale) of each sample; each of the three is None where it is ideal
+    or absent, and then not compiled in. A lane leaves the game when a segment bends beyond a full turn.
     """
-    own_stiffness = load_segments(rows_of(plant)).stiffness
+    undisturbed = load_segments(rows_of(plant))
+    wrist = undisturbed
     motor = rows_of(motors)
     known, seen, view = load_segments(rows_of(model)), wrist_of(model), now_of(now)
     bound, gain, goal, kept, sum_ = rows_of(limits), rows_of(gains), goals_of(goals), rows_of(memory), rows_of(sums)
@@ -59,9 +60,8 @@ def run_block(
     h = period / substeps + zero
     for sample in range(first, last):
         target = rows_of(reference[sample])
-        if sample < disturbed.shape[0]:
-            apply(rows_of(plant), own_stiffness, disturbed[sample, 0], disturbed[sample, 1])
-        wrist = load_segments(rows_of(plant))
+        if disturbed is not None:
+            wrist = disturb(undisturbed, disturbed[sample, 0], disturbed[sample, 1])
         for tick in range(ticks):
             since = tick * period
             angle, rate = zero, zero
@@ -70,7 +70,7 @@ def run_block(
                 rate = rate + omega[i]
             angle_seen, rate_seen = angle, rate
             now_tick = sample * ticks + tick
-            if len(observer.captures) > 0:
+            if observer is not None:
                 observe(observer, drive, known, now_tick, angle, period)
                 angle_seen, rate_seen = rows_of(observer.now)[0], rows_of(observer.now)[1]
             torque_low, torque_high = reach(angle_seen, known, low, high)
@@ -85,7 +85,7 @@ def run_block(
             wanted = law(view, seen, gain, kept)
             plus, minus = allocate(angle_seen, known, wanted, low, high)
             given_plus, given_minus = actuate(drive, motor, known, signals[2], plus, minus, period)
-            acting_plus, acting_minus = pulls(drive, wrist, theta, omega, drive.friction, given_plus, given_minus)
+            acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
             gather(sum_, goal, time, angle, signals[2], acting_plus / _SIDE, acting_minus / _SIDE, saturated)
@@ -102,15 +102,14 @@ def run_block(
                 row[8] = angle_seen
                 for i in range(n):
                     row[_COLUMNS + i] = theta[i]
-            if len(observer.captures) > 0:
+            if observer is not None:
                 expect(observer, drive, known, now_tick, given_plus, given_minus, period)
             for _ in range(substeps):
                 for i in range(n):
                     old_theta[i] = theta[i]
                     old_omega[i] = omega[i]
-                if drive.level == TENDON:
-                    acting = pulls(drive, wrist, theta, omega, drive.friction, given_plus, given_minus)
-                    acting_plus, acting_minus = acting
+                if drive is not None:
+                    acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
                 step(wrist, theta, omega, acting_plus, acting_minus, h)
                 alive = sum_[_ALIVE]
                 for i in range(n):

@@ -19,11 +19,10 @@ from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.lanes.types import LANES
-from wristctl.simulation.actuator import TENDON, Drive, at_rest, pulls
-from wristctl.simulation.camera import Frames
+from wristctl.simulation.actuator import Drive, at_rest, pulls, tendon_stiffness
+from wristctl.simulation.camera import frames
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import moment_arms
 
 Array = NDArray[np.float64]
 
@@ -56,9 +55,7 @@ def predict(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> 
     pull_plus, pull_minus = pulls(drive, known, theta, rate, 0.0, plus, minus)
     inertia, resisting = one_segment(known, angle, speed)
     stiffness = known.stiffness + 0.0 * angle
-    if drive.level == TENDON:
-        arm_plus, arm_minus = moment_arms(angle, known)
-        stiffness = stiffness + drive.stiffness * (arm_plus * arm_plus + arm_minus * arm_minus)
+    stiffness = stiffness + tendon_stiffness(drive, known, angle)
     push = torque_of(angle, known, pull_plus, pull_minus) + load - resisting - h * stiffness * speed
     speed = speed + h * push / (inertia + h * known.damping + h * h * stiffness)
     x[0] = angle + h * speed
@@ -107,7 +104,7 @@ def _predict_rows(drive: Any, model: Any, states: Any, plus: float, minus: float
     predict(drive, known, x, plus + 0.0 * x[0], minus + 0.0 * x[0], h)
 
 
-def stationary_gain(sensor: Sensor, drive: Drive, wrist: WristParameters, period: float) -> Array:
+def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters, period: float) -> Array:
     """The Kalman gain (3,) for one frame after another, from the prediction linearised where the wrist is straight."""
     delivered = at_rest(drive, wrist, np.zeros(1))[[0, 2]]
     small = 1e-6
@@ -130,12 +127,39 @@ def stationary_gain(sensor: Sensor, drive: Drive, wrist: WristParameters, period
     return gain
 
 
-def observer_of(seen: Frames, readings: Array, gain: Array, theta: Array) -> Observer:
-    """A block's observer at the start, with its readings (F, 2, LANES); it knows the angles (n,) at which it starts."""
-    delay = int((seen.arrivals - seen.captures).max(initial=0) + np.diff(seen.captures).max(initial=1)) + 2
+def observers_of(
+    sensor: Sensor,
+    drive: Drive | None,
+    wrist: WristParameters,
+    period: float,
+    horizon: float,
+    seeds: NDArray[np.int64],
+    theta: Array,
+) -> list[Observer] | list[None]:
+    """One observer for each block of the rollouts with these seeds (count,); None for each where the sensor is ideal.
+
+    They know the angles (n,) at which the wrist starts.
+    """
+    count, blocks = len(seeds), -(-len(seeds) // LANES)
+    if sensor.level == "ideal":
+        return [None] * blocks
+    taken = frames(sensor, period, horizon, seeds)
+    gain = stationary_gain(sensor, drive, wrist, period)
+    longest = int((taken.arrivals - taken.captures).max() + np.diff(taken.captures).max(initial=1)) + 2
     start = np.zeros((3, LANES))
     start[0] = theta.sum()
-    return Observer(
-        seen.captures, seen.arrivals, np.ascontiguousarray(readings), gain, np.zeros((delay, 2, LANES)),
-        np.zeros((len(seen.captures), LANES)), start, start.copy(), np.zeros(3, np.int64),
-    )  # fmt: skip
+    lanes = np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
+    return [
+        Observer(
+            captures=taken.captures,
+            arrivals=taken.arrivals,
+            readings=np.ascontiguousarray(taken.readings[..., members]),
+            gain=gain,
+            delivered=np.zeros((longest, 2, LANES)),
+            pictures=np.zeros((len(taken.captures), LANES)),
+            fused=start.copy(),
+            now=start.copy(),
+            clock=np.zeros(3, np.int64),
+        )
+        for members in lanes
+    ]

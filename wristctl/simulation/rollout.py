@@ -17,11 +17,10 @@ from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import at_rest, drive_of
-from wristctl.simulation.camera import frames
-from wristctl.simulation.disturbances import disturb
+from wristctl.simulation.disturbances import course
 from wristctl.simulation.kernel import RECORDED, run_block
 from wristctl.simulation.metrics import SUMS, summary
-from wristctl.simulation.observer import observer_of, stationary_gain
+from wristctl.simulation.observer import observers_of
 from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion
 from wristctl.wrist.segments import segments
@@ -90,30 +89,27 @@ def rollout(
     rest = np.zeros(n) if start is None else start
     drive, period = drive_of(loop.actuator), loop.control_period
     motors_at_rest = np.repeat(at_rest(drive, plant_of(wrist, loop.plant), rest)[:, None], LANES, axis=1)
-    disturbed = disturb(loop.disturbances, motions[0].time)
-    seen = frames(loop.sensor, period, motions[0].horizon, np.zeros(count, np.int64) if seeds is None else seeds)
-    gain = stationary_gain(loop.sensor, drive, wrist, period) if len(seen.captures) else np.zeros(3)
-    lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
-    table = np.stack([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions], axis=-1)
-    total = len(lanes)
+    disturbed = course(loop.disturbances, motions[0].time)
+    references = _References(motions, which)
+    total = len(blocks["gains"])
+    streams = np.zeros(count, np.int64) if seeds is None else seeds
+    observers = observers_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest)
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
     stop, done = threading.Event(), [0] * total
 
     def run(block: int) -> None:
-        reference = np.ascontiguousarray(table[..., lanes[block]])
+        reference = references.of(block)
         state = np.repeat(np.concatenate([rest, 0.0 * rest])[:, None], LANES, axis=1)
         memory, now = np.zeros((max(1, controller.memory), LANES)), np.zeros((len(NOW), LANES))
-        members = np.minimum(np.arange(block * LANES, (block + 1) * LANES), count - 1)
-        observer = observer_of(seen, seen.readings[..., members], gain, rest)
-        own_plant, motors = plant.copy(), motors_at_rest.copy()
+        motors = motors_at_rest.copy()
         piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
             run_block(
-                controller.compiled, own_plant, model, limits, blocks["gains"][block], blocks["goals"][block],
-                reference, now, memory, state, blocks["sums"][block], recorded[block], drive, motors, observer,
-                disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
+                controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block],
+                reference, now, memory, state, blocks["sums"][block], recorded[block], drive, motors,
+                observers[block], disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
             )  # fmt: skip
             done[block] = min(first + piece, samples)
 
@@ -131,3 +127,23 @@ def rollout(
     kept = recorded.transpose(0, 3, 1, 2).reshape(total * LANES, -1, len(RECORDED) + n)[:count] if record else None
     metrics = summary(sums, goal_rows, loop.control_period)
     return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)
+
+
+class _References:
+    """The references of each block, [sample, (angle, rate, acceleration), lane]; alike blocks share one."""
+
+    def __init__(self, motions: Sequence[Motion], which: NDArray[np.int64]) -> None:
+        courses = [np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions]
+        self._table = np.stack(courses, axis=-1)
+        lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
+        self._patterns, self._pattern, self._uses = np.unique(lanes, axis=0, return_inverse=True, return_counts=True)
+        self._shared: dict[int, Array] = {}
+
+    def of(self, block: int) -> Array:
+        pattern = int(self._pattern[block])
+        if pattern in self._shared:
+            return self._shared[pattern]
+        made = np.ascontiguousarray(self._table[..., self._patterns[pattern]])
+        if self._uses[pattern] > 1:
+            self._shared[pattern] = made
+        return made

@@ -15,6 +15,7 @@ from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
 from wristctl.simulation.trajectory import Trajectory, desired_errors
+from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse, chain_tip
 from wristctl.wrist.statics import equilibrium
 
@@ -69,12 +70,15 @@ def simulate(
     chosen = study.simulate
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    followed = motion(chosen.reference, study.wrist, chosen.horizon, sample_period(chosen.loop), network)
+    wrist, reference = in_plane(study.wrist, chosen.direction), chosen.reference
+    if DIRECTIONS[chosen.direction].sign < 0:
+        reference = reference.mirrored()
+    followed = motion(reference, wrist, chosen.horizon, sample_period(chosen.loop), network)
     start = None
     if chosen.start == "equilibrium":
-        plant = plant_of(study.wrist, chosen.loop.plant)
+        plant = plant_of(wrist, chosen.loop.plant)
         start = equilibrium(plant, chosen.loop.plant_segments, (plant.pretension, plant.pretension))
     which = np.zeros(1, np.int64)
-    outcome = rollout(law, gains, [followed], which, chosen.loop, study.wrist, start, record=True)
+    outcome = rollout(law, gains, [followed], which, chosen.loop, wrist, start, record=True)
     name = chosen.gains if isinstance(chosen.gains, str) else "given"
-    return simulation(outcome, 0, followed, study.wrist, f"{law.name}/{name}")
+    return simulation(outcome, 0, followed, wrist, f"{law.name}/{name}")

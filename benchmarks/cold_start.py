@@ -1,0 +1,89 @@
+"""What a user waits for at first: imports, and each command with an empty and with a filled cache of compiled kernels.
+
+`python benchmarks/cold_start.py` prints a table; `--out FILE` writes JSON as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+STUDY = """\
+gen-data: {samples: 1000}
+train: {epochs: 20}
+tune: {controllers: [smc], candidates: 8, iterations: 2}
+compare: {rows: [{controller: smc, gains: initial}], inverses: [exact]}
+"""
+COMMANDS: dict[str, list[str]] = {
+    "--help": [],
+    "gen-data": ["STUDY"],
+    "train": ["STUDY", "--data", "latest:gen-data"],
+    "simulate": [],
+    "tune": ["STUDY"],
+    "compare": ["STUDY"],
+}
+"""Each command's smallest run, in this order; train needs gen-data's."""
+
+
+def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
+    """Wall time of one command and, from its events, until its first report of progress beyond nothing."""
+    arguments = [str(folder / "study.yaml") if word == "STUDY" else word for word in COMMANDS[command]]
+    out = [] if command == "--help" else ["--out", str(folder / "results")]
+    start = time.time()
+    begun = time.perf_counter()
+    program = [sys.executable, "-c", "from wristctl.cli.app import main; main()"]
+    process = subprocess.Popen(
+        [*program, command, *arguments, *out], cwd=folder, text=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env={**os.environ, "XDG_CACHE_HOME": str(cache)},
+    )  # fmt: skip
+    assert process.stderr is not None
+    first, said = None, []
+    for line in process.stderr:
+        said.append(line)
+        if first is None and re.search(r"\b[1-9]\d*\s*(/|of)\s*\d+|compil|simulat", line):
+            first = time.time() - start
+    if process.wait() != 0:
+        raise RuntimeError(f"wristctl {command}: {''.join(said)}")
+    return {"whole": time.perf_counter() - begun, **({"first_progress": first} if first is not None else {})}
+
+
+def import_seconds(command: str) -> float:
+    """Time to import the module of one command."""
+    module = "wristctl.cli.app" if command == "--help" else f"wristctl.cli.{command.replace('-', '_')}"
+    code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+    return float(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout)
+
+
+def main() -> None:
+    """Measure every command twice, cache empty and filled."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, help="JSON file to write")
+    options = parser.parse_args()
+    rows = {}
+    print(f"{'command':10} {'import s':>9} {'first s':>9} {'again s':>9} {'progress, first s':>18} {'again s':>9}")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "study.yaml").write_text(STUDY)
+        for command in COMMANDS:
+            cache = folder / f"cache-{command.strip('-')}"  # of its own: what another command compiled is no help
+            first, again = (seconds_of(command, folder, cache) for _ in range(2))
+            rows[command] = {"import": import_seconds(command), "first": first, "again": again}
+            progress = [f"{run['first_progress']:.2f}" if "first_progress" in run else "-" for run in (first, again)]
+            print(
+                f"{command:10} {rows[command]['import']:9.2f} {first['whole']:9.2f} {again['whole']:9.2f} "
+                f"{progress[0]:>18} {progress[1]:>9}",
+                flush=True,
+            )
+    if options.out:
+        options.out.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""The plain loop in C, compiled for this machine, 16 lanes side by side or the width that C_LANES says."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from equations import SERIES2, SERIES3
+from task import Task
+
+SOURCES = Path(__file__).resolve().parents[1] / "c"
+FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC", "-pthread")
+SUMS = 19
+_DOUBLES = ctypes.POINTER(ctypes.c_double)
+_ARRAYS = ("reference", "gains", "state", "sums", "record")
+
+
+class _Work(ctypes.Structure):
+    """struct work of loop.cpp."""
+
+    _fields_ = [
+        *((name, _DOUBLES) for name in ("plant", "model")),
+        *((name, ctypes.c_double) for name in ("low", "high", "last", "move", "rest", "horizon")),
+        *((name, _DOUBLES) for name in _ARRAYS),
+        ("period", ctypes.c_double),
+        *((name, ctypes.c_int) for name in ("rollouts", "ticks", "substeps", "next")),
+    ]
+
+
+def _library(segments: int, width: int) -> ctypes.CDLL:
+    """Compile, or take what was compiled from the same sources."""
+    series = [f"-DSERIES{k}=" + ",".join(map(repr, s)) for k, s in ((2, SERIES2), (3, SERIES3))]
+    options = [*FLAGS, f"-DSEGMENTS={segments}", f"-DLANES={width}", *series]
+    text = "".join(path.read_text() for path in sorted(SOURCES.iterdir())) + " ".join(options)
+    folder = Path(os.environ["PEERS_CACHE"]) / "c"
+    folder.mkdir(parents=True, exist_ok=True)
+    built = folder / f"loop-{hashlib.sha256(text.encode()).hexdigest()[:16]}.so"
+    if not built.exists():
+        subprocess.run(["g++", *options, str(SOURCES / "loop.cpp"), "-o", str(built)], check=True)
+    return ctypes.CDLL(str(built))
+
+
+def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int], np.ndarray]:
+    """One lane runs in a build one lane wide."""
+    library = _library(task.segments, 1 if lanes == 1 else int(os.environ.get("C_LANES", "16")))
+    final = float(task.reference[-1, 0])
+
+    def run(ticks: int) -> np.ndarray:
+        arrays = {
+            "plant": task.plant, "model": task.model, "reference": np.ascontiguousarray(task.reference),
+            "gains": np.tile(task.gains, (lanes, 1)), "state": np.empty((lanes, 2 * task.segments)),
+            "sums": np.empty((lanes, SUMS)), "record": np.empty(ticks),
+        }  # fmt: skip
+        pointers = {name: array.ctypes.data_as(_DOUBLES) for name, array in arrays.items()}
+        work = _Work(
+            low=task.low, high=task.high, last=final, move=abs(final), rest=task.rest, horizon=ticks * task.period,
+            period=task.period, rollouts=lanes, ticks=ticks, substeps=steps, **pointers,
+        )  # fmt: skip
+        library.run(ctypes.byref(work), threads)
+        return arrays["record"]
+
+    return run

@@ -1,0 +1,34 @@
+"""The documents say what the message table and the pins say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from wristctl.hardware.dictionary import load
+
+DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
+FIRMWARE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware"
+TABLE = load()
+
+
+@pytest.mark.parametrize("group", ["faults", "results", "states"])
+def test_each_fault_refusal_and_state_is_explained_in_the_tables_words(group: str) -> None:
+    text = (DOCUMENTS / "faults.md").read_text()
+    for name, entry in TABLE[group].items():
+        if name == "OK":
+            continue
+        words = [name, entry["meaning"], *([entry["fix"]] if "fix" in entry else [])]
+        assert "| " + " | ".join(words) + " |" in text
+
+
+def test_wiring_names_the_pins_the_firmware_uses() -> None:
+    text, pins = (DOCUMENTS / "wiring.md").read_text(), (FIRMWARE / "pins.h").read_text()
+    for port, first in (("A", 22), ("C", 37)):
+        for bit in range(8 if port == "A" else 4):
+            digital = first + bit if port == "A" else first - bit
+            assert f"D{digital} (P{port}{bit})" in text
+            assert re.search(rf"P{port}{bit}\b", pins) and re.search(rf"\bD{digital}\b", pins)
+    assert "D41 (PG0)" in text and "D13 (PB7)" in text

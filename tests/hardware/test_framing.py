@@ -1,0 +1,80 @@
+"""Frames, against the `cobs` package and a bitwise CRC."""
+
+from __future__ import annotations
+
+from cobs import cobs
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wristctl.hardware.framing import LONGEST, Decoder, Frame, crc, encode, stuff, unstuff
+
+BYTES = st.binary(max_size=LONGEST)
+FRAMES = st.builds(Frame, st.integers(0, 255), st.integers(0, 255), st.binary(max_size=LONGEST - 4))
+
+
+def crc_bit_by_bit(data: bytes) -> int:
+    register = 0xFFFF
+    for byte in data:
+        for place in range(7, -1, -1):
+            bit = (register >> 15) ^ (byte >> place & 1)
+            register = (register << 1 & 0xFFFF) ^ 0x1021 * bit
+    return register
+
+
+@given(BYTES.filter(bool))
+def test_stuffing_is_that_of_the_cobs_package(data: bytes) -> None:
+    assert stuff(data) == cobs.encode(data)
+    assert unstuff(stuff(data)) == data
+
+
+@given(st.binary(min_size=1, max_size=LONGEST).filter(lambda data: 0 not in data))
+def test_unstuffing_accepts_what_the_cobs_package_accepts(data: bytes) -> None:
+    try:
+        expected: bytes | None = cobs.decode(data)
+    except cobs.DecodeError:
+        expected = None
+    try:
+        found: bytes | None = unstuff(data)
+    except ValueError:
+        found = None
+    assert found == expected
+
+
+@given(BYTES)
+def test_crc_is_ccitt_false(data: bytes) -> None:
+    assert crc(data) == crc_bit_by_bit(data)
+
+
+def test_crc_of_the_catalogues_check_string() -> None:
+    assert crc(b"123456789") == 0x29B1
+
+
+@given(st.lists(FRAMES, max_size=5), st.data())
+def test_frames_come_through_in_whatever_pieces_they_arrive(frames: list[Frame], data: st.DataObject) -> None:
+    stream = b"".join(encode(*frame) for frame in frames)
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    decoder = Decoder()
+    pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
+    assert [frame for piece in pieces for frame in decoder.feed(piece)] == frames
+    assert decoder.bad_frames == decoder.bad_crc == 0
+
+
+@given(st.binary(max_size=60), FRAMES)
+def test_garbage_before_a_frame_does_not_swallow_it(garbage: bytes, frame: Frame) -> None:
+    assert Decoder().feed(garbage + encode(*frame))[-1] == frame
+
+
+@given(FRAMES, st.data())
+def test_a_flipped_bit_never_gives_another_frame(frame: Frame, data: st.DataObject) -> None:
+    wire = bytearray(encode(*frame))
+    wire[data.draw(st.integers(1, len(wire) - 2))] ^= 1 << data.draw(st.integers(0, 7))
+    decoder = Decoder()
+    assert decoder.feed(bytes(wire)) == []
+    assert decoder.bad_frames + decoder.bad_crc >= 1
+
+
+def test_an_endless_frame_does_not_fill_the_memory() -> None:
+    decoder = Decoder()
+    for _ in range(100):
+        decoder.feed(b"\x55" * 1000)
+    assert len(decoder._part) <= 2 * LONGEST

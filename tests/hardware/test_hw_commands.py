@@ -1,0 +1,127 @@
+"""`wristctl hw` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+WRISTCTL = [sys.executable, "-c", "from wristctl.cli.app import main; main()", "hw"]
+BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "120"}
+
+Served = Callable[..., str]
+
+
+def hw(*arguments: str, typed: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*WRISTCTL, *arguments], capture_output=True, text=True, env=ENVIRONMENT, input=typed)
+
+
+@pytest.fixture
+def emulate(tmp_path: Path) -> Iterator[Served]:
+    """Starts `hw emulate` and gives the port it prints."""
+    started = []
+
+    def start(*arguments: str) -> str:
+        said = (tmp_path / "stderr").open("w")
+        command = [*WRISTCTL, "emulate", *arguments]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, env=ENVIRONMENT)
+        started.append(child)
+        assert child.stdout is not None
+        return child.stdout.readline().strip()
+
+    yield start
+    for child in started:
+        child.terminate()
+        assert child.wait(10) == 130
+
+
+@pytest.mark.parametrize("how", [[], ["--tcp", "0"]], ids=["pty", "tcp"])
+def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, how: list[str]) -> None:
+    port = emulate(*how)
+    done = hw("check", "--port", port, "--rounds", "20", "--json", "-q")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["port"] == port and told["firmware"] == "1.0.0" and told["state"] == "DISABLED"
+    assert [each["command"] for each in told["round_trips_s"]] == ["PING", "STATUS"]
+    assert told["counters"]["uart_errors"] == 0
+
+
+def test_stop_latches_a_fault_beside_a_running_program(emulate: Served) -> None:
+    port = emulate()
+    holder = f"""
+import sys, time
+from wristctl.hardware.board import Board
+from wristctl.hardware.errors import Faulted, NoAnswer
+from wristctl.hardware.transport import SerialTransport
+with Board(SerialTransport({port!r}, 250_000)) as board:
+    board.enable(); board.home(); print("moving", flush=True)
+    try:
+        while True:
+            board.turn((500, 0, 0, 0)); time.sleep(0.01)
+    except Faulted as error:
+        print(error.faults.name, flush=True)
+"""
+    with subprocess.Popen([sys.executable, "-c", holder], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as mover:
+        assert mover.stdout is not None and mover.stdout.readline() == "moving\n"
+        hw("stop", "--port", port)  # its answer may go to either program
+        assert "ESTOP_COMMAND" in mover.stdout.readline()
+
+
+def test_an_axis_moves_only_after_a_typed_yes() -> None:
+    told = [
+        hw("check", "--port", "emulated", "--rounds", "1", "--wiring", "2", "--json", typed=typed)
+        for typed in ("yes\n", "y\n", "")
+    ]
+    assert told[0].returncode == 0 and json.loads(told[0].stdout)["position"] == [0, 0, 0, 0]
+    assert told[1].returncode == 3 and "nothing was moved" in told[1].stderr
+    assert told[2].returncode in (3, 130)
+
+
+def test_without_a_board_check_says_how_to_go_on() -> None:
+    done = hw("check", "--port", "/dev/no-such-port")
+    assert done.returncode == 4 and done.stdout == ""
+    assert done.stderr.startswith("error: host: there is no such port") and "hw ports" in done.stderr
+
+
+def test_ports_are_listed_for_people_and_programs() -> None:
+    assert hw("ports").returncode == 0
+    assert json.loads(hw("ports", "--json").stdout)["schema"] == "wristctl.ports/1"
+
+
+def test_finding_a_board_that_was_not_unplugged_fails_and_says_so() -> None:
+    done = hw("ports", "--find", typed="\n")
+    assert done.returncode == 4 and "no port went away" in done.stderr
+
+
+def test_flash_refuses_an_image_that_is_not_there() -> None:
+    done = hw("flash", "--port", "/dev/null", "--image", "none.hex")
+    assert done.returncode == 2 and "none.hex" in done.stderr
+
+
+@pytest.mark.skipif(not (BOOT_LOADER.exists() and shutil.which("avrdude")), reason="needs avrdude and arduino-core-avr")
+def test_flash_writes_the_firmware_through_the_stock_boot_loader(emulate: Served, tmp_path: Path) -> None:
+    empty = tmp_path / "empty.hex"
+    empty.write_text(":00000001FF\n")
+    port = emulate("--image", str(empty), "--boot-loader", str(BOOT_LOADER))
+    done = hw("flash", "--port", port)
+    assert done.returncode == 0, done.stderr
+    assert "written, verified and answering" in done.stdout
+    assert "bytes of flash verified" in done.stderr
+
+
+def test_a_compiled_emulator_starts_within_a_second_of_processor_time() -> None:
+    start = "from wristctl.hardware.emulator import Atmega2560; Atmega2560().run(1)"
+    code = f"import time; {start}; print(time.process_time())"
+    took = [
+        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT).stdout)
+        for _ in range(3)
+    ]
+    assert min(took[1:]) < 1.0

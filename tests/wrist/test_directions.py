@@ -1,0 +1,48 @@
+"""The four directions: what the paper assumes of them, and where it ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.benchmark.compare import compare
+from wristctl.config.load import load_study
+from wristctl.config.wrist import WristParameters
+from wristctl.wrist.directions import DIRECTIONS, TENDONS, in_plane
+
+SETTINGS = (
+    "rows=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8", "loops={default: {}}",
+    "references=[{duration: 0.5}]", "directions=[ulnar, radial, flexion, extension]",
+)  # fmt: skip
+
+
+def courses(*settings: str) -> dict[str, np.ndarray]:
+    found = compare(load_study([], [*SETTINGS, *settings], "compare"))
+    return {r.reference.split(", ")[1]: r.simulation.trajectory.theta for r in found}
+
+
+def test_upright_all_four_directions_are_the_same_move() -> None:
+    """The symmetry that the paper assumes."""
+    theta = courses()
+    np.testing.assert_array_equal(theta["ulnar"], theta["flexion"])
+    np.testing.assert_array_equal(theta["radial"], theta["extension"])
+    np.testing.assert_allclose(theta["ulnar"], -theta["radial"], rtol=0, atol=1e-13)
+    assert theta["ulnar"][-1] > 0.5
+
+
+def test_gravity_across_breaks_the_symmetry_in_its_own_plane_only() -> None:
+    theta = courses("wrist.gravity=[0.0, 0.0]", "wrist.gravity_flexion=9.81")
+    np.testing.assert_allclose(theta["ulnar"], -theta["radial"], rtol=0, atol=1e-13)
+    assert np.abs(theta["flexion"] + theta["extension"]).max() > 1e-5
+
+
+def test_each_plane_sees_its_own_gravity() -> None:
+    wrist = WristParameters(gravity=(-9.0, 2.0), gravity_flexion=3.0)
+    assert in_plane(wrist, "radial").gravity == (-9.0, 2.0) and in_plane(wrist, "extension").gravity == (-9.0, 3.0)
+    assert in_plane(in_plane(wrist, "flexion"), "flexion") == wrist
+
+
+@pytest.mark.parametrize("each", DIRECTIONS.values(), ids=lambda d: d.name)
+def test_tendons_that_pull_lie_on_the_side_of_the_bend(each) -> None:
+    axis = 0 if each.plane == "ulnar" else 1
+    assert all(TENDONS[number][axis] == each.sign for number in each.tendons)

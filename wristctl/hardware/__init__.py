@@ -1,0 +1,1 @@
+"""The motor board and the camera, real or emulated."""

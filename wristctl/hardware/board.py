@@ -1,0 +1,277 @@
+"""The driver of the motor board: the same for a real one and an emulated one."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+from wristctl.hardware.errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
+from wristctl.hardware.framing import Decoder, encode
+from wristctl.hardware.messages import (
+    ANSWER_TO,
+    AXES,
+    COMMAND_OF,
+    DICTIONARY_HASH,
+    ENABLE_KEY,
+    FEEDS_WATCHDOG,
+    LAYOUTS,
+    MAX_RATE,
+    TOTAL_RATE,
+    Command,
+    Configure,
+    Counters,
+    Enable,
+    Flag,
+    Hello,
+    Home,
+    Jog,
+    Rate,
+    Result,
+    State,
+    Status,
+)
+from wristctl.hardware.transport import Transport
+
+Axes = tuple[float, float, float, float]
+
+ATTEMPTS = 3
+"""Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
+
+_START_PATIENCE, _START_TIME = 0.1, 3.0
+_ANSWER = 0x80
+_FIRST_OF_HELLO = struct.Struct("<BI3B")  # protocol, dictionary, firmware: in this place in every version
+
+
+@dataclass
+class Traffic:
+    """What the driver has seen on the wire since it was made."""
+
+    sent: int = 0
+    resent: int = 0
+    answers: int = 0
+    stale: int = 0  # answers that came after the command had been sent again, or to nobody
+    bytes_read: int = 0
+
+
+class Board:
+    """A motor board behind a transport. As a context manager it connects, and stops the motors in the end.
+
+    Commands are sent again when no answer comes, at most ATTEMPTS times within the watchdog time; all of them are
+    absolute, so that the board may see one twice. Errors are those of `errors.py`.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self.transport = transport
+        self.traffic = Traffic()
+        self.hello: Hello | None = None
+        self.round_trip = 0.0
+        """Seconds from the last command to its answer."""
+        self._decoder = Decoder()
+        self._sequence = 0
+        self._watchdog = Configure().watchdog
+        self._last_fed = self._silence = 0.0
+
+    def __enter__(self) -> Self:
+        try:
+            self.connect()
+        except BaseException:
+            self.transport.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close(emergency=error is not None)
+
+    @property
+    def bad_frames(self) -> int:
+        """Pieces that came from the board and were no frame, or had a wrong CRC."""
+        return self._decoder.bad_frames + self._decoder.bad_crc
+
+    def connect(self) -> Hello:
+        """Wait for the board, which may be starting, and see that it speaks by our message table."""
+        self.transport.wait(self.transport.boot_time)
+        payload = self._when_up(Command.HELLO)
+        _protocol, dictionary, *version = _FIRST_OF_HELLO.unpack_from(payload, 1)
+        if dictionary != DICTIONARY_HASH:
+            raise WrongFirmware(self.transport.name, dictionary, tuple(version), DICTIONARY_HASH)
+        self.hello = LAYOUTS[Hello].unpack(Hello, payload[1:])
+        return self.hello
+
+    def configure(self, settings: Configure) -> Status:
+        """Set ramps, watchdog and what the drives do in a fault; only while disabled."""
+        status = self.send(settings)
+        self._watchdog = settings.watchdog
+        return status
+
+    def enable(self) -> Status:
+        """Switch the drives on, and wait until they hold."""
+        self.send(Enable(ENABLE_KEY))
+        return self.wait_while(Flag.SETTLING, timeout=2.0)
+
+    def read(self) -> Status:
+        """State, positions and rates; does not feed the watchdog."""
+        return self.send(Command.STATUS)
+
+    def counters(self) -> Counters:
+        """What the board has seen on the wire since its reset."""
+        _result, counters = self._ask(Command.COUNTERS, b"")
+        return Counters(*counters)
+
+    def ping(self) -> None:
+        """Feed the watchdog, and nothing else."""
+        self._ask(Command.PING, b"")
+
+    def turn(self, rates: Sequence[float]) -> tuple[Axes, Status]:
+        """Turn the axes at `rates` (steps/s), as far as the board can; the rates really sent, and the status."""
+        sent = within_reach(rates)
+        return sent, self.send(Rate(sent))
+
+    def jog(self, positions: Sequence[int]) -> Status:
+        """Creep to `positions` (steps) before homing, and wait until the axes stand."""
+        self.send(Jog(_four(positions, int)))
+        return self.wait_while(Flag.MOVING, timeout=30.0)
+
+    def home(self, positions: Sequence[int] = (0,) * AXES) -> Status:
+        """Say where the axes stand (steps); positions are trusted from here on."""
+        return self.send(Home(_four(positions, int)))
+
+    def stop(self) -> Status:
+        """Ramp down to rest; the drives hold."""
+        return self.send(Command.STOP)
+
+    def emergency_stop(self) -> Status:
+        """No further step, drives released, FAULT latched."""
+        return self.send(Command.ESTOP)
+
+    def stop_whatever_runs(self) -> Result:
+        """Emergency stop without a session, at once and until answered, of a board of any message table."""
+        try:
+            answer = self._exchange(Command.ESTOP, b"", _START_PATIENCE, ATTEMPTS)
+        except NoAnswer:
+            self.transport.wait(self.transport.boot_time)
+            answer = self._when_up(Command.ESTOP)
+        return Result(answer[0])
+
+    def clear(self) -> Status:
+        """Leave FAULT for DISABLED."""
+        return self.send(Command.CLEAR)
+
+    def disable(self) -> Status:
+        """Ramp down and release the drives."""
+        return self.send(Command.DISABLE)
+
+    def wait_while(self, flag: Flag, timeout: float) -> Status:
+        """Feed the watchdog until the status no longer has this flag. BoardError after `timeout` s."""
+        deadline = self.transport.now() + timeout
+        while flag in (status := self.read()).flags:
+            if self.transport.now() > deadline:
+                raise BoardError("firmware", f"still {flag.name} after {timeout:g} s", self.transport.name)
+            if status.state == State.FAULT:
+                raise Faulted(self.transport.name, status.faults, self._silence, self._watchdog)
+            self.ping()
+            self.transport.wait(self._watchdog / 4)
+        return status
+
+    def send(self, message: Command | tuple[Any, ...]) -> Status:
+        """Send a command that is answered by the status."""
+        if isinstance(message, Command):
+            command, payload = message, b""
+        else:
+            command, payload = COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
+        _result, status = self._ask(command, payload)
+        return Status(*status)
+
+    def close(self, emergency: bool = False) -> None:
+        """Stop the motors (at once in an `emergency`), as far as the board can be reached, and let it go."""
+        try:
+            with suppress(BoardError):
+                self.send(Command.ESTOP if emergency else Command.DISABLE)
+        finally:
+            self.transport.close()
+
+    def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
+        answer = self._exchange(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
+        result = Result(answer[0])
+        kind = ANSWER_TO.get(command)
+        content: tuple[Any, ...] = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
+        if result == Result.FAULTED:
+            status = Status(*content) if kind is Status else self.read()
+            raise Faulted(self.transport.name, status.faults, self._silence, self._watchdog)
+        if result != Result.OK:
+            self._see_restart()
+            raise Refused(self.transport.name, command, result)
+        return result, content
+
+    def _when_up(self, command: Command) -> bytes:
+        """Send for as long as the board may be starting; what it answers."""
+        deadline = self.transport.now() + _START_TIME
+        while True:
+            try:
+                return self._exchange(command, b"", _START_PATIENCE, attempts=1)
+            except NoAnswer:
+                if self.transport.now() > deadline:
+                    sent, seen = self.traffic.sent, self.traffic.bytes_read
+                    raise NoAnswer(self.transport.name, command, sent, seen) from None
+
+    def _see_restart(self) -> None:
+        if self.hello is None:
+            return
+        answer = self._exchange(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
+        if LAYOUTS[Hello].unpack(Hello, answer[1:]).boot_nonce != self.hello.boot_nonce:
+            raise Restarted(self.transport.name)
+
+    def _exchange(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:
+        """Result and payload of the answer. Raises NoAnswer."""
+        self._sequence = (self._sequence + 1) & 0xFF
+        frame, seen, began = (
+            encode(command, self._sequence, payload),
+            self.traffic.bytes_read,
+            self.transport.now(),
+        )
+        if command in FEEDS_WATCHDOG:
+            self._silence = began - self._last_fed if self._last_fed else 0.0
+        for attempt in range(attempts):
+            self.transport.write(frame)
+            self.traffic.sent += 1
+            self.traffic.resent += attempt > 0
+            if (answer := self._answer(command, self.transport.now() + patience)) is not None:
+                self.round_trip = self.transport.now() - began
+                if command in FEEDS_WATCHDOG:
+                    self._last_fed = began
+                return answer
+        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen)
+
+    def _answer(self, command: Command, deadline: float) -> bytes | None:
+        found = None
+        while found is None and (left := deadline - self.transport.now()) > 0:
+            data = self.transport.read(left)
+            self.traffic.bytes_read += len(data)
+            for frame in self._decoder.feed(data):
+                if (
+                    found is None
+                    and (frame.code, frame.sequence) == (command | _ANSWER, self._sequence)
+                    and frame.payload
+                ):
+                    found = frame.payload
+                    self.traffic.answers += 1
+                else:
+                    self.traffic.stale += 1
+        return found
+
+
+def within_reach(rates: Sequence[float]) -> Axes:
+    """Rates (steps/s) with each within MAX_RATE, and all scaled down together where they exceed TOTAL_RATE."""
+    single = [max(-MAX_RATE, min(MAX_RATE, float(rate))) for rate in rates]
+    total = sum(map(abs, single))
+    return _four([rate * min(1.0, TOTAL_RATE / total) if total else 0.0 for rate in single], float)
+
+
+def _four(values: Sequence[float], kind: Callable[[float], Any]) -> tuple[Any, Any, Any, Any]:
+    first, second, third, fourth = (kind(value) for value in values)
+    return first, second, third, fourth

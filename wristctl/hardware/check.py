@@ -1,0 +1,40 @@
+"""Is the board well: round-trip times, and a look at the wiring of one drive."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from wristctl.hardware.board import Board
+from wristctl.hardware.messages import Command, Status
+
+WIRING_STEPS = 160
+"""A twentieth of a turn at 1/16 step."""
+
+
+class RoundTrips(NamedTuple):
+    """Seconds from a command's first byte to its answer's last."""
+
+    command: str
+    rounds: int
+    median: float
+    p99: float
+    worst: float
+
+
+def round_trips(board: Board, command: Command, count: int) -> RoundTrips:
+    """Ask `count` times."""
+    times = []
+    for _ in range(count):
+        board.ping() if command is Command.PING else board.read()
+        times.append(board.round_trip)
+    times.sort()
+    return RoundTrips(command.name, count, times[count // 2], times[min(count - 1, count * 99 // 100)], times[-1])
+
+
+def move_a_little(board: Board, axis: int) -> Status:
+    """Energise the drives, creep axis `axis` forward by WIRING_STEPS and back, and release them."""
+    start = list(board.enable().position)
+    there = [position + WIRING_STEPS * (k == axis) for k, position in enumerate(start)]
+    board.jog(there)
+    board.jog(start)
+    return board.disable()

@@ -1,0 +1,187 @@
+"""The message table (messages.toml): read, hashed, and written out as the C header and the Python module made from it.
+
+Standard library only, so that the firmware builds with nothing but Python and avr-gcc installed:
+
+    python3 wristctl/hardware/dictionary.py c > messages.h
+    python3 wristctl/hardware/dictionary.py python > wristctl/hardware/messages.py
+"""
+
+from __future__ import annotations
+
+import binascii
+import hashlib
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+TABLE = Path(__file__).with_name("messages.toml")
+PROSE = ("meaning", "fix")
+C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
+STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
+WIRE_RANGE = {"u8": (0, 2**8), "u16": (0, 2**16), "u32": (0, 2**32), "i16": (-(2**15), 2**15), "i32": (-(2**31), 2**31)}
+CODES = {"State": "states", "Result": "results", "Command": "commands"}
+BITS = {"Fault": "faults", "Flag": "flags"}
+_KINDS = {
+    "State": "What the board is doing.",
+    "Result": "What it answers to a command.",
+    "Command": "What a host may ask.",
+    "Fault": "Why it stopped, one bit each.",
+    "Flag": "What its status says besides, one bit each.",
+}
+MARK = "Made from messages.toml by dictionary.py: change that file, not this one."
+
+Table = dict[str, Any]
+
+
+def load(path: Path = TABLE) -> Table:
+    """Return the message table as plain dictionaries, in the file's order."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def dictionary_hash(table: Table) -> int:
+    """Return 32 bits that change with all that two sides must agree on: names, codes, types, ranges; not the prose."""
+
+    def bare(node: Any) -> Any:
+        return {k: bare(v) for k, v in node.items() if k not in PROSE} if isinstance(node, dict) else node
+
+    digest = hashlib.sha256(json.dumps(bare(table), separators=(",", ":")).encode()).digest()
+    return int.from_bytes(digest[:4], "little")
+
+
+def c_header(table: Table) -> str:
+    """Return messages.h: constants, codes, what each command needs, packed structures, range checks."""
+    protocol, commands = table["protocol"], table["commands"]
+    lines = [f"/* {MARK} */", "#ifndef MESSAGES_H", "#define MESSAGES_H"]
+    lines += ["#include <stdbool.h>", "#include <stdint.h>", ""]
+    lines += [f"#define PROTOCOL_VERSION {protocol['version']}"]
+    lines += [f"#define FIRMWARE_VERSION {{{', '.join(map(str, protocol['firmware']))}}}"]
+    lines += [f"#define DICTIONARY_HASH {dictionary_hash(table):#010x}UL"]
+    lines += ["#ifndef BAUD", f"#define BAUD {protocol['baud']}UL", "#endif"]
+    for prefix, group in (("", "constants"), ("DEFAULT_", "defaults")):
+        for name, entry in table[group].items():
+            lines += [f"#define {prefix}{name.upper()} {_c_number(entry['value'])} /* {entry['unit']} */"]
+    estop = ", ".join(f"{byte:#04x}" for byte in _estop_frame(table))
+    lines += [f"#define ESTOP_FRAME {{{estop}}} /* ESTOP with ESTOP_SEQ as it comes over the wire */"]
+    for kind, group in (CODES | BITS).items():
+        members = (f"{kind.upper()}_{name} = {_number(entry)}" for name, entry in table[group].items())
+        lines += ["", f"enum {kind.lower()} {{ {', '.join(members)} }};"]
+    for name, entry in commands.items():
+        if entry["fields"]:
+            lines += ["", *_c_struct(f"{name.lower()}_command", entry)]
+    for name, entry in table["answers"].items():
+        lines += ["", *_c_struct(f"{name.lower()}_answer", entry)]
+    whens = dict.fromkeys(entry["when"] for entry in commands.values())
+    lines += ["", f"enum when {{ {', '.join(f'WHEN_{when.upper()}' for when in whens)} }};"]
+    lines += ["", "/* X(name, when it is admitted, length of its payload, whether it feeds the watchdog) */"]
+    lines += ["#define COMMANDS(X) \\"]
+    for name, entry in commands.items():
+        length = f"sizeof(struct {name.lower()}_command)" if entry["fields"] else "0"
+        lines += [f"  X({name}, WHEN_{entry['when'].upper()}, {length}, {str(entry['feeds']).lower()}) \\"]
+    lines += ["", "static inline bool command_in_range(uint8_t command, const void *payload) {", "  switch (command) {"]
+    for name, entry in commands.items():
+        checks = _c_checks(entry)
+        if checks:
+            lines += [f"  case COMMAND_{name}: {{", f"    const struct {name.lower()}_command *m = payload;"]
+            lines += [*checks, "    return true;", "  }"]
+    return "\n".join([*lines, "  }", "  return true;", "}", "", "#endif", ""])
+
+
+def _estop_frame(table: Table) -> bytes:
+    body = bytes([table["commands"]["ESTOP"]["code"], table["constants"]["ESTOP_SEQ"]["value"]])
+    body += binascii.crc_hqx(body, 0xFFFF).to_bytes(2, "big")
+    return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")) + b"\0"
+
+
+def _number(entry: Table) -> int:
+    return int(entry["code"]) if "code" in entry else 1 << int(entry["bit"])
+
+
+def _c_number(value: int) -> str:
+    return f"{value}L" if value < 2**31 else f"{value}UL"
+
+
+def _c_struct(tag: str, entry: Table) -> list[str]:
+    lines = [f"struct {tag} {{ /* {entry['meaning']} */"]
+    for name, (kind, count, *_) in entry["fields"].items():
+        lines += [f"  {C_TYPE[kind]} {name}{f'[{count}]' if count > 1 else ''};"]
+    return [*lines, "} __attribute__((packed));"]
+
+
+def _c_checks(entry: Table) -> list[str]:
+    lines = []
+    for name, (kind, count, scale, _unit, lowest, highest) in entry["fields"].items():
+        least, past = WIRE_RANGE[kind]
+        first, last = round(lowest * scale), round(highest * scale)
+        value = f"m->{name}[i]" if count > 1 else f"m->{name}"
+        outside = [f"{value} < {_c_number(first)}"] * (first > least)
+        outside += [f"{value} > {_c_number(last)}"] * (last < past - 1)
+        if outside:
+            loop = f"for (uint8_t i = 0; i < {count}; i++) " if count > 1 else ""
+            lines += [f"    {loop}if ({' || '.join(outside)}) return false;"]
+    return lines
+
+
+def python_module(table: Table) -> str:
+    """Return messages.py: constants, codes with their meanings, and one named tuple per message with its layout."""
+    protocol, commands = table["protocol"], table["commands"]
+    out = [f'"""What host and board say to each other. {MARK}"""', "", "from __future__ import annotations", ""]
+    out += ["from enum import IntEnum, IntFlag", "from typing import NamedTuple", ""]
+    out += ["from wristctl.hardware.layout import Field, Layout", ""]
+    out += [f"PROTOCOL_VERSION = {protocol['version']}", f"FIRMWARE_VERSION = {tuple(protocol['firmware'])}"]
+    out += [f"DICTIONARY_HASH = {dictionary_hash(table):#010X}".replace("0X", "0x"), f"BAUD = {protocol['baud']}"]
+    for name, entry in table["constants"].items():
+        out += [f"{name} = {entry['value']}  # {entry['unit']}: {entry['meaning']}"]
+    for kind, group in (CODES | BITS).items():
+        out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):", f'    """{_KINDS[kind]}"""', ""]
+        out += [f"    {name} = {_number(entry)}  # {entry['meaning']}" for name, entry in table[group].items()]
+    out += ["", ""]
+    for kind, prose in (("Result", "meaning"), ("Result", "fix"), ("Fault", "meaning"), ("Fault", "fix")):
+        out += [f"{kind.upper()}_{prose.upper()} = {{"]
+        for name, entry in table[(CODES | BITS)[kind]].items():
+            out += [f"    {kind}.{name}: {json.dumps(entry[prose])},"]
+        out += ["}"]
+    named = {name.title(): entry for name, entry in commands.items() if entry["fields"]}
+    for name, entry in (named | table["answers"]).items():
+        out += _named_tuple(name, entry, table["defaults"] if name in named else {})
+    out += ["", "", "LAYOUTS: dict[type, Layout] = {"]
+    for name, entry in (named | table["answers"]).items():
+        out += [f"    {name}: Layout(", *map(_layout_field, entry["fields"].items()), "    ),"]
+    out += ["}", "COMMAND_OF: dict[type, Command] = {"]
+    out += [f"    {name}: Command.{name.upper()}," for name in named]
+    out += ["}", "ANSWER_TO: dict[Command, type] = {"]
+    out += [f"    Command.{name}: {entry['answer']}," for name, entry in commands.items() if "answer" in entry]
+    out += ["}", "FEEDS_WATCHDOG = frozenset(", "    {"]
+    out += [f"        Command.{name}," for name, entry in commands.items() if entry["feeds"]]
+    return "\n".join([*out, "    }", ")", ""])
+
+
+def _enumeration(unit: str) -> str | None:
+    return unit if unit in CODES | BITS else None
+
+
+def _named_tuple(name: str, entry: Table, defaults: Table) -> list[str]:
+    out = ["", "", f"class {name}(NamedTuple):", f'    """{entry["meaning"][0].upper()}{entry["meaning"][1:]}."""', ""]
+    for field, (_kind, count, scale, unit, *span) in entry["fields"].items():
+        scalar = _enumeration(unit) or ("float" if scale > 1 else "int")
+        default = ""
+        if field in defaults:
+            value = defaults[field]["value"]
+            default = f" = {value / scale if scale > 1 else value}"
+        range_note = f", {span[0]} to {span[1]}" if span else ""
+        typed = f"tuple[{', '.join([scalar] * count)}]" if count > 1 else scalar
+        out += [f"    {field}: {typed}{default}  # {unit}{range_note}"]
+    return out
+
+
+def _layout_field(item: tuple[str, list[Any]]) -> str:
+    name, (kind, count, scale, unit, *span) = item
+    lowest, highest = span or (None, None)
+    numbers = f'"{STRUCT_CODE[kind]}", {count}, {scale}, "{unit}", {lowest}, {highest}'
+    return f'        Field("{name}", {numbers}, {_enumeration(unit)}),'
+
+
+if __name__ == "__main__":
+    render = {"c": c_header, "python": python_module}[sys.argv[1]]
+    sys.stdout.write(render(load()))

@@ -1,0 +1,156 @@
+"""The emulated board in real time, behind a pseudo-terminal or a TCP port, for any serial client.
+
+As on a Mega, the first client to open the port resets the board.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from wristctl.config.errors import UserError
+from wristctl.hardware.emulator.atmega2560 import Atmega2560, Halted
+from wristctl.hardware.emulator.chip import FREQUENCY
+
+log = logging.getLogger(__name__)
+
+_QUANTUM, _IDLE_QUANTUM = 0.0005, 0.02
+_FURTHEST_BEHIND = 0.1
+"""Seconds that the chip may lag behind real time before that time is given up."""
+
+
+class Line(Protocol):
+    """The client's side of the board's serial line."""
+
+    address: str
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
+
+    def receive(self) -> bytes:
+        """What clients have sent."""
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to every client; what a client does not read is lost to it."""
+
+    def close(self) -> None:
+        """Send the clients away."""
+
+
+class PtyLine:
+    """A pseudo-terminal, on Linux and macOS: clients open `address` like a serial port."""
+
+    def __init__(self) -> None:
+        try:
+            import pty
+            import tty
+        except ImportError as error:
+            raise UserError("no pseudo-terminals here", fix="wristctl hw emulate --tcp 5000") from error
+        self._master, client = pty.openpty()
+        tty.setraw(client)
+        self.address = os.ttyname(client)
+        os.close(client)
+        os.set_blocking(self._master, False)
+        self._poll = select.poll()
+        self._poll.register(self._master, select.POLLIN)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
+        found = self._poll.poll(1e3 * timeout)
+        if found and found[0][1] & select.POLLHUP:
+            time.sleep(timeout)
+            return False
+        return True
+
+    def receive(self) -> bytes:
+        """What the client has sent."""
+        with contextlib.suppress(OSError):
+            return os.read(self._master, 4096)
+        return b""
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to the client."""
+        with contextlib.suppress(OSError):
+            os.write(self._master, data)
+
+    def close(self) -> None:
+        """Hang up."""
+        os.close(self._master)
+
+
+class TcpLine:
+    """A TCP port on this computer, on any system: clients connect to `address`."""
+
+    def __init__(self, port: int) -> None:
+        try:
+            self._server = socket.create_server(("127.0.0.1", port))
+        except OSError as error:
+            raise UserError(f"cannot listen ({error.strerror})", f"port {port}", "another port") from error
+        self._server.setblocking(False)
+        self.address = f"socket://127.0.0.1:{self._server.getsockname()[1]}"
+        self._clients: list[socket.socket] = []
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
+        select.select([self._server, *self._clients], [], [], timeout)
+        with contextlib.suppress(BlockingIOError):
+            client, _ = self._server.accept()
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._clients.append(client)
+        return bool(self._clients)
+
+    def receive(self) -> bytes:
+        """What the clients have sent."""
+        received = b""
+        for client in list(self._clients):
+            try:
+                data = client.recv(4096)
+            except BlockingIOError:
+                continue
+            except OSError:
+                data = b""
+            if not data:
+                self._clients.remove(client)
+                client.close()
+            received += data
+        return received
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to every client."""
+        for client in self._clients:
+            with contextlib.suppress(OSError):
+                client.send(data)
+
+    def close(self) -> None:
+        """Close all connections."""
+        for each in (self._server, *self._clients):
+            each.close()
+
+
+def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: True) -> None:
+    """Run the chip in real time on this line for as long as `running` says; a program that crashes is reset."""
+    start = time.monotonic() - chip.cycles / FREQUENCY
+    there = False
+    while running():
+        before, there = there, line.wait(_QUANTUM if there else _IDLE_QUANTUM)
+        if there and not before:
+            chip.reset()
+        if there:
+            chip.write(line.receive())
+        behind = time.monotonic() - start - chip.cycles / FREQUENCY
+        start += max(0.0, behind - _FURTHEST_BEHIND)
+        try:
+            chip.run(max(0, round(min(behind, _FURTHEST_BEHIND) * FREQUENCY)))
+        except Halted as crash:
+            log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
+            chip.reset()
+        if data := chip.read():
+            line.send(data)
+        chip.events()

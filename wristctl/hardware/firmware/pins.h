@@ -1,0 +1,33 @@
+/* Which pin is what; the wiring table in docs/hardware/wiring.md says the same in terminals.
+ *
+ *   axis          0    1    2    3
+ *   STEP (port A) PA0  PA2  PA4  PA6    Mega D22 D24 D26 D28   the drive steps on the rising edge
+ *   DIR  (port A) PA1  PA3  PA5  PA7    Mega D23 D25 D27 D29   high = toward smaller positions
+ *   ENA  (port C) PC0  PC1  PC2  PC3    Mega D37 D36 D35 D34   high = opto energised = drive OFF
+ *
+ *   emergency stop input PG0 (D41), closed to GND while all is well: a broken wire stops too
+ *   state lamp           PB7 (D13, the board's own)                                                */
+#ifndef PINS_H
+#define PINS_H
+#include <avr/io.h>
+#include <stdbool.h>
+
+#define STEP_BIT(axis) (1 << (2 * (axis)))
+#define DIR_BIT(axis) (2 << (2 * (axis)))
+#define ENA_BITS 0x0F
+
+static inline void pins_init(void) {
+  PORTC |= ENA_BITS; /* before the direction, so that the drives never see an enabling level */
+  DDRC |= ENA_BITS;
+  PORTA = 0;
+  DDRA = 0xFF;
+  PORTG |= _BV(PG0); /* pull-up */
+  DDRB |= _BV(PB7);
+}
+
+static inline void drives_on(void) { PORTC &= ~ENA_BITS; }
+static inline void drives_off(void) { PORTC |= ENA_BITS; }
+static inline bool drives_are_on(void) { return !(PORTC & ENA_BITS); }
+static inline bool estop_open(void) { return PING & _BV(PG0); }
+
+#endif

@@ -1,0 +1,59 @@
+"""How a message lies in its bytes: little-endian, no padding, values scaled to whole counts."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+M = TypeVar("M")
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field: `count` values of one struct code; the wire carries round(value * scale); the range is in `unit`."""
+
+    name: str
+    code: str
+    count: int
+    scale: int
+    unit: str
+    lowest: float | None
+    highest: float | None
+    kind: Callable[[int], Any] | None  # the enumeration the value belongs to
+
+    def to_wire(self, value: Any) -> list[int]:
+        """Return the wire counts of `value` (a sequence where count > 1). ValueError names field, value and range."""
+        values = [value] if self.count == 1 else list(value)
+        if len(values) != self.count:
+            raise ValueError(f"{self.name} needs {self.count} values, got {len(values)}")
+        for item in values:
+            if self.lowest is not None and self.highest is not None and not self.lowest <= item <= self.highest:
+                raise ValueError(f"{self.name} = {item} {self.unit} is outside {self.lowest} to {self.highest}")
+        return [round(item * self.scale) for item in values]
+
+    def from_wire(self, counts: tuple[int, ...]) -> Any:
+        """Return the value, or the tuple of values, that these wire counts mean."""
+        read: Callable[[int], Any] = self.kind or ((lambda n: n / self.scale) if self.scale > 1 else int)
+        return read(counts[0]) if self.count == 1 else tuple(read(n) for n in counts)
+
+
+class Layout:
+    """The fields of one message in order; packs its named tuple into bytes and back."""
+
+    def __init__(self, *fields: Field) -> None:
+        self.fields = fields
+        self.struct = struct.Struct("<" + "".join(f"{f.count}{f.code}" for f in fields))
+
+    def pack(self, message: tuple[Any, ...]) -> bytes:
+        """Return the payload. ValueError where a value is out of its range."""
+        return self.struct.pack(*(n for f, value in zip(self.fields, message, strict=True) for n in f.to_wire(value)))
+
+    def unpack(self, message: Callable[..., M], payload: bytes) -> M:
+        """Return the message in this payload. struct.error where the length is wrong."""
+        counts, values, at = self.struct.unpack(payload), [], 0
+        for field in self.fields:
+            values.append(field.from_wire(counts[at : at + field.count]))
+            at += field.count
+        return message(*values)

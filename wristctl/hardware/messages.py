@@ -1,0 +1,304 @@
+"""What host and board say to each other. Made from messages.toml by dictionary.py: change that file, not this one."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+from wristctl.hardware.layout import Field, Layout
+
+PROTOCOL_VERSION = 1
+FIRMWARE_VERSION = (1, 0, 0)
+DICTIONARY_HASH = 0xB57568A7
+BAUD = 250000
+AXES = 4  # 1: step/direction drives
+MAX_RATE = 20000  # steps/s: of one axis
+TOTAL_RATE = 40000  # steps/s: of all axes together: what the step interrupts leave time for
+JOG_RATE = 400  # steps/s: of every axis while positions are not trusted
+JOG_SPAN = 3200  # steps: furthest a JOG may lie from where the axis is: one turn at 1/16 step
+SETTLE_MS = 200  # ms: from energising a drive to its first step
+HEARTBEAT_MS = 5  # ms: a main loop silent for longer counts as hung
+ENABLE_KEY = 1465010515  # 1: makes an ENABLE that no noise produces
+ESTOP_SEQ = 0  # 1: an ESTOP with this sequence number is obeyed on its last byte, whatever waits before it
+MAX_PAYLOAD = 48  # bytes: of any message, either way
+
+
+class State(IntEnum):
+    """What the board is doing."""
+
+    DISABLED = 0  # drives off, nothing moves; from here ENABLE
+    ENABLED = 1  # drives on, motion commands are obeyed
+    STOPPING = 2  # ramping down on the way to DISABLED or FAULT
+    FAULT = 3  # latched: nothing moves until CLEAR
+
+
+class Result(IntEnum):
+    """What it answers to a command."""
+
+    OK = 0  # done
+    LENGTH = 1  # the message has the wrong length
+    UNKNOWN = 2  # the board does not know this command
+    RANGE = 3  # a value is out of range
+    STATE = 4  # not possible in this state
+    FAULTED = 5  # a fault is latched
+    KEY = 6  # the key of ENABLE is wrong
+    UNHOMED = 7  # positions are not trusted
+    ESTOP_OPEN = 8  # the emergency stop input is open
+    MOVING = 9  # an axis is moving
+
+
+class Command(IntEnum):
+    """What a host may ask."""
+
+    HELLO = 1  # who are you? Its answer's first three fields keep their place in every version
+    PING = 2  # are you there? Keeps the link watchdog fed while nothing moves
+    STATUS = 3  # state, positions and rates
+    COUNTERS = 4  # what went well and wrong on the wire since reset
+    ENABLE = 5  # energise the drives (DISABLED to ENABLED)
+    DISABLE = 6  # ramp down, then release the drives; positions are no longer trusted. In FAULT: release held drives
+    RATE = 7  # turn each axis at this rate, as far as its soft limit; less than 1 step/s stands still
+    TARGET = 8  # go to these positions, no faster than these rates; may be changed on the way
+    JOG = 9  # creep to these positions at JOG_RATE, without soft limits: the way home, while positions are not trusted
+    HOME = 10  # the axes stand at these positions: trust them from here on
+    STOP = 11  # ramp every axis down to rest; stays ENABLED and homed
+    ESTOP = 12  # no further step, drives released, FAULT: obeyed in every state
+    CLEAR = 13  # FAULT to DISABLED; refused while the emergency stop input is open
+    CONFIGURE = 14  # ramps, watchdog and what the drives do in a fault; only in DISABLED, kept until reset
+    LIMITS = 15  # soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset
+
+
+class Fault(IntFlag):
+    """Why it stopped, one bit each."""
+
+    LINK = 1  # no command arrived within the watchdog time
+    ESTOP_COMMAND = 2  # the host sent an emergency stop
+    ESTOP_INPUT = 4  # the emergency stop button is pressed or its wire is broken
+    HANG = 8  # the board's main loop stood still
+    WATCHDOG = 16  # the board's millisecond clock stood still
+
+
+class Flag(IntFlag):
+    """What its status says besides, one bit each."""
+
+    HOMED = 1  # positions are trusted
+    MOVING = 2  # some axis is moving or waiting for its next step
+    DRIVES_ON = 4  # the drives are energised
+    ESTOP_OPEN = 8  # the emergency stop input reads pressed
+    SETTLING = 16  # drives just energised; motion starts when this clears
+    AT_LIMIT = 32  # a soft limit holds some axis back
+
+
+RESULT_MEANING = {
+    Result.OK: "done",
+    Result.LENGTH: "the message has the wrong length",
+    Result.UNKNOWN: "the board does not know this command",
+    Result.RANGE: "a value is out of range",
+    Result.STATE: "not possible in this state",
+    Result.FAULTED: "a fault is latched",
+    Result.KEY: "the key of ENABLE is wrong",
+    Result.UNHOMED: "positions are not trusted",
+    Result.ESTOP_OPEN: "the emergency stop input is open",
+    Result.MOVING: "an axis is moving",
+}
+RESULT_FIX = {
+    Result.OK: "",
+    Result.LENGTH: "flash the firmware that belongs to this host: wristctl hw flash",
+    Result.UNKNOWN: "flash the firmware that belongs to this host: wristctl hw flash",
+    Result.RANGE: "stay within the ranges of the message table and the soft limits",
+    Result.STATE: "enable first to move, disable first to configure or to jog a homed wrist",
+    Result.FAULTED: "mend its cause, then clear and home",
+    Result.KEY: "send ENABLE_KEY",
+    Result.UNHOMED: "jog to the home position, then home",
+    Result.ESTOP_OPEN: "release the button (D41 must be closed to GND)",
+    Result.MOVING: "stop and wait until MOVING clears",
+}
+FAULT_MEANING = {
+    Fault.LINK: "no command arrived within the watchdog time",
+    Fault.ESTOP_COMMAND: "the host sent an emergency stop",
+    Fault.ESTOP_INPUT: "the emergency stop button is pressed or its wire is broken",
+    Fault.HANG: "the board's main loop stood still",
+    Fault.WATCHDOG: "the board's millisecond clock stood still",
+}
+FAULT_FIX = {
+    Fault.LINK: "see why the host fell silent (cable, load, crash), then clear and home",
+    Fault.ESTOP_COMMAND: "clear and home when it is safe",
+    Fault.ESTOP_INPUT: "release the button (D41 must be closed to GND), then clear and home",
+    Fault.HANG: "reset the board; report it, with the log: this is a firmware bug",
+    Fault.WATCHDOG: "reset the board; report it, with the log: this is a firmware bug",
+}
+
+
+class Enable(NamedTuple):
+    """Energise the drives (DISABLED to ENABLED)."""
+
+    key: int  # 1, 0 to 4294967295
+
+
+class Rate(NamedTuple):
+    """Turn each axis at this rate, as far as its soft limit; less than 1 step/s stands still."""
+
+    rate: tuple[float, float, float, float]  # steps/s, -20000 to 20000
+
+
+class Target(NamedTuple):
+    """Go to these positions, no faster than these rates; may be changed on the way."""
+
+    position: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+    rate: tuple[int, int, int, int]  # steps/s, 1 to 20000
+
+
+class Jog(NamedTuple):
+    """Creep to these positions at JOG_RATE, without soft limits: the way home, while positions are not trusted."""
+
+    position: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+
+
+class Home(NamedTuple):
+    """The axes stand at these positions: trust them from here on."""
+
+    position: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+
+
+class Configure(NamedTuple):
+    """Ramps, watchdog and what the drives do in a fault; only in DISABLED, kept until reset."""
+
+    watchdog: float = 0.1  # s, 0.01 to 2.0
+    hold_on_fault: int = 0  # 1, 0 to 1
+    acceleration: int = 50000  # steps/s^2, 1000 to 200000
+    stop_acceleration: int = 400000  # steps/s^2, 20000 to 2000000
+
+
+class Limits(NamedTuple):
+    """Soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset."""
+
+    lowest: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+    highest: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+
+
+class Hello(NamedTuple):
+    """Who the board is."""
+
+    protocol: int  # 1
+    dictionary: int  # 1
+    firmware: tuple[int, int, int]  # 1
+    boot_nonce: int  # 1
+    reset_cause: int  # 1
+    axes: int  # 1
+    max_rate: int  # steps/s
+    total_rate: int  # steps/s
+
+
+class Status(NamedTuple):
+    """State, positions and rates at one instant."""
+
+    time: float  # s
+    state: State  # State
+    faults: Fault  # Fault
+    flags: Flag  # Flag
+    watchdog_left: float  # s
+    position: tuple[int, int, int, int]  # steps
+    rate: tuple[int, int, int, int]  # steps/s
+
+
+class Counters(NamedTuple):
+    """All count from reset and wrap."""
+
+    frames: int  # 1
+    bad_crc: int  # 1
+    bad_frame: int  # 1
+    dropped_answers: int  # 1
+    uart_errors: int  # 1
+    late_steps: int  # 1
+
+
+LAYOUTS: dict[type, Layout] = {
+    Enable: Layout(
+        Field("key", "I", 1, 1, "1", 0, 4294967295, None),
+    ),
+    Rate: Layout(
+        Field("rate", "i", 4, 65536, "steps/s", -20000, 20000, None),
+    ),
+    Target: Layout(
+        Field("position", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+        Field("rate", "H", 4, 1, "steps/s", 1, 20000, None),
+    ),
+    Jog: Layout(
+        Field("position", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+    ),
+    Home: Layout(
+        Field("position", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+    ),
+    Configure: Layout(
+        Field("watchdog", "H", 1, 1000, "s", 0.01, 2.0, None),
+        Field("hold_on_fault", "B", 1, 1, "1", 0, 1, None),
+        Field("acceleration", "I", 1, 1, "steps/s^2", 1000, 200000, None),
+        Field("stop_acceleration", "I", 1, 1, "steps/s^2", 20000, 2000000, None),
+    ),
+    Limits: Layout(
+        Field("lowest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+        Field("highest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+    ),
+    Hello: Layout(
+        Field("protocol", "B", 1, 1, "1", None, None, None),
+        Field("dictionary", "I", 1, 1, "1", None, None, None),
+        Field("firmware", "B", 3, 1, "1", None, None, None),
+        Field("boot_nonce", "I", 1, 1, "1", None, None, None),
+        Field("reset_cause", "B", 1, 1, "1", None, None, None),
+        Field("axes", "B", 1, 1, "1", None, None, None),
+        Field("max_rate", "H", 1, 1, "steps/s", None, None, None),
+        Field("total_rate", "H", 1, 1, "steps/s", None, None, None),
+    ),
+    Status: Layout(
+        Field("time", "I", 1, 1000000, "s", None, None, None),
+        Field("state", "B", 1, 1, "State", None, None, State),
+        Field("faults", "B", 1, 1, "Fault", None, None, Fault),
+        Field("flags", "B", 1, 1, "Flag", None, None, Flag),
+        Field("watchdog_left", "H", 1, 1000, "s", None, None, None),
+        Field("position", "i", 4, 1, "steps", None, None, None),
+        Field("rate", "h", 4, 1, "steps/s", None, None, None),
+    ),
+    Counters: Layout(
+        Field("frames", "I", 1, 1, "1", None, None, None),
+        Field("bad_crc", "H", 1, 1, "1", None, None, None),
+        Field("bad_frame", "H", 1, 1, "1", None, None, None),
+        Field("dropped_answers", "H", 1, 1, "1", None, None, None),
+        Field("uart_errors", "H", 1, 1, "1", None, None, None),
+        Field("late_steps", "H", 1, 1, "1", None, None, None),
+    ),
+}
+COMMAND_OF: dict[type, Command] = {
+    Enable: Command.ENABLE,
+    Rate: Command.RATE,
+    Target: Command.TARGET,
+    Jog: Command.JOG,
+    Home: Command.HOME,
+    Configure: Command.CONFIGURE,
+    Limits: Command.LIMITS,
+}
+ANSWER_TO: dict[Command, type] = {
+    Command.HELLO: Hello,
+    Command.STATUS: Status,
+    Command.COUNTERS: Counters,
+    Command.ENABLE: Status,
+    Command.DISABLE: Status,
+    Command.RATE: Status,
+    Command.TARGET: Status,
+    Command.JOG: Status,
+    Command.HOME: Status,
+    Command.STOP: Status,
+    Command.ESTOP: Status,
+    Command.CLEAR: Status,
+    Command.CONFIGURE: Status,
+    Command.LIMITS: Status,
+}
+FEEDS_WATCHDOG = frozenset(
+    {
+        Command.PING,
+        Command.ENABLE,
+        Command.RATE,
+        Command.TARGET,
+        Command.JOG,
+        Command.HOME,
+        Command.STOP,
+    }
+)

@@ -1,0 +1,41 @@
+"""The four anatomical directions: bending planes, tendons that pull, and gravity as each plane sees it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from wristctl.config.wrist import WristParameters
+
+
+class Direction(NamedTuple):
+    """One of the four anatomical directions: its bending plane, the sign of theta and the tendons that pull."""
+
+    name: str
+    plane: str
+    """Name of +y in the bending plane."""
+    sign: int
+    tendons: tuple[int, int]
+
+
+DIRECTIONS = {
+    each.name: each
+    for each in (
+        Direction("ulnar", "ulnar", 1, (4, 5)),
+        Direction("radial", "ulnar", -1, (1, 2)),
+        Direction("flexion", "flexion", 1, (2, 5)),
+        Direction("extension", "flexion", -1, (1, 4)),
+    )
+}
+TENDONS = {1: (-1, -1), 2: (-1, 1), 3: (0, 0), 4: (1, -1), 5: (1, 1)}
+"""Places in the cross-section, +X ulnar and +Y flexion, in units of the tendon offset c."""
+
+
+def in_plane(wrist: WristParameters, direction: str) -> WristParameters:
+    """The wrist as its motion in this direction's bending plane sees it: gravity across is that plane's.
+
+    The cross-section is square, so the planes differ in gravity alone; upright they are the same.
+    """
+    if DIRECTIONS[direction].plane == "ulnar":
+        return wrist
+    along, ulnar = wrist.gravity
+    return wrist.model_copy(update={"gravity": (along, wrist.gravity_flexion), "gravity_flexion": ulnar})
