@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.learning import training
+from wristctl.learning import processes, training
 from wristctl.learning.network_file import load_network, training_record
+from wristctl.learning.training import Epoch
 from wristctl.runs import list_runs, open_run
 
-QUICK = ("--set", "hidden=[16,8]", "--set", "activation=tanh", "--set", "learning_rate=0.01", "--epochs", "12")
+LEAVES = ("hidden=[16,8]", "activation=tanh", "learning_rate=0.01", "workers=1", "epochs=12")
+QUICK = tuple(word for leaf in LEAVES for word in ("--set", leaf))
 
 
 def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
@@ -59,24 +61,105 @@ def test_the_same_seed_gives_the_same_results(call) -> None:
     assert hashes[0][0] != hashes[2][0] and hashes[0][1] != hashes[2][1]
 
 
+def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the first training be interrupted in this epoch."""
+    train_one = processes.train_one
+
+    def interrupted(samples, job, device, checkpoints, report):
+        def stop(done: Epoch) -> None:
+            if done.epoch == epoch:
+                raise KeyboardInterrupt
+            report(done)
+
+        return train_one(samples, job, device, checkpoints, stop)
+
+    monkeypatch.setattr(processes, "train_one", interrupted)
+
+
 def test_interrupted_training_keeps_the_network_found_so_far(call, monkeypatch: pytest.MonkeyPatch) -> None:
     call("gen-data", "--samples", "100")
-    train = training.train
-
-    def interrupted(samples, split, settings, seeds, progress):
-        def report(epoch: training.Epoch) -> None:
-            if epoch.epoch == 3:
-                raise KeyboardInterrupt
-            progress(epoch)
-
-        return train(samples, split, settings, seeds, report)
-
-    monkeypatch.setattr(training, "train", interrupted)
+    interrupt_at(3, monkeypatch)
     code, _, _ = call("train", "--data", "latest:gen-data", *QUICK)
     (run,) = (run for run in list_runs(Path("results")) if run.kind == "train")
     assert code == 130 and run.state == "interrupted"
     assert len(run.data("curves")) == 3 and load_network(run.file("models/network.safetensors")).sizes == (2, 16, 8, 1)
     run.check()
+
+
+def test_a_training_that_was_stopped_resumes_to_the_same_result(call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "SAVE_EVERY", 0.0)
+    call("gen-data", "--samples", "100")
+    with monkeypatch.context() as stopping:
+        interrupt_at(5, stopping)
+        call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
+    (stopped,) = (run for run in list_runs(Path("results")) if run.kind == "train")
+    assert (stopped.path / "checkpoints" / "network-0.pt").is_file()
+    code, _, _ = call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2", "--resume", stopped.id)
+    resumed = open_run("latest:train")
+    call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
+    whole = open_run("latest:train")
+    assert code == 0 and resumed.id != whole.id and resumed.result_hash == whole.result_hash
+    assert not (resumed.path / "checkpoints").exists()
+    code, _, err = call("train", "--data", "latest:gen-data", *QUICK, "--seed", "9", "--resume", stopped.id)
+    assert code == 2 and "other settings, data or seed" in err
+
+
+def test_without_a_data_run_train_draws_what_gen_data_would(call) -> None:
+    call("gen-data", "--samples", "100", "--seed", "3")
+    call("train", *QUICK, "--seed", "3", "--set", "gen-data.samples=100")
+    drawn, own = open_run("latest:gen-data"), open_run("latest:train")
+    assert own.file("data/samples.npz").read_bytes() == drawn.file("data/samples.npz").read_bytes()
+    assert "samples: 100" in own.file("config.yaml").read_text()
+
+
+def test_rows_are_ranked_with_intervals_beside_the_paper(call, tmp_path: Path) -> None:
+    study = tmp_path / "rows.yaml"
+    rows = "".join(
+        f"    - {{name: {name}-{form}, preset: t1-{name}, hidden: [8], epochs: 3{more}}}\n"
+        for form, more in (("printed", ""), ("scaled", ", optimiser: adamw, standardise: true"))
+        for name in ("relu", "sigmoid")
+    )
+    study.write_text(f"gen-data: {{samples: 60}}\ntrain:\n  seeds: 3\n  workers: 1\n  rows:\n{rows}")
+    code, out, _ = call("train", str(study), "--json")
+    metrics, result = open_run("latest:train").metrics, json.loads(out)
+    assert code == 0 and len(open_run("latest:train").data("trials")) == 4 * 3
+    low, high = metrics["relu-scaled_mean_rmse_deg"]["interval"]
+    assert low < metrics["relu-scaled_mean_rmse_deg"]["value"] < high
+    assert {metrics[f"{name}-printed_rank_adam-raw"]["value"] for name in ("relu", "sigmoid")} == {1, 2}
+    assert metrics["c16_sigmoid-printed_is_best"]["value"] == 0, "three seeds cannot support it"
+    seeds = next(table for table in result["tables"] if table["title"].startswith("Over 3 seeds"))
+    assert [row[-1] for row in seeds["rows"] if row[:2] == ["sigmoid-printed", "gradient_norm"]] == [0.0012]
+
+
+def test_a_search_chooses_by_cross_validation_and_says_why(call) -> None:
+    grid = "grid={depths: [1, 3], activations: [tanh], widths: [8], folds: 2}"
+    call("train", "--search", *QUICK, "--epochs", "3", "--set", grid, "--set", "gen-data.samples=80")
+    run = open_run("latest:train")
+    record = training_record(run.file("models/network.safetensors"))
+    depth = run.metrics["c15_chosen_depth"]["value"]
+    assert depth in (1, 3) and "cheapest network" in str(record["reason"])
+    assert len(load_network(run.file("models/network.safetensors")).sizes) == depth + 2
+    assert len(run.data("grid")) == 2 and run.file("figures/accuracy-against-cost.svg").is_file()
+
+
+def test_a_network_of_the_plant_is_judged_on_what_was_held_out_and_knows_its_wrist(call) -> None:
+    plant = ("--source", "plant", "--set", "segments=2", "--set", "held_out_poses=[45]", "--samples", "120")
+    call("gen-data", *plant)
+    call("train", "--data", "latest:gen-data", *QUICK, "--epochs", "2")
+    metrics = open_run("latest:train").metrics
+    assert metrics["held_out_poses_rmse_deg"]["n"] + metrics["held_out_payloads_rmse_deg"]["n"] == metrics["r2"]["n"]
+    assert metrics["rmse_over_exact_test_samples"]["value"] > 0.0
+    code, _, err = call("simulate", "--network", "latest:train", "--set", "reference.inverse=network")
+    assert code == 2 and "2 segments, the loop has 4" in err
+
+
+def test_samples_of_an_earlier_run_are_its_course(call) -> None:
+    call("simulate", "--set", "horizon=0.5")
+    code, _, _ = call("gen-data", "--source", "run", "--run", "latest:simulate", "--samples", "50")
+    table, course = open_run("latest:gen-data").data("samples"), open_run("latest:simulate").data("trajectory")
+    assert code == 0 and len(table) == 50
+    known = set(zip(course["tip_x"], course["tip_y"], course["theta"], strict=True))
+    assert set(zip(table["x"], table["y"], table["theta"], strict=True)) <= known
 
 
 def test_dry_runs_write_nothing(call, tmp_path: Path) -> None:
@@ -93,7 +176,12 @@ def test_dry_runs_write_nothing(call, tmp_path: Path) -> None:
     [
         (("gen-data", "--set", "stretch=[1.1,0.9]"), "stretch"),
         (("gen-data", "--set", "sampling=sobel"), "sobol"),
-        (("train",), "gen-data"),
+        (("gen-data", "--source", "run"), "source run needs a run"),
+        (("gen-data", "--source", "run", "--run", "latest:gen-data"), "no course"),
+        (("gen-data", "--run", "latest:gen-data"), "--source run"),
+        (("train", "--preset", "t1-selu"), "t1-relu"),
+        (("train", "--resume", "latest:gen-data"), "train run is needed"),
+        (("train", "--search", "--set", "rows=[{name: a}]"), "not both"),
         (("train", "--data", "latest:gen-data", "--set", "activation=gelu"), "activation"),
         (("train", "--data", "latest:gen-data", "--set", "train_share=0.99"), "train_share"),
         (("train", "--data", "latest:gen-data", "--set", "hidden=[0]"), "hidden"),

@@ -3,15 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
-from wristctl.learning.training import Training, train
+from wristctl.learning.training import Job, Trial, train_one
 
 
 @pytest.fixture(scope="session")
-def quick() -> TrainSettings:
-    return TrainSettings(hidden=(24, 16), activation="tanh", learning_rate=0.01, epochs=25, batch=50)
+def quick() -> NetworkSettings:
+    return NetworkSettings(hidden=(24, 16), activation="tanh", learning_rate=0.01, epochs=25, batch=50)
 
 
 @pytest.fixture(scope="session")
@@ -25,5 +25,5 @@ def split(samples: Samples) -> Split:
 
 
 @pytest.fixture(scope="session")
-def trained(samples: Samples, split: Split, quick: TrainSettings) -> Training:
-    return train(samples, split, quick, [np.random.SeedSequence(7)])
+def trained(samples: Samples, split: Split, quick: NetworkSettings) -> Trial:
+    return train_one(samples, Job("quick", quick, split, np.random.SeedSequence(7)))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from typing import get_args
 
@@ -12,6 +13,7 @@ from torch import nn
 
 from wristctl.config.learning import Activation
 from wristctl.learning.domain import Domain
+from wristctl.learning.inference import compiled_network
 from wristctl.learning.network import BLOCK, Network, Scaler
 from wristctl.learning.training import LAYERS
 from wristctl.wrist.kinematics import TipPath, arc_tip
@@ -53,6 +55,15 @@ def test_angle_equals_torch(activation: Activation) -> None:
     with torch.no_grad():
         wanted = theirs(torch.tensor(ours.input_scaler.scale(tip))).numpy()[:, 0] * 0.5 + 0.02
     np.testing.assert_allclose(ours.angle(tip), wanted, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("activation", ALL)
+def test_compiled_angle_equals_torch(activation: Activation) -> None:
+    ours, theirs = pair(activation)
+    tip = np.random.default_rng(2).uniform((0.05, -0.05), (0.09, 0.05), (300, 2))
+    with torch.no_grad():
+        wanted = theirs(torch.tensor(ours.input_scaler.scale(tip))).numpy()[:, 0] * 0.5 + 0.02
+    np.testing.assert_allclose(compiled_network(ours)(tip), wanted, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("activation", ALL)
@@ -99,3 +110,25 @@ def test_a_network_needs_no_torch() -> None:
     code = "import sys, wristctl.learning.network_file; print({'torch', 'scipy', 'pandas'} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "set()"
+
+
+def test_a_network_at_a_pose_and_mass_is_the_network_with_those_inputs() -> None:
+    two, _ = pair("silu")
+    rng = np.random.default_rng(1)
+    four = replace(
+        two,
+        weights=(np.hstack([two.weights[0], rng.normal(size=(30, 2))]), *two.weights[1:]),
+        input_scaler=Scaler(np.array([0.07, 0.001, 1.0, 0.3]), np.array([0.005, 0.02, 0.5, 0.1])),
+        domain=Domain(DOMAIN.theta, DOMAIN.arc_length, ((0.0, 3.0), (0.3, 0.45))),
+        others=("pose", "hand_mass"),
+    )
+    tip = arc_tip(np.linspace(-0.8, 0.8, 20), 0.08)
+    at = four.at({"pose": 1.2, "hand_mass": 0.4})
+    inputs = np.hstack([tip, np.tile([1.2, 0.4], (20, 1))])
+    np.testing.assert_allclose(at.angle(tip), four.angle(inputs), rtol=0, atol=1e-14)
+    assert at.domain.contains(tip).all() and four.domain.contains(inputs).all()
+    assert not four.at({"pose": 1.2, "hand_mass": 0.6}).domain.contains(tip).any(), "too heavy: every tip is flagged"
+
+
+def test_an_input_that_is_not_finite_lies_outside() -> None:
+    assert not DOMAIN.contains(np.array([[np.nan, 0.0], [np.inf, 0.0]])).any()

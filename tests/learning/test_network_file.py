@@ -9,15 +9,16 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from wristctl.config.errors import UserError
-from wristctl.learning.network import Network
+from wristctl.learning.domain import Domain
+from wristctl.learning.network import Network, Scaler
 from wristctl.learning.network_file import load_network, save_network, training_record
-from wristctl.learning.training import Training
+from wristctl.learning.training import Trial
 
 RECORD: dict[str, object] = {"seed": 3, "settings": {"epochs": 5, "hidden": [24, 16]}, "data_sha256": "ab12"}
 
 
 @pytest.fixture
-def network(trained: Training) -> Network:
+def network(trained: Trial) -> Network:
     return trained.network
 
 
@@ -96,12 +97,34 @@ def test_other_peoples_safetensors_are_the_users_error(file: Path) -> None:
         ({"input": {"mean": [0, 0, 0], "deviation": [1, 1, 1]}}, "input.mean"),
         ({"input": {"unit": "mm", "mean": [0, 0], "deviation": [1, 1]}}, "input.unit"),
         ({"domain": {"theta": [-1.0, 1.0]}}, "domain.arc_length"),
+        (
+            {"others": [{"name": "pose", "unit": "rad", "mean": 0, "deviation": 1, "range": [0, 1]}]},
+            r"0.weight is \(24, 2\).*header says \(24, 3\)",
+        ),
     ],
 )
 def test_header_that_does_not_fit_is_the_users_error(file: Path, change: dict[str, object], message: str) -> None:
     tensors = load_file(file)
     save_file(tensors, file, {"wristctl": json.dumps({**header(file), **change})})
     rejected(file, message)
+
+
+def test_a_network_of_pose_and_mass_reads_back_with_its_segments(network: Network, tmp_path: Path) -> None:
+    first = np.hstack([network.weights[0], np.full((24, 2), 0.3)])
+    more = replace(
+        network,
+        weights=(first, *network.weights[1:]),
+        input_scaler=Scaler(np.array([0.07, 0.0, 1.5, 0.4]), np.array([0.01, 0.02, 1.2, 0.1])),
+        domain=Domain(network.domain.theta, network.domain.arc_length, ((0.0, 3.0), (0.3, 0.5))),
+        others=("pose", "hand_mass"),
+        segments=4,
+    )
+    path = tmp_path / "more.safetensors"
+    save_network(more, path, RECORD)
+    back = load_network(path)
+    inputs = np.array([[0.07, 0.02, 1.0, 0.35]])
+    assert back.angle(inputs).tobytes() == more.angle(inputs).tobytes()
+    assert (back.domain, back.others, back.segments) == (more.domain, more.others, 4)
 
 
 def test_header_that_is_no_json_is_the_users_error(file: Path) -> None:

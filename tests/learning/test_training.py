@@ -1,29 +1,42 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
 from wristctl.config.errors import UserError
-from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.learning import training
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
 from wristctl.learning.metrics import AngleErrors, angle_errors
-from wristctl.learning.training import Epoch, Training, train
+from wristctl.learning.processes import train_all
+from wristctl.learning.training import Epoch, Job, Trial, best_of, train_one
 
 SEED = np.random.SeedSequence(7)
 
 
-def errors(training: Training, samples: Samples, split: Split) -> AngleErrors:
-    return angle_errors(training.network.angle(samples.tip[split.test]), samples.theta[split.test])
+def trained_on(samples: Samples, split: Split, settings: NetworkSettings, seed: np.random.SeedSequence = SEED) -> Trial:
+    return train_one(samples, Job("one", settings, split, seed))
+
+
+def errors(trial: Trial, samples: Samples, split: Split) -> AngleErrors:
+    return angle_errors(trial.network.angle(samples.tip[split.test]), samples.theta[split.test])
 
 
 def paper(**changes: object) -> AngleErrors:
     """The paper's network on the paper's number of samples."""
     samples = draw_samples(DataSettings(), WristParameters(), np.random.default_rng(0))
     split = split_samples(1000, 0.75, np.random.default_rng(0))
-    settings = TrainSettings.model_validate(changes)
-    return errors(train(samples, split, settings, [SEED]), samples, split)
+    return errors(trained_on(samples, split, NetworkSettings.model_validate(changes)), samples, split)
+
+
+def same_bytes(a: Trial, b: Trial) -> bool:
+    pairs = zip((*a.network.weights, *a.network.biases), (*b.network.weights, *b.network.biases), strict=True)
+    return a.epochs == b.epochs and all(x.tobytes() == y.tobytes() for x, y in pairs)
 
 
 def test_standardised_adamw_learns_the_papers_network() -> None:
@@ -31,39 +44,38 @@ def test_standardised_adamw_learns_the_papers_network() -> None:
     assert learned.r2 > 0.998 and learned.rmse_deg < 1.2
 
 
-def test_printed_adam_on_raw_inputs_collapses_to_the_mean() -> None:
-    collapsed = paper(optimiser="adam", standardise=False)
+def test_t1s_sigmoid_as_printed_collapses_to_the_mean() -> None:
+    collapsed = paper(preset="t1-sigmoid")
     assert abs(collapsed.r2) < 0.1, "C11: coupled weight decay of 0.01 leaves nothing but the mean"
 
 
-def test_quick_network_learns(trained: Training, samples: Samples, split: Split) -> None:
+def test_quick_network_learns(trained: Trial, samples: Samples, split: Split) -> None:
     assert errors(trained, samples, split).r2 > 0.998
 
 
 def test_losses_are_mean_squared_angles(
-    trained: Training, samples: Samples, split: Split, quick: TrainSettings
+    trained: Trial, samples: Samples, split: Split, quick: NetworkSettings
 ) -> None:
     error = trained.network.angle(samples.tip[split.validation]) - samples.theta[split.validation]
-    assert trained.epochs[-1].validation_loss == pytest.approx(float(np.mean(error**2)), rel=1e-9)
+    assert trained.validation_loss == pytest.approx(float(np.mean(error**2)), rel=1e-9)
     assert [e.epoch for e in trained.epochs] == list(range(1, quick.epochs + 1))
 
 
 @pytest.mark.parametrize("optimiser", ["adam", "adamw", "sgd"])
 def test_the_same_seed_gives_the_same_network(
-    samples: Samples, split: Split, optimiser: str, quick: TrainSettings
+    samples: Samples, split: Split, optimiser: str, quick: NetworkSettings
 ) -> None:
     settings = quick.model_copy(update={"optimiser": optimiser, "epochs": 2})
     first, second, other = (
-        train(samples, split, settings, [seed]).network.weights for seed in (SEED, SEED, np.random.SeedSequence(8))
+        trained_on(samples, split, settings, seed) for seed in (SEED, SEED, np.random.SeedSequence(8))
     )
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(first, second, strict=True))
-    assert first[0].tobytes() != other[0].tobytes()
+    assert same_bytes(first, second) and not same_bytes(first, other)
 
 
-def test_gradient_norm_matches_finite_differences(samples: Samples, split: Split, quick: TrainSettings) -> None:
+def test_gradient_norm_matches_finite_differences(samples: Samples, split: Split, quick: NetworkSettings) -> None:
     settings = quick.model_copy(update={"hidden": (3,), "epochs": 3})
-    training = train(samples, split, settings, [SEED])
-    network = training.network
+    trial = trained_on(samples, split, settings)
+    network = trial.network
     parameters = [*network.weights, *network.biases]
 
     def loss() -> float:
@@ -79,45 +91,81 @@ def test_gradient_norm_matches_finite_differences(samples: Samples, split: Split
             array[index] = kept - step
             square += ((above - loss()) / (2 * step)) ** 2
             array[index] = kept
-    assert training.gradient_norm == pytest.approx(np.sqrt(square), rel=1e-5)
+    assert trial.gradient_norm == pytest.approx(np.sqrt(square), rel=1e-5)
 
 
-def test_the_best_of_several_seeds_is_kept(samples: Samples, split: Split, quick: TrainSettings) -> None:
-    seeds = np.random.SeedSequence(3).spawn(3)
-    training = train(samples, split, quick.model_copy(update={"epochs": 4}), seeds)
-    final = [e.validation_loss for e in training.epochs if e.epoch == 4]
-    assert len(final) == 3 and training.trial == int(np.argmin(final))
-
-
-def test_a_trial_does_not_depend_on_the_trials_before_it(samples: Samples, split: Split, quick: TrainSettings) -> None:
-    first, second = np.random.SeedSequence(3).spawn(2)
+def test_the_best_of_several_seeds_is_kept(samples: Samples, split: Split, quick: NetworkSettings) -> None:
     settings = quick.model_copy(update={"epochs": 2})
-    both = train(samples, split, settings, [first, second]).epochs[2:]
-    alone = train(samples, split, settings, [second]).epochs
-    assert [e.validation_loss for e in both] == [e.validation_loss for e in alone]
+    trials = [trained_on(samples, split, settings, seed) for seed in np.random.SeedSequence(3).spawn(3)]
+    assert best_of(trials).validation_loss == min(trial.epochs[-1].validation_loss for trial in trials)
 
 
-def test_interrupted_training_keeps_its_last_whole_epoch(samples: Samples, split: Split, quick: TrainSettings) -> None:
+def test_the_number_of_processes_changes_no_byte(samples: Samples, split: Split, quick: NetworkSettings) -> None:
+    settings = quick.model_copy(update={"epochs": 2})
+    jobs = [Job(f"job-{k}", settings, split, seed, k) for k, seed in enumerate(np.random.SeedSequence(3).spawn(3))]
+    told: set[tuple[int, int]] = set()
+    over = train_all(samples, jobs, workers=2, report=lambda job, epoch: told.add((job, epoch.epoch)))
+    for one, other in zip(train_all(samples, jobs, workers=1), over, strict=True):
+        assert same_bytes(one, other)
+    assert told == {(job, epoch) for job in range(3) for epoch in (1, 2)}
+
+
+def interrupted_at(last: int, samples: Samples, job: Job, checkpoints: Path | None = None) -> Trial:
     def stop(epoch: Epoch) -> None:
-        if epoch.epoch == 3:
+        if epoch.epoch == last:
             raise KeyboardInterrupt
 
-    training = train(samples, split, quick, [SEED], stop)
-    whole = train(samples, split, quick.model_copy(update={"epochs": 3}), [SEED])
-    assert training.interrupted and not whole.interrupted
-    assert len(training.epochs) == 3
-    assert training.network.weights[0].tobytes() == whole.network.weights[0].tobytes()
+    return train_one(samples, job, checkpoints=checkpoints, report=stop)
 
 
-def test_diverged_training_is_the_users_error(samples: Samples, split: Split, quick: TrainSettings) -> None:
+def test_interrupted_training_keeps_its_last_whole_epoch(
+    samples: Samples, split: Split, quick: NetworkSettings
+) -> None:
+    trial = interrupted_at(3, samples, Job("one", quick, split, SEED))
+    whole = trained_on(samples, split, quick.model_copy(update={"epochs": 3}))
+    assert trial.interrupted and not whole.interrupted and same_bytes(trial, whole)
+
+
+@pytest.mark.parametrize("change", [{}, {"schedule": "cosine"}, {"patience": 2, "learning_rate": 0.05}])
+def test_a_training_taken_up_from_its_checkpoint_ends_in_the_same_bytes(
+    samples: Samples, split: Split, quick: NetworkSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change
+) -> None:
+    monkeypatch.setattr(training, "SAVE_EVERY", 0.0)
+    job = Job("one", quick.model_copy(update={"epochs": 6, **change}), split, SEED)
+    interrupted_at(2, samples, job, tmp_path)
+    again: list[int] = []
+    resumed = train_one(samples, job, checkpoints=tmp_path, report=lambda epoch: again.append(epoch.epoch))
+    assert again[0] == 3 and same_bytes(resumed, train_one(samples, job))
+
+
+def test_another_trainings_or_a_broken_checkpoint_is_the_users_error(
+    samples: Samples, split: Split, quick: NetworkSettings, tmp_path: Path
+) -> None:
+    job = Job("one", quick.model_copy(update={"epochs": 1}), split, SEED)
+    train_one(samples, job, checkpoints=tmp_path)
+    with pytest.raises(UserError, match="other settings, data or seed"):
+        train_one(samples, replace(job, seed=np.random.SeedSequence(8)), checkpoints=tmp_path)
+    file = tmp_path / "one.pt"
+    file.write_bytes(file.read_bytes()[:500])
+    with pytest.raises(UserError, match="not a readable checkpoint"):
+        train_one(samples, job, checkpoints=tmp_path)
+
+
+def test_patience_stops_early_and_keeps_the_best_epoch(samples: Samples, split: Split, quick: NetworkSettings) -> None:
+    trial = trained_on(samples, split, quick.model_copy(update={"patience": 2, "learning_rate": 0.05, "epochs": 60}))
+    losses = [epoch.validation_loss for epoch in trial.epochs]
+    assert len(losses) < 60 and trial.validation_loss == min(losses) == losses[-3]
+
+
+def test_diverged_training_is_the_users_error(samples: Samples, split: Split, quick: NetworkSettings) -> None:
     settings = quick.model_copy(update={"optimiser": "sgd", "learning_rate": 1e6, "activation": "relu"})
     with pytest.raises(UserError, match="learning_rate"):
-        train(samples, split, settings, [SEED])
+        best_of([trained_on(samples, split, settings)])
 
 
 def test_training_leaves_torchs_threads_and_random_state_alone(
-    samples: Samples, split: Split, quick: TrainSettings
+    samples: Samples, split: Split, quick: NetworkSettings
 ) -> None:
     threads, state = torch.get_num_threads(), torch.get_rng_state()
-    train(samples, split, quick.model_copy(update={"epochs": 1}), [SEED])
+    trained_on(samples, split, quick.model_copy(update={"epochs": 1}))
     assert torch.get_num_threads() == threads and torch.equal(torch.get_rng_state(), state)

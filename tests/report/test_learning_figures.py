@@ -53,7 +53,8 @@ def test_learning_curves_are_in_deg_and_the_kept_trial_stands_out() -> None:
 
 
 def test_predicted_angles_show_the_error_beside_the_angle(samples: Samples) -> None:
-    table = predictions_table(samples.tip, samples.theta, samples.theta + np.radians(0.3), samples.theta)
+    theta = samples.theta
+    table = predictions_table(samples.tip, (), theta, theta + np.radians(0.3), theta, theta)
     figure = predicted_angles(table)
     left, right = figure.axes
     np.testing.assert_allclose(left.get_lines()[1].get_ydata(), np.degrees(samples.theta) + 0.3)

@@ -169,6 +169,8 @@ def series(results: Sequence[Result], every: int = 5) -> dict[str, NDArray[np.fl
     courses = [result.simulation.trajectory for result in results]
     columns = {
         "theta": [c.theta for c in courses],
+        "tip_x": [c.tip[:, 0] for c in courses],
+        "tip_y": [c.tip[:, 1] for c in courses],
         "theta_ref": [c.theta_ref for c in courses],
         "theta_desired": [c.theta_desired for c in courses],
         "tension_plus": [c.tension[:, 0] for c in courses],

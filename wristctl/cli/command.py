@@ -25,7 +25,7 @@ from wristctl.config.keys import section_keys
 from wristctl.config.load import load_study
 from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
-from wristctl.runs import InputRun, LiveRun, Run, require, start_run
+from wristctl.runs import InputRun, LiveRun, Run, open_run, require, start_run
 from wristctl.runs.journal import plain
 from wristctl.runs.manifest import TABLES, Manifest
 
@@ -34,11 +34,15 @@ __all__ = ["Input", "Session", "Table", "study_command"]
 
 @dataclass(frozen=True)
 class Input:
-    """An earlier run that a command reads: the leaf of its section that names it, and the kind it must be."""
+    """An earlier run that a command reads: the leaf of a section that names it, and the kind it must be.
+
+    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked.
+    """
 
     leaf: str
-    kind: str
+    kind: str | None
     optional: bool = False
+    unfinished: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,13 +95,15 @@ def study_command(
 
     def call(**given: Any) -> None:
         own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
-        typed = {leaf: json.dumps(value) if leaf in named else value for leaf, value in own.items()}
+        typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         _execute(
             command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
         )
 
     keys = section_keys(kind)
-    own = [(leaf, keys[leaf].description or "") for leaf in (*named, *shortcuts)]
+    switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
+    quoted = {*named, *switches}
+    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*named, *shortcuts)]
     call.__signature__ = signature(own)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
@@ -134,11 +140,20 @@ def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
     for each in command.inputs:
         ref = getattr(command.section(study), each.leaf)
         if ref is not None:
-            runs[each.leaf] = require(ref, each.kind, out)
+            runs[each.leaf] = _stopped(ref, each, out) if each.unfinished else require(ref, each.kind, out)
         elif not each.optional:
             fix = f"--{each.leaf} latest:{each.kind}, or the path or id of a {each.kind} run"
             raise UserError(f"{command.kind} needs a {each.kind} run", f"{command.kind}.{each.leaf}", fix)
     return runs
+
+
+def _stopped(ref: str, wanted: Input, out: Path) -> Run:
+    run = open_run(ref, out)
+    if run.kind != wanted.kind:
+        raise UserError(f"a {run.kind} run where a {wanted.kind} run is needed", str(run.path), "name another")
+    if run.state == "running":
+        raise UserError("that run is still going on", str(run.path), "wait for it, or stop it first")
+    return run
 
 
 def _naming(inputs: dict[str, Run], study: Study, command: _Command, out: Path) -> Study:

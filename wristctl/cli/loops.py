@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Session
+from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 
@@ -19,11 +21,30 @@ Gains = Mapping[str, Mapping[str, float]]
 
 
 def network_of(session: Session) -> Inverse | None:
-    """The network of the session's train run, None without one."""
+    """The network of the session's train run at the study's pose and hand, None without one.
+
+    UserError where it learned a wrist of another number of segments than the loops simulate.
+    """
     from wristctl.learning.network_file import load_network
 
     run = session.inputs.get("network")
-    return load_network(run.file("models/network.safetensors")).along if run else None
+    if run is None:
+        return None
+    file = run.file("models/network.safetensors")
+    network, wrist, settings = load_network(file), session.study.wrist, session.settings
+    loops = settings.loops.values() if hasattr(settings, "loops") else [settings.loop]
+    others = sorted({loop.plant_segments for loop in loops} - {network.segments})
+    if network.segments > 1 and others:
+        raise UserError(
+            f"the network learned a wrist of {network.segments} segments, the loop has {others[0]}",
+            str(file),
+            f"plant_segments: {network.segments} in every loop, or train on data with segments: {others[0]}",
+        )
+    pose = math.atan2(wrist.gravity[1], -wrist.gravity[0])
+    at = network.at({"pose": pose, "hand_mass": wrist.hand_mass}) if network.others else network
+    if at.domain.is_empty:
+        log.warning("the study's pose or hand mass lies outside what the network learned: every angle is a guess")
+    return at.along
 
 
 def tuned_of(session: Session) -> Gains | None:

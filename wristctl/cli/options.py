@@ -53,8 +53,8 @@ _COMPLETED: dict[str, Callable[..., list[str]]] = {
 }
 
 
-def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help)."""
+def signature(own: Iterable[tuple[str, str, bool]]) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch)."""
     shared = inspect.signature(Options, eval_str=True).parameters.values()
     named = [
         inspect.Parameter(
@@ -62,10 +62,10 @@ def signature(own: Iterable[tuple[str, str]]) -> inspect.Signature:
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
             annotation=Annotated[
-                str | None,
+                (bool if switch else str) | None,
                 typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf)),
             ],
         )
-        for leaf, text in own
+        for leaf, text, switch in own
     ]
     return inspect.Signature([*shared, *named])

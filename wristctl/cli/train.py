@@ -1,20 +1,23 @@
-"""`wristctl train`: a network from tip position to bending angle."""
+"""`wristctl train`: networks from tip position to bending angle."""
 
 from __future__ import annotations
 
-import json
+import shutil
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
 if TYPE_CHECKING:
     from wristctl.learning.dataset import Samples, Split
-    from wristctl.learning.network import Network
-    from wristctl.learning.training import Epoch, Training
-    from wristctl.wrist.kinematics import Array
+    from wristctl.learning.selection import Choice
+    from wristctl.learning.training import Job, Trial
+
+CHECKPOINTS = "checkpoints"
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
@@ -23,136 +26,151 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
     from wristctl.learning.dataset import Samples, split_samples
 
-    settings, data = study.train, inputs["data"]
-    count = len(Samples.from_arrays(data.array("samples")).theta)
-    split = split_samples(count, settings.train_share, np.random.default_rng(0))
-    layers = "-".join(str(neurons) for neurons in settings.hidden)
-    return (
-        f"{settings.seeds} x {settings.epochs} epochs of a {layers} {settings.activation} network on {data.id}: "
-        f"{len(split.train)} samples to train on, {len(split.validation)} to choose by, {len(split.test)} to judge by"
+    settings, data, held_out = study.train, inputs.get("data"), None
+    count, source = study.gen_data.samples, "samples of its own"
+    if data is not None:
+        samples = Samples.from_arrays(data.array("samples"))
+        count, source, held_out = len(samples.theta), data.id, samples.held_out
+    split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out)
+    lines = [
+        f"{settings.seeds} x {row.epochs} epochs of a {'-'.join(map(str, row.hidden))} {row.activation} network"
+        + (f" ({name})" if name else "")
+        for name, row in networks(settings).items()
+    ]
+    if settings.search:
+        grid = settings.grid
+        rates, decays = max(1, len(grid.learning_rates)), max(1, len(grid.weight_decays))
+        points = len(grid.depths) * len(grid.activations) * len(grid.widths) * rates * decays
+        lines = [f"{points} networks x {grid.folds} folds, then {settings.seeds} x the chosen one"]
+    return "\n".join(
+        [
+            *lines,
+            f"on {source}: {len(split.train)} samples to train on, {len(split.validation)} to choose by, "
+            f"{len(split.test)} to judge by",
+        ]
     )
+
+
+def networks(settings: TrainSettings) -> dict[str, NetworkSettings]:
+    """The networks to train by name: the rows, or the section's own without a name."""
+    if not settings.rows:
+        return {"": _network(settings)}
+    return {row.name: _network(row) for row in settings.rows}
+
+
+def _network(settings: NetworkSettings) -> NetworkSettings:
+    fields = {name: getattr(settings, name) for name in NetworkSettings.model_fields}
+    return NetworkSettings.model_construct(**fields)
 
 
 def train(session: Session) -> list[Table]:
-    """Train the network from tip position to bending angle."""
+    """Train networks from tip position to bending angle."""
     import numpy as np
 
-    from wristctl.learning import training
+    from wristctl.cli.gen_data import drawn
+    from wristctl.cli.train_outputs import write_choice, write_results
     from wristctl.learning.dataset import Samples, split_samples
 
     settings, run = session.settings, session.run
-    samples = Samples.from_arrays(session.inputs["data"].array("samples"))
-    split = split_samples(len(samples.theta), settings.train_share, np.random.default_rng(run.stream("split")))
-    seeds = [np.random.SeedSequence(run.stream(f"training {trial}")) for trial in range(settings.seeds)]
-    run.numerics(dtype="float64", torch_threads=1)
+    if "data" in session.inputs:
+        samples = Samples.from_arrays(session.inputs["data"].array("samples"))
+    else:
+        samples = drawn(session.study, run.stream("samples"), {})
+        run.arrays("data/samples.npz", samples.arrays())
+    rng = np.random.default_rng(run.stream("split"))
+    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out)
+    if "resume" in session.inputs and (stopped := session.inputs["resume"].path / CHECKPOINTS).is_dir():
+        shutil.copytree(stopped, run.path / CHECKPOINTS)
 
-    began = time.perf_counter()
-    with session.progress("training", settings.seeds * settings.epochs, "epochs") as done:
-
-        def report(epoch: Epoch) -> None:
-            count = epoch.trial * settings.epochs + epoch.epoch
-            done(count, rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
-
-        trained = training.train(samples, split, settings, seeds, report)
+    began, choice, tables = time.perf_counter(), None, []
+    wanted = networks(settings)
+    if settings.search:
+        choice = _searched(session, samples, split)
+        wanted = {"": choice.chosen.settings}
+        tables += write_choice(session, choice)
+    trials = _trained(session, samples, split, wanted)
     seconds = time.perf_counter() - began
-
-    _write_network(session, trained.network)
-    tables = [
-        _write_curves(session, trained),
-        _write_errors(session, trained.network, samples, split),
-        _write_times(session, trained.network, samples.tip[split.test][:1000], seconds),
-    ]
-    if trained.interrupted:
+    tables += write_results(session, trials, samples, split, seconds, choice.reason if choice else "")
+    if any(trial.interrupted for each in trials.values() for trial in each):
         raise KeyboardInterrupt
+    shutil.rmtree(run.path / CHECKPOINTS, ignore_errors=True)
     return tables
 
 
-def _write_network(session: Session, network: Network) -> None:
-    from wristctl.learning.network_file import save_network
-    from wristctl.runs.files import sha256_of
-
-    # The data is named by its hash: a run's id would make the same training give other bytes each time.
-    record = {
-        "seed": session.study.seed,
-        "settings": session.settings.model_dump(mode="json", exclude={"data"}),
-        "samples_sha256": sha256_of(session.inputs["data"].file("data/samples.npz")),
-    }
-    save_network(network, session.run.file("models/network.safetensors"), record)
-
-
-def _write_curves(session: Session, trained: Training) -> Table:
+def _trained(
+    session: Session, samples: Samples, split: Split, wanted: dict[str, NetworkSettings]
+) -> dict[str, list[Trial]]:
+    """Every network from every seed; a seed begins all networks alike."""
     import numpy as np
 
-    from wristctl.report.learning_figures import learning_curves
-    from wristctl.report.learning_tables import MEANING, UNITS, curves_table
+    from wristctl.learning.training import Job
 
-    run, curves = session.run, curves_table(trained.epochs)
-    run.table("data/curves.csv", curves, UNITS, MEANING)
-    run.figure("learning-curves", learning_curves(curves, trained.trial))
-    run.metric(
-        "gradient_norm",
-        trained.gradient_norm,
-        better="lower",
-        meaning="norm of the gradient of the training loss (mean squared scaled angle) at the kept weights",
-    )
-    final = {epoch.trial: epoch for epoch in trained.epochs}.values()
-    rows = [
-        (e.trial, e.epoch, *np.degrees(np.sqrt([e.train_loss, e.validation_loss])).tolist(), e.trial == trained.trial)
-        for e in final
+    count, run = session.settings.seeds, session.run
+    seeds = [np.random.SeedSequence(run.stream(f"training {trial}")) for trial in range(count)]
+    jobs = [
+        Job(f"{name or 'network'}-{trial}", settings, split, seed, trial)
+        for name, settings in wanted.items()
+        for trial, seed in enumerate(seeds)
     ]
-    return Table("Trials", ("trial", "epochs", "training RMSE [deg]", "validation RMSE [deg]", "kept"), rows)
+    trials = _done(session, "training", samples, jobs)
+    found: dict[str, list[Trial]] = {}
+    for trial in trials:
+        found.setdefault(trial.job.name.rpartition("-")[0], []).append(trial)
+    return found
 
 
-def _write_errors(session: Session, network: Network, samples: Samples, split: Split) -> Table:
-    from wristctl.learning.metrics import MEASURES, angle_errors, error_map
-    from wristctl.report.learning_figures import error_over_workspace, predicted_angles
-    from wristctl.report.learning_tables import MEANING, UNITS, predictions_table
-    from wristctl.wrist.kinematics import exact_angle
+def _searched(session: Session, samples: Samples, split: Split) -> Choice:
+    import numpy as np
 
-    run = session.run
-    tip, theta = samples.tip[split.test], samples.theta[split.test]
-    predictions = predictions_table(tip, theta, network.angle(tip), exact_angle(tip))
-    run.table("data/predictions.csv", predictions, UNITS, MEANING)
-    run.figure("predicted-angles", predicted_angles(predictions))
+    from wristctl.learning.selection import candidates, choose, fold_jobs, grid_points
 
-    grid = error_map(network.angle, samples.domain)
-    run.arrays("data/error_map.npz", {"tip": grid.tip, "theta": grid.theta, "error": grid.error})
-    run.figure("error-map", error_over_workspace(grid.tip, grid.error))
-
-    rows = []
-    for inverse, angle, prefix in (("network", network.angle, ""), ("exact inverse", exact_angle, "exact_")):
-        for place, tips, true in (("test samples", tip, theta), ("whole workspace", grid.tip, grid.theta)):
-            errors = angle_errors(angle(tips), true)
-            rows.append((inverse, place, errors.r2, errors.rmse_deg, errors.max_error_deg, errors.close_share))
-            begin = prefix if place == "test samples" else f"{prefix}workspace_"
-            for name, (unit, better, meaning) in MEASURES.items():
-                value = getattr(errors, name)
-                run.metric(begin + name, value, unit, better, true.size, meaning=f"{inverse}, {place}: {meaning}")
-    columns = ("inverse", "tips", "R^2", "RMSE [deg]", "max error [deg]", "within 0.5 deg [share]")
-    return Table("Errors of the bending angle", columns, rows)
+    folds = session.settings.grid.folds
+    seed = np.random.SeedSequence(session.run.stream("folds"))
+    jobs = fold_jobs(grid_points(session.settings), split, folds, seed)
+    trials = _done(session, "cross-validation", samples, jobs)
+    if len(trials) < len(jobs) or any(trial.interrupted for trial in trials):
+        raise KeyboardInterrupt
+    return choose(candidates(trials, folds))
 
 
-def _write_times(session: Session, network: Network, tip: Array, seconds: float) -> Table:
-    from wristctl.learning.metrics import call_time
-    from wristctl.wrist.kinematics import exact_angle
+def _done(session: Session, what: str, samples: Samples, jobs: list[Job]) -> list[Trial]:
+    """The jobs' trials, with progress and checkpoints."""
+    import numpy as np
+    import torch
 
-    rows = []
-    for name, angle in (("network", network.angle), ("exact inverse", exact_angle)):
-        rows.append((name, 1e6 * call_time(angle, tip[:1]), 1e6 * call_time(angle, tip) / len(tip)))
-    times = {name: {"alone_us": alone, "batch_us": batch} for name, alone, batch in rows}
-    record = {"training_s": seconds, "batch_size": len(tip), "per_angle": times}
-    session.run.file("timing.json").write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-    return Table("Time for one angle", ("inverse", "alone [us]", f"in a batch of {len(tip)} [us]"), rows)
+    from wristctl.learning.processes import cores, train_all
+    from wristctl.learning.training import Epoch
+
+    settings, run = session.settings, session.run
+    device = settings.device
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    workers = settings.workers or cores()
+    run.numerics(dtype="float64", torch_threads=1, device=device)
+    epochs = [0] * len(jobs)
+    checkpoints: Path = run.path / CHECKPOINTS
+    with session.progress(what, sum(job.settings.epochs for job in jobs), "epochs") as done:
+
+        def report(number: int, epoch: Epoch) -> None:
+            epochs[number] = epoch.epoch
+            done(sum(epochs), rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
+
+        return train_all(samples, jobs, workers, device, checkpoints, report)
 
 
 app = study_command(
     "train",
     work=train,
     plan=plan,
-    inputs=(Input("data", kind="gen-data"),),
-    shortcuts=("epochs", "seeds"),
+    inputs=(
+        Input("data", kind="gen-data", optional=True),
+        Input("resume", kind="train", optional=True, unfinished=True),
+    ),
+    shortcuts=("search", "preset", "epochs", "seeds", "device"),
     examples=(
         "wristctl train experiments/paper.yaml --data latest:gen-data",
-        "wristctl train --data latest:gen-data --set activation=relu --seeds 5",
+        "wristctl train --preset recommended --seeds 5",
+        "wristctl train experiments/table1.yaml",
+        "wristctl train --search experiments/model_selection.yaml",
     ),
 )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,29 +13,70 @@ Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
 
 
 class DataSettings(Section):
-    """Samples of tip positions and bending angles from the constant-curvature model (E1)."""
+    """Samples of tip positions and bending angles."""
 
-    source: Literal["pcc"] = choice("pcc", "where samples come from", "paper")
+    source: Literal["pcc", "plant", "run"] = choice(
+        "pcc", "constant curvature (E1), static equilibria of the loaded wrist, or an earlier run's courses", "paper"
+    )
     samples: int = choice(1000, "number of samples", "paper", ge=10, le=10_000_000)
     sampling: Literal["uniform", "latin-hypercube", "sobol"] = choice(
-        "sobol", "how angle and stretch are drawn"
+        "sobol", "how angle, stretch and payload are drawn"
     )
     stretch: tuple[float, float] = quantity(
-        (0.9, 1.1), "", "range of arc length over the wrist's length", "assumed"
+        (0.9, 1.1), "", "pcc: range of arc length over the wrist's length", "assumed"
     )
+    segments: int = choice(1, "segments: each with an angle of its own (pcc), in equilibrium (plant)", ge=1, le=8)
+    poses: tuple[float, ...] = quantity(
+        (0.0, 90.0, 180.0), "deg", "plant: tilts of the base from upright, drawn in turn", "assumed", min_length=1
+    )
+    held_out_poses: tuple[float, ...] = quantity((), "deg", "plant: tilts kept from training, to judge by")
+    payload: tuple[float, float] = quantity(
+        (0.0, 0.5), "", "plant: range of the payload over the hand's mass", "assumed"
+    )
+    held_out_payload: tuple[float, float] = quantity(
+        (0.2, 0.3), "", "plant: part of that range kept from training, to judge by"
+    )
+    run: str | None = choice(None, "run: a simulate or compare run: path, id or latest:simulate")
 
     @model_validator(mode="after")
-    def _stretch_in_order(self) -> Self:
+    def _ranges_in_order(self) -> Self:
         low, high = self.stretch
         if not 0 < low <= high:
             raise ValueError(f"stretch must be 0 < low <= high, not ({low}, {high})")
+        for name, (least, most) in (("payload", self.payload), ("held_out_payload", self.held_out_payload)):
+            if not 0 <= least <= most:
+                raise ValueError(f"{name} must be 0 <= low <= high, not ({least}, {most})")
         return self
 
 
-class TrainSettings(Section):
-    """A multilayer perceptron from tip position (x, y) to bending angle; defaults are the paper's network."""
+_PRINTED = {"optimiser": "adam", "standardise": False, "weight_decay": 0.01}
 
-    data: str | None = choice(None, "data run: path, id or latest:gen-data")
+PRESETS: dict[str, dict[str, Any]] = {
+    "t1-sigmoid": {"activation": "sigmoid", "beta1": 0.90, "learning_rate": 0.003, **_PRINTED},
+    "t1-relu": {"activation": "relu", "beta1": 0.95, "learning_rate": 0.001, **_PRINTED},
+    "t1-leaky-relu": {"activation": "leaky-relu", "beta1": 0.92, "learning_rate": 0.001, **_PRINTED},
+    "t1-tanh": {"activation": "tanh", "beta1": 0.97, "learning_rate": 0.002, **_PRINTED},
+    "recommended": {
+        "activation": "silu",
+        "hidden": (64, 64, 64),
+        "learning_rate": 0.005,
+        "schedule": "cosine",
+        "weight_decay": 0.0,
+        "batch": 50,
+        "epochs": 1000,
+    },
+}
+"""T1's columns as printed (decay coupled to the gradient, raw inputs, momentum read as beta1), and a network that is
+accurate: smooth, scaled, trained long and to a vanishing rate."""
+
+
+class NetworkSettings(Section):
+    """A multilayer perceptron and its training; defaults are the paper's network."""
+
+    preset: Literal["t1-sigmoid", "t1-relu", "t1-leaky-relu", "t1-tanh", "recommended"] | None = choice(
+        None, "values for the leaves below that are not given"
+    )
+    inputs: Literal["all", "tip"] = choice("all", "all of the data's inputs, or the tip position alone")
     hidden: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = choice(
         (200, 100, 100), "neurons of each hidden layer", "paper", min_length=1, max_length=10
     )
@@ -45,11 +87,48 @@ class TrainSettings(Section):
     standardise: bool = choice(
         True, "scale inputs and outputs to zero mean and unit deviation; false: raw, as printed"
     )
-    learning_rate: float = quantity(0.003, "", "learning rate", "paper T1", gt=0)
+    learning_rate: float = quantity(0.003, "", "learning rate at the start", "paper T1", gt=0)
+    schedule: Literal["constant", "cosine"] = choice("constant", "learning rate over the epochs; cosine falls to zero")
     beta1: float = quantity(0.90, "", "Adam's beta1, sgd's momentum", "paper T1", ge=0, lt=1)
     weight_decay: float = quantity(0.01, "", "weight decay", "paper T1", ge=0)
     batch: int = choice(100, "samples of a batch", "paper", ge=1)
     epochs: int = choice(100, "passes over the training data", "paper", ge=1)
+    patience: int = choice(
+        0, "stop after so many epochs without a lower validation loss, keep the lowest; 0: train to the end", ge=0
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_preset(cls, given: Any) -> Any:
+        preset = PRESETS.get(str(given.get("preset"))) if isinstance(given, Mapping) else None
+        return {**preset, **given} if preset else given
+
+
+class Row(NetworkSettings):
+    """One of several networks trained on the same data."""
+
+    name: str = choice("", "its name in tables and metrics", pattern=r"[a-z0-9][a-z0-9-]*")
+
+
+class Grid(Section):
+    """What a search tries: all combinations. An empty list stands for the section's own value."""
+
+    depths: tuple[Annotated[int, Field(ge=1, le=10)], ...] = choice(
+        (1, 2, 3, 4, 5), "hidden layers: `width` neurons in the first, half of that in each other", "paper"
+    )
+    activations: tuple[Activation, ...] = choice(("sigmoid", "relu", "leaky-relu", "tanh"), "activations", "paper")
+    widths: tuple[Annotated[int, Field(ge=2, le=10_000)], ...] = choice(
+        (200,), "neurons of the first hidden layer", "paper", min_length=1
+    )
+    learning_rates: tuple[Annotated[float, Field(gt=0)], ...] = choice((), "learning rates")
+    weight_decays: tuple[Annotated[float, Field(ge=0)], ...] = choice((), "weight decays")
+    folds: int = choice(5, "parts of the samples, each held out once", "paper", ge=2, le=20)
+
+
+class TrainSettings(NetworkSettings):
+    """A network from tip position to bending angle."""
+
+    data: str | None = choice(None, "data run: path, id or latest:gen-data; without one, gen-data's samples are drawn")
     train_share: float = quantity(
         0.75,
         "",
@@ -64,3 +143,18 @@ class TrainSettings(Section):
         ge=1,
         le=100,
     )
+    rows: tuple[Row, ...] = choice((), "several networks side by side, in place of the one above")
+    search: bool = choice(False, "choose layers and activation by cross-validation over the grid, then train that")
+    grid: Grid = Grid()
+    workers: int = choice(0, "processes at once, whose number changes no byte; 0: one for each core", ge=0, le=256)
+    device: Literal["auto", "cpu", "cuda"] = choice("cpu", "auto: cuda where there is one; small networks like the cpu")
+    resume: str | None = choice(None, "train run that was stopped; its trainings are taken up where they were")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        names = [row.name for row in self.rows]
+        if "" in names or len(set(names)) < len(names):
+            raise ValueError("each row needs a name of its own")
+        if self.rows and self.search:
+            raise ValueError("give rows or search, not both")
+        return self

@@ -19,10 +19,14 @@ _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 
 Entry = tuple[str, Any, str]
 
+_SHARED = ("seed", "wrist")
+_READ = {"train": ("gen-data",)}
+"""Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
+
 
 def resolved_yaml(study: Study, command: str) -> str:
-    """What `command` reads of the study (seed, wrist, its own section) as YAML that gives the same study."""
-    entries = [entry for entry in _entries(study) if entry[0] in ("seed", "wrist", command)]
+    """What `command` reads of the study (seed, wrist, sections) as YAML that gives the same study."""
+    entries = [entry for entry in _entries(study) if entry[0] in (*_SHARED, command, *_READ.get(command, ()))]
     return "\n".join(_mapping(entries, "")) + "\n"
 
 
@@ -33,7 +37,7 @@ def config_hash(study: Study, command: str) -> str:
 
 
 def _names(command: str) -> set[str]:
-    return {"seed", "wrist", command.replace("-", "_")}
+    return {name.replace("-", "_") for name in (*_SHARED, command, *_READ.get(command, ()))}
 
 
 def _entries(section: Section) -> Iterator[Entry]:

@@ -1,9 +1,10 @@
-"""Samples of tip positions and bending angles from the constant-curvature model (E1)."""
+"""Samples of tip positions and bending angles: of constant curvature (E1), of equilibria, or from earlier runs."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +12,70 @@ from numpy.typing import NDArray
 from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.learning.domain import Domain
-from wristctl.wrist.kinematics import Array, arc_tip
+from wristctl.learning.domain import OTHERS, Domain
+from wristctl.wrist.kinematics import Array, arc_tip, chain_tip, exact_angle, exact_arc
 
 LEAST_SHARE = 2
 """Samples that validation and test need at least: one sample has no spread to explain."""
 
+KEPT, HELD_PAYLOAD, HELD_POSE = range(3)
+"""Why a sample is held out of training; KEPT is not."""
+
 
 @dataclass(frozen=True)
 class Samples:
-    """N arcs and the region they were drawn from."""
+    """N samples and the region they fill."""
 
     tip: Array
     """(N, 2) x and y of the last disc's centre [m]"""
     theta: Array
-    """(N,) bending angle [rad]"""
+    """(N,) bending angle of the last disc [rad]"""
     arc_length: Array
-    """(N,) [m]"""
+    """(N,) of the single arc that ends at the tip [m]"""
     domain: Domain
+    others: Array
+    """(N, K) inputs after x and y"""
+    names: tuple[str, ...]
+    """of those, keys of OTHERS"""
+    held_out: NDArray[np.int64]
+    """(N,) KEPT, HELD_PAYLOAD or HELD_POSE"""
+    segments: int
+    """of the wrist they come from; 1: any"""
+
+    @property
+    def inputs(self) -> Array:
+        """(N, 2 + K)"""
+        return np.hstack([self.tip, self.others])
+
+    @property
+    def curvature_is_constant(self) -> bool:
+        """Whether the single arc through each tip has the true angle, so that the whole domain is known."""
+        return not self.names and bool(np.abs(exact_angle(self.tip) - self.theta).max() < 1e-9)
+
+    def tips_alone(self) -> Samples:
+        """The same without the inputs after x and y."""
+        domain = Domain(self.domain.theta, self.domain.arc_length)
+        return replace(self, others=self.others[:, :0], names=(), domain=domain)
 
     def arrays(self) -> dict[str, Array]:
         """The samples as named arrays; `from_arrays` reads them back without loss."""
-        ends = np.array([self.domain.theta, self.domain.arc_length])
-        return {"tip": self.tip, "theta": self.theta, "arc_length": self.arc_length, "domain": ends}
+        ends = np.array([self.domain.theta, self.domain.arc_length, *self.domain.others])
+        own = {name: self.others[:, k] for k, name in enumerate(self.names)}
+        more = {"held_out": self.held_out} if self.held_out.any() else {}
+        arrays = {"tip": self.tip, "theta": self.theta, "arc_length": self.arc_length, "domain": ends}
+        return arrays | own | more | {"segments": np.array(self.segments)}
 
     @staticmethod
-    def from_arrays(arrays: dict[str, Array]) -> Samples:
+    def from_arrays(arrays: Mapping[str, Array]) -> Samples:
         """Samples from what `arrays` gave. Raises KeyError where an array is missing."""
-        theta, arc_length = arrays["domain"].tolist()
-        domain = Domain(tuple(theta), tuple(arc_length))
-        return Samples(arrays["tip"], arrays["theta"], arrays["arc_length"], domain)
+        theta, arc_length, *rest = (tuple(ends) for ends in arrays["domain"].tolist())
+        names = tuple(name for name in OTHERS if name in arrays)
+        count = len(arrays["theta"])
+        others = np.column_stack([arrays[name] for name in names]) if names else np.empty((count, 0))
+        held_out = arrays.get("held_out", np.zeros(count)).astype(np.int64)
+        domain = Domain(theta, arc_length, tuple(rest))
+        tip, lengths = arrays["tip"], arrays["arc_length"]
+        return Samples(tip, arrays["theta"], lengths, domain, others, names, held_out, int(arrays["segments"]))
 
 
 @dataclass(frozen=True)
@@ -53,39 +88,72 @@ class Split:
 
 
 def draw_samples(settings: DataSettings, wrist: WristParameters, rng: np.random.Generator) -> Samples:
-    """Samples with the angle in +-range_deg and the arc length in stretch * length, both spread evenly."""
-    bend = math.radians(wrist.range_deg)
+    """Samples of `pcc`: each segment's angle within its part of +-range_deg, the length in stretch * length."""
+    n, bend = settings.segments, math.radians(wrist.range_deg)
     low, high = (ratio * wrist.length for ratio in settings.stretch)
-    unit = _unit_square(settings.sampling, settings.samples, rng)
-    theta = -bend + 2.0 * bend * unit[:, 0]
-    length = low + (high - low) * unit[:, 1]
-    return Samples(arc_tip(theta, length), theta, length, Domain((-bend, bend), (low, high)))
+    unit = unit_cube(settings.sampling, settings.samples, n + 1, rng)
+    angles = (-bend + 2.0 * bend * unit[:, :n]) / n
+    length = low + (high - low) * unit[:, n]
+    theta = angles.sum(axis=1)
+    if n == 1:
+        return _samples(arc_tip(theta, length), theta, Domain((-bend, bend), (low, high)), length)
+    return _samples(length[:, None] * chain_tip(angles, 1.0), theta, segments=n)
 
 
-def split_samples(count: int, train_share: float, rng: np.random.Generator) -> Split:
+def samples_of_courses(tables: Sequence[Array], count: int, rng: np.random.Generator) -> Samples:
+    """At most `count` samples out of courses with columns x, y [m] and theta [rad], each (T, 3).
+
+    Raises UserError where too few are finite.
+    """
+    rows = np.concatenate(tables)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if len(rows) < 10:
+        raise UserError(f"the run holds {len(rows)} finite samples", "gen-data.run", "name a run with longer courses")
+    rows = rows[np.sort(rng.choice(len(rows), min(count, len(rows)), replace=False))]
+    return _samples(rows[:, :2], rows[:, 2])
+
+
+def split_samples(
+    count: int, train_share: float, rng: np.random.Generator, held_out: NDArray[np.int64] | None = None
+) -> Split:
     """A random split: `train_share` for training, the rest halved into validation and test.
 
-    Raises UserError where fewer than two samples would be left for either.
+    Where samples are held out, those are the test, and the rest of the others is for validation. Raises UserError
+    where fewer than two samples would be left for either.
     """
-    train = max(1, round(count * train_share))
-    validation = (count - train) // 2
+    held = np.flatnonzero(held_out) if held_out is not None else np.empty(0, np.int64)
+    order = rng.permutation(count)
+    order = order[~np.isin(order, held)]
+    train = max(1, round(len(order) * train_share))
+    validation = len(order) - train if len(held) else (count - train) // 2
     if validation < LEAST_SHARE:
         raise UserError(
             f"{count} samples with train_share {train_share:g} leave {validation} for validation",
             where="train.train_share",
             fix=f"draw more samples or lower the share: validation and test need {LEAST_SHARE} each",
         )
-    order = rng.permutation(count)
-    return Split(order[:train], order[train : train + validation], order[train + validation :])
+    test = held if len(held) else order[train + validation :]
+    return Split(order[:train], order[train : train + validation], test)
 
 
-def _unit_square(sampling: str, count: int, rng: np.random.Generator) -> Array:
-    """`count` points (count, 2) in the unit square."""
+def unit_cube(sampling: str, count: int, dimensions: int, rng: np.random.Generator) -> Array:
+    """`count` points (count, dimensions) in the unit cube."""
     if sampling == "uniform":
-        return rng.random((count, 2))
+        return rng.random((count, dimensions))
     from scipy.stats import qmc
 
     if sampling == "latin-hypercube":
-        return np.asarray(qmc.LatinHypercube(d=2, rng=rng).random(count))
+        return np.asarray(qmc.LatinHypercube(d=dimensions, rng=rng).random(count))
     # A Sobol sequence is balanced in powers of two: draw the next larger one and keep its beginning.
-    return np.asarray(qmc.Sobol(d=2, rng=rng).random_base2(math.ceil(math.log2(count)))[:count])
+    return np.asarray(qmc.Sobol(d=dimensions, rng=rng).random_base2(math.ceil(math.log2(count)))[:count])
+
+
+def _samples(
+    tip: Array, theta: Array, domain: Domain | None = None, length: Array | None = None, segments: int = 1
+) -> Samples:
+    """Samples whose only inputs are x and y."""
+    count, others = len(theta), np.empty((len(theta), 0))
+    arc = exact_arc(tip)[1] if length is None else length
+    return Samples(
+        tip, theta, arc, domain or Domain.around(tip, others), others, (), np.zeros(count, np.int64), segments
+    )

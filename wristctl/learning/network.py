@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,7 +86,7 @@ class Scaler:
 
 @dataclass(frozen=True)
 class Network:
-    """Tip position (x, y) [m] to bending angle [rad]: scaled inputs, hidden layers, one linear output."""
+    """Inputs, of which x and y [m] of the tip are the first, to bending angle [rad]; scaled, one linear output."""
 
     weights: tuple[Array, ...]
     """per layer (neurons, inputs)"""
@@ -97,25 +97,57 @@ class Network:
     input_scaler: Scaler
     output_scaler: Scaler
     domain: Domain
-    """the region of tips it was trained on"""
+    """the region of inputs it was trained on"""
+    others: tuple[str, ...] = ()
+    """inputs after x and y"""
+    segments: int = 1
+    """of the wrist that it learned; 1: any"""
+
+    @property
+    def parameters(self) -> int:
+        """Number of weights and biases."""
+        return sum(weight.size + len(weight) for weight in self.weights)
+
+    @property
+    def multiply_adds(self) -> int:
+        """Of one angle, activations not counted."""
+        return sum(weight.size for weight in self.weights)
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Inputs, neurons of each hidden layer, outputs."""
         return (self.weights[0].shape[1], *(len(bias) for bias in self.biases))
 
-    def angle(self, tip: Array) -> Array:
-        """Bending angles (...) [rad] of tips (..., 2) [m]; `domain.contains` says which can be trusted."""
-        rows = tip.reshape(-1, 2)
+    def at(self, others: Mapping[str, float]) -> Network:
+        """The network of the tip alone that this one is where its other inputs stay at these values (SI units).
+
+        A value outside the trained domain leaves no tip inside. Raises KeyError where a value is missing.
+        """
+        values = np.array([others[name] for name in self.others])
+        scaler, weight = self.input_scaler, self.weights[0]
+        shift = weight[:, 2:] @ ((values - scaler.mean[2:]) / scaler.deviation[2:])
+        return replace(
+            self,
+            weights=(weight[:, :2], *self.weights[1:]),
+            biases=(self.biases[0] + shift, *self.biases[1:]),
+            input_scaler=Scaler(scaler.mean[:2], scaler.deviation[:2]),
+            domain=self.domain.at(values),
+            others=(),
+        )
+
+    def angle(self, inputs: Array) -> Array:
+        """Bending angles (...) [rad] of inputs (..., 2 + others); `domain.contains` says which can be trusted."""
+        rows = inputs.reshape(-1, self.sizes[0])
         blocks = [self._forward(rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
-        return np.concatenate(blocks or [np.empty(0)]).reshape(tip.shape[:-1])
+        return np.concatenate(blocks or [np.empty(0)]).reshape(inputs.shape[:-1])
 
     def along(self, path: TipPath) -> AnglePath:
         """Angles along a path with their exact first and second time derivatives.
 
-        Every layer passes on its value and both derivatives (a second-order Taylor expansion in time), so
-        nothing is differenced. Tips outside the trained domain are flagged. A ReLU network's angle
-        is piecewise linear in the tip: at its kinks the rate jumps, which the acceleration does not show.
+        Only for networks of the tip alone (`at`). Every layer passes on its value and both derivatives (a
+        second-order Taylor expansion in time), so nothing is differenced. Tips outside the trained domain are
+        flagged. A ReLU network's angle is piecewise linear in the tip: at its kinks the rate jumps, which the
+        acceleration does not show.
         """
         count = len(path.position)
         columns = np.empty((3, count))
@@ -124,9 +156,9 @@ class Network:
             columns[:, rows] = self._expand(path.position[rows], path.velocity[rows], path.acceleration[rows])
         return AnglePath(columns[0], columns[1], columns[2], ~self.domain.contains(path.position))
 
-    def _forward(self, tip: Array) -> Array:
+    def _forward(self, inputs: Array) -> Array:
         activate = ACTIVATIONS[self.activation]
-        value = self.input_scaler.scale(tip)
+        value = self.input_scaler.scale(inputs)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             value = activate(value @ weight.T + bias)[0]
         return self.output_scaler.restore(value @ self.weights[-1].T + self.biases[-1])[:, 0]

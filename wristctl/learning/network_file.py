@@ -14,7 +14,7 @@ from safetensors.numpy import save
 from wristctl.config.errors import UserError
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
-from wristctl.learning.domain import Domain
+from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.wrist.kinematics import Array
 
@@ -30,6 +30,14 @@ class _Input(Section):
     unit: Literal["m"] = "m"
     mean: tuple[float, float]
     deviation: tuple[Positive, Positive]
+
+
+class _Other(Section):
+    name: str
+    unit: str
+    mean: float
+    deviation: Positive
+    range: tuple[float, float]
 
 
 class _Output(Section):
@@ -49,6 +57,8 @@ class _Header(Section):
     hidden: tuple[int, ...]
     activation: Activation
     input: _Input
+    others: tuple[_Other, ...] = ()
+    segments: int = 1
     output: _Output
     domain: _Region
     training: dict[str, object]
@@ -56,10 +66,18 @@ class _Header(Section):
 
 def save_network(network: Network, path: Path, training: dict[str, object]) -> None:
     """Write a network and `training`, its record: settings, seed, the data's hash, whatever JSON can hold."""
+    scaler = _columns(network.input_scaler)
     header = _Header(
         hidden=network.sizes[1:-1],
         activation=network.activation,
-        input=_Input.model_validate(_columns(network.input_scaler)),
+        input=_Input.model_validate({name: tuple(values[:2]) for name, values in scaler.items()}),
+        others=tuple(
+            _Other(name=name, unit=OTHERS[name], mean=mean, deviation=deviation, range=ends)
+            for name, mean, deviation, ends in zip(
+                network.others, scaler["mean"][2:], scaler["deviation"][2:], network.domain.others, strict=True
+            )
+        ),
+        segments=network.segments,
         output=_Output.model_validate(_columns(network.output_scaler)),
         domain=_Region(theta=network.domain.theta, arc_length=network.domain.arc_length),
         training=training,
@@ -73,17 +91,22 @@ def save_network(network: Network, path: Path, training: dict[str, object]) -> N
 def load_network(path: Path) -> Network:
     """Read a network. Raises UserError for anything that `save_network` would not have written."""
     header, tensors = _read(path)
-    weights, biases = [], []
-    for layer, (inputs, neurons) in enumerate(pairwise((2, *header.hidden, 1))):
+    weights, biases, others = [], [], header.others
+    for layer, (inputs, neurons) in enumerate(pairwise((2 + len(header.others), *header.hidden, 1))):
         weights.append(_tensor(path, tensors, f"{layer}.weight", (neurons, inputs)))
         biases.append(_tensor(path, tensors, f"{layer}.bias", (neurons,)))
     return Network(
         tuple(weights),
         tuple(biases),
         header.activation,
-        _scaler(header.input),
-        _scaler(header.output),
-        Domain(header.domain.theta, header.domain.arc_length),
+        Scaler(
+            np.array([*header.input.mean, *(each.mean for each in others)]),
+            np.array([*header.input.deviation, *(each.deviation for each in others)]),
+        ),
+        Scaler(np.array(header.output.mean), np.array(header.output.deviation)),
+        Domain(header.domain.theta, header.domain.arc_length, tuple(each.range for each in others)),
+        tuple(each.name for each in others),
+        header.segments,
     )
 
 
@@ -125,10 +148,6 @@ def _tensor(path: Path, tensors: dict[str, Array], name: str, shape: tuple[int, 
 
 def _columns(scaler: Scaler) -> dict[str, tuple[float, ...]]:
     return {"mean": tuple(scaler.mean.tolist()), "deviation": tuple(scaler.deviation.tolist())}
-
-
-def _scaler(columns: _Input | _Output) -> Scaler:
-    return Scaler(np.array(columns.mean), np.array(columns.deviation))
 
 
 def _broken(path: Path, what: str) -> UserError:

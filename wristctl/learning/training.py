@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,7 +17,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from wristctl.config.errors import UserError
-from wristctl.config.learning import Activation, TrainSettings
+from wristctl.config.learning import Activation, NetworkSettings
+from wristctl.learning.checkpoint import fingerprint, read_checkpoint, write_checkpoint
 from wristctl.learning.dataset import Samples, Split
 from wristctl.learning.network import LEAK, Network, Scaler
 
@@ -24,6 +28,9 @@ DTYPE = torch.float64
 BLOCK = 8192
 """Samples evaluated at once where no gradient step is taken."""
 
+SAVE_EVERY = 5.0
+"""Time between two checkpoints [s]."""
+
 LAYERS: dict[Activation, Callable[[], nn.Module]] = {
     "sigmoid": nn.Sigmoid,
     "relu": nn.ReLU,
@@ -31,6 +38,19 @@ LAYERS: dict[Activation, Callable[[], nn.Module]] = {
     "tanh": nn.Tanh,
     "silu": nn.SiLU,
 }
+
+
+@dataclass(frozen=True)
+class Job:
+    """One training: of which network, on which samples, from which random start."""
+
+    name: str
+    """its own among those trained together; names its checkpoint"""
+    settings: NetworkSettings
+    split: Split
+    seed: np.random.SeedSequence
+    trial: int = 0
+    """which of the trainings of its network, from 0"""
 
 
 @dataclass(frozen=True)
@@ -48,79 +68,87 @@ class Epoch:
 
 
 @dataclass(frozen=True)
-class Training:
-    """What came of it: the kept network and the curves of every trial."""
+class Trial:
+    """What came of one training."""
 
+    job: Job
     network: Network
-    trial: int
-    """the kept trial: the one with the least validation loss after its last epoch"""
+    """of the last epoch; with patience, of the one with the least validation loss"""
     epochs: tuple[Epoch, ...]
-    gradient_norm: float
-    """norm of the training loss's gradient at the kept weights: of the scaled angle, without weight decay"""
-    interrupted: bool
-    """whether Ctrl-C ended it early; the network is then the best after whole epochs"""
-
-
-@dataclass
-class _Candidate:
-    trial: int
     validation_loss: float
-    state: dict[str, Tensor]
+    """of the network [rad^2]; not finite where the training diverged"""
+    gradient_norm: float
+    """norm of the training loss's gradient at these weights: of the scaled angle, without weight decay"""
+    interrupted: bool
+    """whether Ctrl-C ended it early; the network is then that of the last whole epoch"""
 
 
-def train(
+def train_one(
     samples: Samples,
-    split: Split,
-    settings: TrainSettings,
-    seeds: list[np.random.SeedSequence],
-    progress: Callable[[Epoch], None] = lambda epoch: None,
-) -> Training:
-    """Train one network per seed, one after another, keeping the best; `progress` is called after each epoch.
+    job: Job,
+    device: str = "cpu",
+    checkpoints: Path | None = None,
+    report: Callable[[Epoch], None] = lambda epoch: None,
+) -> Trial:
+    """Train one network; `report` is called after each epoch and may raise KeyboardInterrupt to end it there.
 
-    Raises UserError where every trial diverges, KeyboardInterrupt only before the first epoch's end.
+    With a folder of checkpoints the training goes on from its checkpoint there, and leaves one now and then. Raises
+    KeyboardInterrupt only before the first epoch's end, UserError where the checkpoint belongs to another training.
     """
-    problem = _Problem(samples, split, settings)
-    epochs: list[Epoch] = []
-    candidates: list[_Candidate] = []
-    interrupted = False
     with _one_thread():
+        problem = _Problem(samples if job.settings.inputs == "all" else samples.tips_alone(), job, device)
+        course = _Course(problem)
+        file = checkpoints / f"{job.name}.pt" if checkpoints else None
+        mark = fingerprint(samples, job)
+        if file and file.is_file():
+            course.restore(read_checkpoint(file, mark))
+            if course.ended:
+                report(course.epochs[-1])
+        saved, interrupted = time.monotonic(), False
         try:
-            for trial, seed in enumerate(seeds):
-                for epoch, candidate in _trial(problem, trial, seed):
-                    epochs.append(epoch)
-                    candidates[trial:] = [candidate]
-                    progress(epoch)
+            while not course.ended:
+                course.advance()
+                if file and (course.ended or time.monotonic() - saved > SAVE_EVERY):
+                    write_checkpoint(file, mark, course.state())
+                    saved = time.monotonic()
+                report(course.epochs[-1])
         except KeyboardInterrupt:
-            if not candidates:
+            if not course.epochs:
                 raise
             interrupted = True
-        finite = [c for c in candidates if math.isfinite(c.validation_loss)]
-        if not finite:
-            raise UserError(
-                f"the training diverged in epoch {epochs[-1].epoch}",
-                where="train.learning_rate",
-                fix=f"choose less than {settings.learning_rate:g}, or set standardise: true",
-            )
-        best = min(finite, key=lambda c: c.validation_loss)
-        model = problem.model(0)
-        model.load_state_dict(best.state)
-        return Training(problem.export(model), best.trial, tuple(epochs), problem.gradient_norm(model), interrupted)
+        model, loss = course.kept()
+        norm = problem.gradient_norm(model)
+        return Trial(job, problem.export(model), tuple(course.epochs), loss, norm, interrupted)
+
+
+def best_of(trials: list[Trial]) -> Trial:
+    """The trial with the least validation loss. Raises UserError where every one of them diverged."""
+    finite = [trial for trial in trials if math.isfinite(trial.validation_loss)]
+    if not finite:
+        last = trials[-1]
+        raise UserError(
+            f"the training diverged in epoch {last.epochs[-1].epoch}",
+            where="train.learning_rate",
+            fix=f"choose less than {last.job.settings.learning_rate:g}, or set standardise: true",
+        )
+    return min(finite, key=lambda trial: trial.validation_loss)
 
 
 class _Problem:
     """The data as scaled tensors, and what is asked of a model on them."""
 
-    def __init__(self, samples: Samples, split: Split, settings: TrainSettings) -> None:
-        self.settings, self.domain = settings, samples.domain
-        theta = samples.theta[:, None]
-        fit = Scaler.of if settings.standardise else lambda values: Scaler.none(values.shape[1])
-        self.input, self.output = fit(samples.tip[split.train]), fit(theta[split.train])
+    def __init__(self, samples: Samples, job: Job, device: str) -> None:
+        self.settings, self.samples, self.job, self.device = job.settings, samples, job, device
+        inputs, theta = samples.inputs, samples.theta[:, None]
+        fit = Scaler.of if self.settings.standardise else lambda values: Scaler.none(values.shape[1])
+        self.input, self.output = fit(inputs[job.split.train]), fit(theta[job.split.train])
 
         def tensors(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-            scaled = self.input.scale(samples.tip[rows]), self.output.scale(theta[rows])
-            return torch.tensor(scaled[0], dtype=DTYPE), torch.tensor(scaled[1], dtype=DTYPE)
+            scaled = self.input.scale(inputs[rows]), self.output.scale(theta[rows])
+            x, y = (torch.tensor(each, dtype=DTYPE, device=device) for each in scaled)
+            return x, y
 
-        self.train, self.validation = tensors(split.train), tensors(split.validation)
+        self.train, self.validation = tensors(job.split.train), tensors(job.split.validation)
         self.square_radians = float(self.output.deviation[0] ** 2)
 
     def model(self, seed: int) -> nn.Sequential:
@@ -128,16 +156,17 @@ class _Problem:
         layers: list[nn.Module] = []
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            for inputs, neurons in pairwise((2, *self.settings.hidden)):
+            for inputs, neurons in pairwise((self.train[0].shape[1], *self.settings.hidden)):
                 layers += [nn.Linear(inputs, neurons, dtype=DTYPE), LAYERS[self.settings.activation]()]
-            return nn.Sequential(*layers, nn.Linear(self.settings.hidden[-1], 1, dtype=DTYPE))
+            last = nn.Linear(self.settings.hidden[-1], 1, dtype=DTYPE)
+            return nn.Sequential(*layers, last).to(self.device)
 
     def optimiser(self, model: nn.Sequential) -> torch.optim.Optimizer:
         rate, beta1, decay = self.settings.learning_rate, self.settings.beta1, self.settings.weight_decay
         if self.settings.optimiser == "sgd":
             return torch.optim.SGD(model.parameters(), lr=rate, momentum=beta1, weight_decay=decay)
         kind = torch.optim.AdamW if self.settings.optimiser == "adamw" else torch.optim.Adam
-        return kind(model.parameters(), lr=rate, betas=(beta1, 0.999), weight_decay=decay)
+        return kind(model.parameters(), lr=rate, betas=(beta1, 0.999), weight_decay=decay, fused=True)
 
     def validation_loss(self, model: nn.Sequential) -> float:
         with torch.no_grad():
@@ -154,37 +183,90 @@ class _Problem:
     def export(self, model: nn.Sequential) -> Network:
         linear = [layer for layer in model if isinstance(layer, nn.Linear)]
         return Network(
-            tuple(layer.weight.detach().numpy().astype(np.float64) for layer in linear),
-            tuple(layer.bias.detach().numpy().astype(np.float64) for layer in linear),
+            tuple(layer.weight.detach().cpu().numpy().astype(np.float64) for layer in linear),
+            tuple(layer.bias.detach().cpu().numpy().astype(np.float64) for layer in linear),
             self.settings.activation,
             self.input,
             self.output,
-            self.domain,
+            self.samples.domain,
+            self.samples.names,
+            self.samples.segments,
         )
 
 
-def _trial(problem: _Problem, trial: int, seed: np.random.SeedSequence) -> Iterator[tuple[Epoch, _Candidate]]:
-    """One training; after each epoch its losses and a copy of the weights. Ends early where it diverges."""
-    weight_seed, order_seed = (int(word) for word in seed.generate_state(2))
-    model = problem.model(weight_seed)
-    optimiser = problem.optimiser(model)
-    shuffle = torch.Generator().manual_seed(order_seed)
-    x, y = problem.train
-    for epoch in range(1, problem.settings.epochs + 1):
-        squares = 0.0
-        order = torch.randperm(len(x), generator=shuffle)
-        for start in range(0, len(x), problem.settings.batch):
-            rows = order[start : start + problem.settings.batch]
-            optimiser.zero_grad()
-            loss = nn.functional.mse_loss(model(x[rows]), y[rows])
+class _Course:
+    """One training, epoch by epoch, whose whole state can be put away and taken up again."""
+
+    def __init__(self, problem: _Problem) -> None:
+        self.problem, self.settings = problem, problem.settings
+        weight_seed, order_seed = (int(word) for word in problem.job.seed.generate_state(2))
+        self.model = problem.model(weight_seed)
+        self.optimiser = problem.optimiser(self.model)
+        self.shuffle = torch.Generator().manual_seed(order_seed)
+        self.epochs: list[Epoch] = []
+        self.best: dict[str, Tensor] | None = None
+        self.best_epoch = 0
+
+    @property
+    def ended(self) -> bool:
+        """All epochs done, diverged, or out of patience."""
+        done, patience = len(self.epochs), self.settings.patience
+        stale = patience > 0 and done - self.best_epoch >= patience
+        return done > 0 and (
+            done >= self.settings.epochs or stale or not math.isfinite(self.epochs[-1].validation_loss)
+        )
+
+    def advance(self) -> None:
+        """One epoch."""
+        x, y = self.problem.train
+        settings, squares, epoch = self.settings, 0.0, len(self.epochs) + 1
+        batches = math.ceil(len(x) / settings.batch)
+        order = torch.randperm(len(x), generator=self.shuffle).to(x.device)
+        for batch in range(batches):
+            if settings.schedule == "cosine":
+                course = ((epoch - 1) * batches + batch) / (settings.epochs * batches)
+                for group in self.optimiser.param_groups:
+                    group["lr"] = settings.learning_rate * 0.5 * (1.0 + math.cos(math.pi * course))
+            rows = order[batch * settings.batch : (batch + 1) * settings.batch]
+            self.optimiser.zero_grad()
+            loss = nn.functional.mse_loss(self.model(x[rows]), y[rows])
             loss.backward()  # type: ignore[no-untyped-call]
-            optimiser.step()
+            self.optimiser.step()
             squares += loss.item() * len(rows)
-        validation = problem.validation_loss(model)
-        result = Epoch(trial, epoch, squares / len(x) * problem.square_radians, validation)
-        yield result, _Candidate(trial, validation, {k: v.clone() for k, v in model.state_dict().items()})
-        if not math.isfinite(validation):
-            return
+        validation = self.problem.validation_loss(self.model)
+        train = squares / len(x) * self.problem.square_radians
+        self.epochs.append(Epoch(self.problem.job.trial, epoch, train, validation))
+        least = self.best_epoch == 0 or validation < self.epochs[self.best_epoch - 1].validation_loss
+        if settings.patience and least:
+            self.best = {name: value.clone() for name, value in self.model.state_dict().items()}
+            self.best_epoch = epoch
+
+    def kept(self) -> tuple[nn.Sequential, float]:
+        """The model to keep and its validation loss [rad^2]."""
+        if self.best is None:
+            return self.model, self.epochs[-1].validation_loss
+        self.model.load_state_dict(self.best)
+        return self.model, self.epochs[self.best_epoch - 1].validation_loss
+
+    def state(self) -> dict[str, object]:
+        """Everything that the epochs to come depend on."""
+        return {
+            "model": self.model.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "shuffle": self.shuffle.get_state(),
+            "epochs": [(epoch.train_loss, epoch.validation_loss) for epoch in self.epochs],
+            "best": self.best,
+            "best_epoch": self.best_epoch,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Take up what `state` gave."""
+        self.model.load_state_dict(state["model"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.shuffle.set_state(state["shuffle"])
+        trial = self.problem.job.trial
+        self.epochs = [Epoch(trial, k, *losses) for k, losses in enumerate(state["epochs"], start=1)]
+        self.best, self.best_epoch = state["best"], state["best_epoch"]
 
 
 def _blocks(x: Tensor, y: Tensor) -> Iterator[tuple[Tensor, Tensor]]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from wristctl.report.style import BLACK, BLUE, VERMILLION, figure, legend
+from wristctl.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend
 from wristctl.wrist.kinematics import Array
 
 ANGLES, ERRORS = "PuOr", "cividis"
@@ -89,6 +89,35 @@ def error_over_workspace(tip: Array, error: Array) -> Figure:
     worst = np.unravel_index(degrees.argmax(), degrees.shape)
     axes.plot(y[worst], x[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
     made.colorbar(image, ax=axes, label="absolute error [deg]")
+    return made
+
+
+def errors_at_samples(tip: Array, error: Array) -> Figure:
+    """Absolute error of a network at tips (N, 2) [m] that fill no grid; errors (N,) [rad]."""
+    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[:, 0], 1e3 * tip[:, 1]
+    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, on the test samples")
+    order = np.argsort(degrees)
+    options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(x) > MOST_PATHS}
+    dots = axes.scatter(y[order], x[order], c=degrees[order], **options)
+    made.colorbar(dots, ax=axes, label="absolute error [deg]")
+    return made
+
+
+def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
+    """Cross-validated RMSE over multiply-adds: a table with activation, hidden, multiply_adds, rmse_deg, error_deg."""
+    made, ((axes,),) = figure(height=4.2)
+    colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
+    for colour, (activation, rows) in zip(colours, grid.groupby("activation", sort=False), strict=False):
+        rows = rows.sort_values("multiply_adds")
+        axes.errorbar(
+            rows["multiply_adds"], rows["rmse_deg"], rows["error_deg"], color=colour, marker="o", markersize=4,
+            linewidth=0.8, capsize=2.0, label=str(activation),
+        )  # fmt: skip
+    at = grid.iloc[chosen]
+    axes.plot(at["multiply_adds"], at["rmse_deg"], "o", color=BLACK, fillstyle="none", markersize=12, label="chosen")
+    axes.set(xlabel="multiply-adds of one angle", ylabel="cross-validated RMSE [deg]", xscale="log", yscale="log")
+    axes.set_title("mean over the folds with its standard error", loc="left")
+    legend(axes, loc="best")
     return made
 
 

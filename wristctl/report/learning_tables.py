@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from wristctl.learning.dataset import Samples
 from wristctl.wrist.kinematics import Array
 
 if TYPE_CHECKING:
+    from wristctl.learning.selection import Candidate
     from wristctl.learning.training import Epoch
 
 UNITS = {
@@ -20,6 +22,10 @@ UNITS = {
     "arc_length": "m",
     "theta_network": "rad",
     "theta_exact": "rad",
+    "theta_polynomial": "rad",
+    "pose": "rad",
+    "hand_mass": "kg",
+    "held_out": "1",
     "trial": "1",
     "epoch": "1",
     "train_loss": "rad^2",
@@ -34,6 +40,10 @@ MEANING = {
     "arc_length": "length of the arc from the first to the last disc",
     "theta_network": "the network's angle",
     "theta_exact": "the exact inverse's angle, 2 atan2(y, x)",
+    "theta_polynomial": "the angle of a polynomial of the inputs",
+    "pose": "tilt of the base from upright",
+    "hand_mass": "mass of hand and payload",
+    "held_out": "0: not; held out of training by 1: its payload, 2: its pose",
     "trial": "which of the trainings with different initial weights",
     "epoch": "passes over the training data so far",
     "train_loss": "mean squared error of the angle over the epoch's batches, each before its own step",
@@ -42,10 +52,16 @@ MEANING = {
 """What the columns of all tables here mean."""
 
 
+GRID_UNITS = {"rmse_deg": "deg", "error_deg": "deg"}
+"""Units of grid_table's columns."""
+
+
 def samples_table(samples: Samples) -> pd.DataFrame:
-    """One row per sample: x, y, theta, arc_length."""
+    """One row per sample: x, y, the other inputs, theta, arc_length, and held_out where any is."""
     x, y = samples.tip.T
-    return pd.DataFrame({"x": x, "y": y, "theta": samples.theta, "arc_length": samples.arc_length})
+    others = dict(zip(samples.names, samples.others.T, strict=True))
+    held = {"held_out": samples.held_out} if samples.held_out.any() else {}
+    return pd.DataFrame({"x": x, "y": y} | others | {"theta": samples.theta, "arc_length": samples.arc_length} | held)
 
 
 def curves_table(epochs: Sequence[Epoch]) -> pd.DataFrame:
@@ -53,8 +69,30 @@ def curves_table(epochs: Sequence[Epoch]) -> pd.DataFrame:
     return pd.DataFrame([vars(epoch) for epoch in epochs])
 
 
-def predictions_table(tip: Array, theta: Array, theta_network: Array, theta_exact: Array) -> pd.DataFrame:
-    """One row per tip: x, y, theta, theta_network, theta_exact."""
-    x, y = tip.T
-    columns = {"x": x, "y": y, "theta": theta, "theta_network": theta_network, "theta_exact": theta_exact}
-    return pd.DataFrame(columns)
+def predictions_table(
+    inputs: Array, names: Sequence[str], theta: Array, theta_network: Array, theta_polynomial: Array, theta_exact: Array
+) -> pd.DataFrame:
+    """One row per sample: x, y, the inputs `names` after them, theta, theta_network, theta_polynomial, theta_exact."""
+    own = dict(zip(("x", "y", *names), inputs.T, strict=True))
+    angles = {"theta_network": theta_network, "theta_polynomial": theta_polynomial, "theta_exact": theta_exact}
+    return pd.DataFrame(own | {"theta": theta} | angles)
+
+
+def grid_table(found: Sequence[Candidate]) -> pd.DataFrame:
+    """One row per point of the grid: its settings, cost, and cross-validated RMSE with its standard error."""
+    return pd.DataFrame(
+        [
+            {
+                "hidden": "-".join(map(str, each.settings.hidden)),
+                "depth": each.depth,
+                "activation": each.settings.activation,
+                "learning_rate": each.settings.learning_rate,
+                "weight_decay": each.settings.weight_decay,
+                "multiply_adds": each.multiply_adds,
+                "rmse_deg": np.degrees(each.mean),
+                "error_deg": np.degrees(each.standard_error),
+            }
+            | {f"fold_{fold}_rmse_deg": np.degrees(value) for fold, value in enumerate(each.rmse)}
+            for each in found
+        ]
+    )

@@ -60,15 +60,15 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     raise UserError("no such run", f"{ref} in {results}", fix)
 
 
-def require(ref: str | Path, kind: str, results: Path = RESULTS) -> Run:
-    """The run `ref` if it is of the kind, has ended ok, and holds the very files sealed; else UserError."""
+def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
+    """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError."""
     run = open_run(ref, results)
-    if run.kind != kind:
+    if kind is not None and run.kind != kind:
         raise UserError(
             f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
         )
     if run.state != "ok":
-        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {kind}` again")
+        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {run.kind}` again")
     run.check()
     return run
 

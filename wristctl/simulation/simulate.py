@@ -16,7 +16,7 @@ from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
 from wristctl.simulation.trajectory import Trajectory, desired_errors
 from wristctl.wrist.directions import DIRECTIONS, in_plane
-from wristctl.wrist.kinematics import Inverse, arc_tip
+from wristctl.wrist.kinematics import Inverse, chain_tip
 from wristctl.wrist.statics import equilibrium
 
 Array = NDArray[np.float64]
@@ -29,16 +29,6 @@ class Simulation:
     trajectory: Trajectory
     metrics: dict[str, float]
     failed: bool
-
-
-def chain_tip(segment_theta: Array, length: float) -> Array:
-    """Tip (T, 2) [m] of a chain of arcs with angles (T, n) [rad] and a total length [m] (E1)."""
-    n = segment_theta.shape[1]
-    before = np.cumsum(segment_theta, axis=1) - segment_theta
-    arcs = arc_tip(segment_theta, length / n)
-    place = (arcs[..., 0] + 1j * arcs[..., 1]) * np.exp(1j * before)
-    end = place.sum(axis=1)
-    return np.stack([end.real, end.imag], axis=-1)
 
 
 def trajectory(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Trajectory:

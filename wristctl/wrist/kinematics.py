@@ -47,6 +47,16 @@ def arc_tip(theta: Array, length: Array | float) -> Array:
     return np.stack([chord * np.cos(0.5 * theta), chord * np.sin(0.5 * theta)], axis=-1)
 
 
+def chain_tip(segment_theta: Array, length: Array | float) -> Array:
+    """Tips (T, 2) [m] of chains of equal arcs with angles (T, n) [rad] and a total length [m] (E1)."""
+    n = segment_theta.shape[1]
+    before = np.cumsum(segment_theta, axis=1) - segment_theta
+    arcs = arc_tip(segment_theta, length / n)
+    place = (arcs[..., 0] + 1j * arcs[..., 1]) * np.exp(1j * before)
+    end = place.sum(axis=1)
+    return np.stack([end.real, end.imag], axis=-1)
+
+
 def exact_angle(tip: Array) -> Array:
     """Bending angle [rad] of the arc from the base to each tip (..., 2) [m]; shape (...), in (-2 pi, 2 pi]."""
     angle: Array = 2.0 * np.arctan2(tip[..., 1], tip[..., 0])

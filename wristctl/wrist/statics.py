@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,17 @@ from wristctl.wrist.model import linearised
 from wristctl.wrist.segments import segments
 
 Array = NDArray[np.float64]
+
+
+class Equilibria(NamedTuple):
+    """Wrists at rest with wanted tip angles."""
+
+    theta: Array
+    """(B, n) segment angles [rad]"""
+    pulls: Array
+    """(B, 2) total tensions of the + and the - side [N]"""
+    stable: NDArray[np.bool_]
+    """(B,) whether it was found and stays there under held tensions"""
 
 
 def stiffness(wrist: WristParameters, n: int, theta: Array, tensions: tuple[float, float]) -> Array:
@@ -52,3 +65,34 @@ def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -
             fix="lower wrist.hand_mass, hand_offset or the tensions, or raise wrist.stiffness",
         )
     return theta
+
+
+def equilibria_at(parameters: Array, n: int, angle: Array, pretension: float) -> Equilibria:
+    """Equilibria with the last disc at `angle` (B,) [rad], one side at `pretension` (of all its tendons) [N].
+
+    `parameters` are rows of Segments, (B, 12). Newton's method on the segments' angles and the difference of the two
+    sides' pulls, for all wrists at once; the wanted angle as a side condition keeps it regular where a load buckles.
+    """
+    count, still = len(angle), np.zeros((len(angle), n))
+    theta, difference = np.repeat(angle[:, None] / n, n, axis=1), np.zeros(count)
+    bordered = np.zeros((count, n + 1, n + 1))
+    bordered[:, n, :n] = 1.0
+    for _ in range(60):
+        r, tangent, _ = linearised(parameters, theta, still, still, _pulls(difference, pretension))
+        side = np.where(difference >= 0.0, 1.0, -1.0)  # the pull that grows: r is linear in it
+        more = linearised(parameters, theta, still, still, _pulls(difference + side, pretension))[0]
+        bordered[:, :n, :n], bordered[:, :n, n] = tangent, (more - r) * side[:, None]
+        rest = np.concatenate([r, theta.sum(axis=1, keepdims=True) - angle[:, None]], axis=1)
+        change = np.linalg.solve(bordered, -rest[..., None])[..., 0]
+        theta, difference = theta + change[:, :n], difference + change[:, n]
+        if np.abs(change[:, :n]).max() < 1e-12 and np.abs(change[:, n]).max() < 1e-9:
+            break
+    pulls = _pulls(difference, pretension)
+    r, tangent, _ = linearised(parameters, theta, still, still, pulls)
+    least = np.linalg.eigvalsh(0.5 * (tangent + tangent.transpose(0, 2, 1)))[:, 0]
+    return Equilibria(theta, pulls, (np.abs(r).max(axis=1) < 1e-9) & (least > 0.0))
+
+
+def _pulls(difference: Array, pretension: float) -> Array:
+    """(B, 2) pulls whose difference is the given one, the lesser at pretension [N]."""
+    return pretension + np.stack([difference.clip(0.0), (-difference).clip(0.0)], axis=-1)

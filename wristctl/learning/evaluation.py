@@ -1,0 +1,93 @@
+"""What is said of every trained network, and of what stands beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from wristctl.learning.baseline import Polynomial
+from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
+from wristctl.learning.inference import compiled_network
+from wristctl.learning.metrics import angle_errors, error_map
+from wristctl.learning.training import Trial
+from wristctl.wrist.kinematics import Array, exact_angle
+
+MEASURES: dict[str, tuple[str, str]] = {
+    "r2": ("", "coefficient of determination on the test samples"),
+    "rmse_deg": ("deg", "RMSE of the angle on the test samples"),
+    "max_error_deg": ("deg", "largest error on the test samples"),
+    "close_share": ("1", "share of the test samples with an error of at most 0.5 deg"),
+    "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
+    "workspace_max_error_deg": ("deg", "largest error on a dense grid over the whole domain"),
+    "gradient_norm": ("", "norm of the training loss's gradient at the kept weights (of the scaled angle)"),
+    "train_loss": ("rad^2", "mean squared error over the last epoch's batches"),
+    "validation_loss": ("rad^2", "mean squared error on the validation samples"),
+    "epochs": ("1", "epochs done"),
+}
+"""Unit and meaning of what `measures` gives."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Inputs with known angles, on which inverses are judged."""
+
+    name: str
+    inputs: Array
+    """(..., D), x and y first"""
+    theta: Array
+    """(...) [rad]"""
+
+
+def places(samples: Samples, split: Split) -> list[Place]:
+    """The test samples, by reason where they were held out, and the whole domain where its angles are known."""
+    held = samples.held_out[split.test]
+    named = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
+    found = [Place("test samples", samples.inputs[split.test], samples.theta[split.test])]
+    for code, name in named.items():
+        rows = split.test[held == code]
+        if 0 < len(rows) < len(split.test):
+            found.append(Place(name, samples.inputs[rows], samples.theta[rows]))
+    if samples.curvature_is_constant:
+        grid = error_map(exact_angle, samples.domain)
+        found.append(Place("whole workspace", grid.tip, grid.theta))
+    return found
+
+
+def inverses(
+    trial: Trial, samples: Samples, split: Split
+) -> dict[str, tuple[Callable[[Array], Array], int, int]]:
+    """The network, a polynomial of all inputs and the exact inverse: angles of inputs, parameters, multiply-adds."""
+    network = trial.network
+    columns = network.sizes[0]
+    polynomial = Polynomial.fit(samples.inputs[split.train], samples.theta[split.train])
+    return {
+        "network": (lambda x: network.angle(x[..., :columns]), network.parameters, network.multiply_adds),
+        "polynomial": (polynomial.angle, len(polynomial.factors), polynomial.multiply_adds),
+        "exact inverse": (lambda x: exact_angle(x[..., :2]), 0, 0),
+    }
+
+
+def measures(trial: Trial, where: Sequence[Place]) -> dict[str, float]:
+    """Every one of MEASURES, NaN for the workspace where its angles are not known."""
+    columns, angle = trial.network.sizes[0], compiled_network(trial.network)
+    by_place = {
+        place.name: angle_errors(
+            angle(place.inputs.reshape(-1, place.inputs.shape[-1])[:, :columns]), place.theta.ravel()
+        )
+        for place in where
+        if place.name in ("test samples", "whole workspace")
+    }
+    test, whole = by_place["test samples"], by_place.get("whole workspace")
+    return {
+        "r2": test.r2,
+        "rmse_deg": test.rmse_deg,
+        "max_error_deg": test.max_error_deg,
+        "close_share": test.close_share,
+        "workspace_rmse_deg": whole.rmse_deg if whole else math.nan,
+        "workspace_max_error_deg": whole.max_error_deg if whole else math.nan,
+        "gradient_norm": trial.gradient_norm,
+        "train_loss": trial.epochs[-1].train_loss,
+        "validation_loss": trial.validation_loss,
+        "epochs": float(len(trial.epochs)),
+    }

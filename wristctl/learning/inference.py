@@ -1,0 +1,159 @@
+"""The network, the polynomial and the exact inverse as compiled code: one angle at a time, as a control loop asks.
+
+Weights lie input by input, so that a layer is a sum of columns: many neurons at once and in a fixed order.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from wristctl.lanes.compiled import compiled
+from wristctl.learning.baseline import Polynomial
+from wristctl.learning.network import LEAK, Network
+from wristctl.wrist.kinematics import Array
+
+_ACTIVATIONS = ("sigmoid", "tanh", "silu", "relu", "leaky-relu")
+
+CHUNK = 50
+"""Inputs timed at once: enough to hide the call, few enough to be done within one slice of a busy machine's time."""
+
+Timed = Callable[[Array], Array]
+"""From inputs (N, D) to angles (N,) [rad]."""
+
+
+@compiled
+def _activate(kind: int, value: Any) -> None:
+    if kind == 0:
+        for i in range(len(value)):
+            value[i] = 1.0 / (1.0 + math.exp(-value[i]))
+    elif kind == 1:
+        for i in range(len(value)):
+            value[i] = 1.0 - 2.0 / (1.0 + math.exp(2.0 * value[i]))
+    elif kind == 2:
+        for i in range(len(value)):
+            value[i] = value[i] / (1.0 + math.exp(-value[i]))
+    elif kind == 3:
+        for i in range(len(value)):
+            value[i] = max(value[i], 0.0)
+    else:
+        for i in range(len(value)):
+            value[i] = max(value[i], LEAK * value[i])
+
+
+@compiled
+def _add_column(total: Any, factor: float, column: Any) -> None:
+    for i in range(len(total)):
+        total[i] += factor * column[i]
+
+
+@compiled
+def _add_columns(total: Any, factors: Any, columns: Any) -> None:
+    """Four columns at once: the sums are read and written a quarter as often."""
+    n = len(total)
+    a, b, c, d = columns[:n], columns[n : 2 * n], columns[2 * n : 3 * n], columns[3 * n : 4 * n]
+    p, q, r, s = factors[0], factors[1], factors[2], factors[3]
+    for i in range(n):
+        total[i] += (p * a[i] + q * b[i]) + (r * c[i] + s * d[i])
+
+
+@compiled
+def _angles(sizes: Any, kind: int, packed: Any, inputs: Any, value: Any, result: Any, out: Any) -> None:
+    for sample in range(len(out)):
+        value[: sizes[0]] = inputs[sample]
+        at = 0
+        for layer in range(1, len(sizes)):
+            before, here = sizes[layer - 1], sizes[layer]
+            total = result[:here]
+            total[:] = packed[at : at + here]
+            at += here
+            fours = before // 4 * 4
+            for j in range(0, fours, 4):
+                _add_columns(total, value[j : j + 4], packed[at : at + 4 * here])
+                at += 4 * here
+            for j in range(fours, before):
+                _add_column(total, value[j], packed[at : at + here])
+                at += here
+            if layer < len(sizes) - 1:
+                _activate(kind, total)
+            value[:here] = total
+        out[sample] = value[0]
+
+
+@compiled
+def _polynomials(powers: Any, factors: Any, inputs: Any, table: Any, out: Any) -> None:
+    for sample in range(len(out)):
+        for j in range(inputs.shape[1]):
+            table[j, 0] = 1.0
+            for k in range(1, table.shape[1]):
+                table[j, k] = table[j, k - 1] * inputs[sample, j]
+        total = 0.0
+        for term in range(len(factors)):
+            product = factors[term]
+            for j in range(inputs.shape[1]):
+                product *= table[j, powers[term, j]]
+            total += product
+        out[sample] = total
+
+
+@compiled
+def _arcs(inputs: Any, out: Any) -> None:
+    for sample in range(len(out)):
+        out[sample] = 2.0 * math.atan2(inputs[sample, 1], inputs[sample, 0])
+
+
+def compiled_network(network: Network) -> Timed:
+    """The network's angles, one sample after another; scaling is folded into the first and the last layer."""
+    weights, biases = [*network.weights], [*network.biases]
+    weights[0] = weights[0] / network.input_scaler.deviation
+    biases[0] = biases[0] - weights[0] @ network.input_scaler.mean
+    weights[-1] = weights[-1] * network.output_scaler.deviation
+    biases[-1] = biases[-1] * network.output_scaler.deviation + network.output_scaler.mean
+    parts = zip(weights, biases, strict=True)
+    packed = np.concatenate([np.concatenate([bias, weight.T.ravel()]) for weight, bias in parts])
+    sizes, kind = np.array(network.sizes), _ACTIVATIONS.index(network.activation)
+    value, result = np.empty(sizes.max()), np.empty(sizes.max())
+
+    def angles(inputs: Array) -> Array:
+        out = np.empty(len(inputs))
+        _angles(sizes, kind, packed, np.ascontiguousarray(inputs), value, result, out)
+        return out
+
+    return angles
+
+
+def compiled_polynomial(polynomial: Polynomial) -> Timed:
+    """The polynomial's angles, one sample after another."""
+    table = np.empty((polynomial.powers.shape[1], polynomial.degree + 1))
+
+    def angles(inputs: Array) -> Array:
+        out = np.empty(len(inputs))
+        scaled = polynomial.scaler.scale(inputs)
+        _polynomials(polynomial.powers, polynomial.factors, scaled, table, out)
+        return out
+
+    return angles
+
+
+def compiled_exact(inputs: Array) -> Array:
+    """2 atan2(y, x), one sample after another."""
+    out = np.empty(len(inputs))
+    _arcs(np.ascontiguousarray(inputs), out)
+    return out
+
+
+def microseconds(angles: Timed, inputs: Array, repeats: int = 301) -> float:
+    """Median time for one input [us]; each repeat is a run through up to CHUNK of them in compiled code."""
+    few = inputs[:CHUNK]
+    angles(few)
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        angles(few)
+        times.append(time.perf_counter() - began)
+    return 1e6 * statistics.median(times) / len(few)

@@ -1,0 +1,79 @@
+"""What a comparison of trainings supports: means with intervals, and tests between rows paired by seed or fold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from wristctl.wrist.kinematics import Array
+
+LEVEL = 0.05
+"""Significance level, after Holm's correction over all pairs of a group."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two rows, the better one first."""
+
+    better: str
+    worse: str
+    difference: float
+    """median over the seeds of worse minus better"""
+    p: float
+    """Wilcoxon's signed-rank test, two-sided, corrected by Holm (Scand. J. Statist. 6 (1979) 65)"""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Rows by their mean, least first, with a test of the whole and one of every pair."""
+
+    order: tuple[str, ...]
+    friedman_p: float
+    """that all rows are alike; nan for fewer than three rows"""
+    pairs: tuple[Pair, ...]
+
+    def supports_best(self, name: str) -> bool:
+        """Whether this row is better than every other at LEVEL."""
+        beaten = [pair for pair in self.pairs if pair.better == name and pair.p < LEVEL]
+        return len(beaten) == len(self.order) - 1
+
+
+def mean_interval(values: Sequence[float] | Array) -> tuple[float, float, float]:
+    """Mean and ends of its 95 % interval (Student's t); the ends are nan for fewer than two values."""
+    array = np.asarray(values, float)
+    mean = float(array.mean())
+    if len(array) < 2:
+        return mean, np.nan, np.nan
+    from scipy.stats import t
+
+    half = float(t.ppf(0.975, len(array) - 1) * array.std(ddof=1) / np.sqrt(len(array)))
+    return mean, mean - half, mean + half
+
+
+def rank(errors: Mapping[str, Sequence[float] | Array]) -> Ranking:
+    """Rank rows by errors (less is better), one for each seed, the same seeds in every row; at least two rows."""
+    from scipy.stats import friedmanchisquare, wilcoxon
+
+    columns = {name: np.asarray(values, float) for name, values in errors.items()}
+    order = tuple(sorted(columns, key=lambda name: columns[name].mean()))
+    found = []
+    for better, worse in combinations(order, 2):
+        difference = columns[worse] - columns[better]
+        p = float(wilcoxon(difference).pvalue) if np.any(difference != 0.0) else 1.0
+        found.append((better, worse, float(np.median(difference)), p))
+    whole = float(friedmanchisquare(*columns.values()).pvalue) if len(columns) > 2 else np.nan
+    corrected = holm([p for *_, p in found])
+    pairs = tuple(Pair(a, b, difference, p) for (a, b, difference, _), p in zip(found, corrected, strict=True))
+    return Ranking(order, whole, pairs)
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """p-values corrected for being several, in their order."""
+    corrected, least = [0.0] * len(p), 0.0
+    for place, index in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
+        least = max(least, min(1.0, (len(p) - place) * p[index]))
+        corrected[index] = least
+    return corrected

@@ -1,0 +1,116 @@
+"""Choosing layers and activation: cross-validation over a grid, then the one-standard-error rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from wristctl.config.errors import UserError
+from wristctl.config.learning import NetworkSettings, TrainSettings
+from wristctl.learning.dataset import Split
+from wristctl.learning.training import Job, Trial
+from wristctl.wrist.kinematics import Array
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One point of the grid and what the folds said of it."""
+
+    settings: NetworkSettings
+    depth: int
+    multiply_adds: int
+    rmse: Array
+    """(folds,) of the angle on the part held out [rad]"""
+
+    @property
+    def mean(self) -> float:
+        """Over the folds [rad]; infinite where one diverged."""
+        return float(self.rmse.mean())
+
+    @property
+    def standard_error(self) -> float:
+        """Of that mean [rad]."""
+        return float(self.rmse.std(ddof=1) / np.sqrt(len(self.rmse)))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The whole grid, the chosen point of it, the one with the least error, and the reason in words."""
+
+    found: Sequence[Candidate]
+    chosen: Candidate
+    best: Candidate
+    reason: str
+
+
+def grid_points(settings: TrainSettings) -> list[NetworkSettings]:
+    """Every combination of the grid, with the section's own values elsewhere."""
+    grid, fields = settings.grid, set(NetworkSettings.model_fields)
+    base = settings.model_dump(include=fields, exclude={"preset"})
+    rates = grid.learning_rates or (settings.learning_rate,)
+    decays = grid.weight_decays or (settings.weight_decay,)
+    return [
+        NetworkSettings.model_validate(
+            base
+            | {"hidden": (width, *[width // 2] * (depth - 1)), "activation": activation}
+            | {"learning_rate": rate, "weight_decay": decay}
+        )
+        for activation, depth, width, rate, decay in product(
+            grid.activations, grid.depths, grid.widths, rates, decays
+        )
+    ]
+
+
+def fold_jobs(points: Sequence[NetworkSettings], split: Split, folds: int, seed: np.random.SeedSequence) -> list[Job]:
+    """One training for each point and fold; training and validation samples are cut in `folds`, the test is not used.
+
+    A fold has the same samples and the same random stream at every point.
+    """
+    rows = np.concatenate([split.train, split.validation])
+    parts, seeds = np.array_split(rows, folds), seed.spawn(folds)
+    if min(len(part) for part in parts) < 2:
+        raise UserError(f"{len(rows)} samples are too few for {folds} folds", "train.grid.folds", "draw more samples")
+    cuts = [Split(np.setdiff1d(rows, part, assume_unique=True), part, split.test) for part in parts]
+    return [
+        Job(f"grid-{number}-{fold}", settings, cut, seeds[fold], fold)
+        for number, settings in enumerate(points)
+        for fold, cut in enumerate(cuts)
+    ]
+
+
+def candidates(trials: Sequence[Trial], folds: int) -> list[Candidate]:
+    """The grid's points out of the trials of `fold_jobs`."""
+    found = []
+    for first in range(0, len(trials), folds):
+        own = trials[first : first + folds]
+        losses = np.array([trial.validation_loss for trial in own])
+        rmse = np.sqrt(np.where(np.isfinite(losses), losses, np.inf))
+        network = own[0].network
+        found.append(Candidate(own[0].job.settings, len(network.weights) - 1, network.multiply_adds, rmse))
+    return found
+
+
+def choose(found: Sequence[Candidate]) -> Choice:
+    """The network of the fewest multiply-adds within one standard error of the least error.
+
+    Breiman et al., Classification and Regression Trees (1984), section 3.4. Raises UserError where all diverged.
+    """
+    finite = [each for each in found if np.isfinite(each.mean)]
+    if not finite:
+        raise UserError("every network of the grid diverged", "train.learning_rate", "choose less")
+    best = min(finite, key=lambda each: each.mean)
+    limit = best.mean + best.standard_error
+    chosen = min((each for each in finite if each.mean <= limit), key=lambda each: (each.multiply_adds, each.mean))
+    reason = (
+        f"{_named(chosen)} is the cheapest network ({chosen.multiply_adds} multiply-adds) whose cross-validated RMSE "
+        f"({np.degrees(chosen.mean):.3g} deg) lies within one standard error ({np.degrees(best.standard_error):.2g} "
+        f"deg) of the least ({np.degrees(best.mean):.3g} deg, {_named(best)})"
+    )
+    return Choice(found, chosen, best, reason)
+
+
+def _named(candidate: Candidate) -> str:
+    return f"{'-'.join(map(str, candidate.settings.hidden))} {candidate.settings.activation}"
