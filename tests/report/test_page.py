@@ -139,12 +139,14 @@ def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, c
     assert panels == [rested, "diverged", *[rested] * 4]
     other = "const g = document.getElementById('group'); g.selectedIndex = 1; g.dispatchEvent(new Event('change'));"
     assert browser.run(other + seek + read) == [rested] * 6
-    browser.run("document.getElementById('play').click()")
-    time.sleep(0.5)
-    first = browser.run("return document.getElementById('clock').textContent")
-    assert 0.0 < float(first.split()[0]) < 4.0
-    assert browser.run("return document.getElementById('play').textContent") == "Pause"
-    browser.run("document.getElementById('play').click()")
+    clock = "return parseFloat(document.getElementById('clock').textContent)"
+    pressed = browser.run("document.getElementById('play').click(); return document.getElementById('play').textContent")
+    assert pressed == "Pause"
+    deadline = time.monotonic() + 30.0  # from the beginning to the end again, however slow the machine
+    seen = {browser.run(clock)}
+    while max(seen) < 4.9 and time.monotonic() < deadline:
+        seen.add(browser.run(clock))
+    assert min(seen) < 4.9 <= max(seen)
     assert browser.console() == []
 
 

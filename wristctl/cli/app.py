@@ -86,6 +86,10 @@ def _wristctl(
 def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    lost: list[type[BaseException]] = []  # a KeyboardInterrupt in a compiler's callback ends as another error
+    sys.unraisablehook = lambda told: (
+        lost.append(told.exc_type) if told.exc_type is KeyboardInterrupt else sys.__unraisablehook__(told)
+    )
     try:
         code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
     except UserError as error:
@@ -96,6 +100,8 @@ def main() -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:
+        if lost:
+            sys.exit(130)
         notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
         code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
     sys.exit(code)

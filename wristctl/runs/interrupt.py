@@ -6,6 +6,8 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
 from typing import Any
 
 
@@ -22,9 +24,27 @@ def _handled(handlers: dict[signal.Signals, Any]) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def sigterm_as_interrupt() -> Any:
-    """Within the block (main thread only) SIGTERM raises KeyboardInterrupt."""
-    return _handled({signal.SIGTERM: signal.default_int_handler})
+@dataclass
+class Interrupts:
+    """Whether Ctrl-C or SIGTERM has come: a KeyboardInterrupt in a compiler's callback is lost on its way up."""
+
+    asked: bool = False
+
+
+@contextmanager
+def interrupts() -> Iterator[Interrupts]:
+    """Within the block (main thread only) Ctrl-C, where it is not ignored, and SIGTERM raise KeyboardInterrupt."""
+    seen = Interrupts()
+
+    def raised(number: int, frame: FrameType | None) -> None:
+        seen.asked = True
+        raise KeyboardInterrupt
+
+    handlers: dict[signal.Signals, Any] = {signal.SIGTERM: raised}
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        handlers[signal.SIGINT] = raised
+    with _handled(handlers):
+        yield seen
 
 
 def undisturbed() -> Any:

@@ -20,7 +20,7 @@ from wristctl.config.study import Study
 from wristctl.runs.code import code_state
 from wristctl.runs.environment import environment_state
 from wristctl.runs.files import replacing, sha256_of, write_text
-from wristctl.runs.interrupt import sigterm_as_interrupt, undisturbed
+from wristctl.runs.interrupt import interrupts, undisturbed
 from wristctl.runs.journal import now
 from wristctl.runs.live import LiveRun, Page
 from wristctl.runs.lock import RunLock
@@ -56,7 +56,7 @@ def start_run(
     path = _new_directory(out, kind, label, digest)
     lock = RunLock(path)
     try:
-        with sigterm_as_interrupt():
+        with interrupts() as seen:
             try:
                 run = _begin(path, kind, study, label, argv, inputs, digest, page)
             except BaseException as error:
@@ -67,7 +67,7 @@ def start_run(
                 with undisturbed():
                     run.end("ok")
             except BaseException as error:
-                told = _of_the_disk(error, path)
+                told = KeyboardInterrupt() if seen.asked else _of_the_disk(error, path)
                 with undisturbed():
                     _end_badly(run, told)
                 if told is not error:
