@@ -37,7 +37,7 @@ def _other(value: Any) -> Any:
         case tuple() if value and not isinstance(value[-1], str | Section):
             return (*value[:-1], _other(value[-1]))
         case tuple():
-            return value[:-1]
+            return value[:-1] if value else (1.0,)
     return "other"
 
 

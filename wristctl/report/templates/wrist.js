@@ -94,7 +94,8 @@
   }
   function tick(now) {
     if (last === null) return;
-    instant += (now - last) / 1e3 * Number(speed.value);
+    // a page that was busy or hidden goes on where it was, rather than jumping to the end
+    instant += Math.min(Math.max(now - last, 0), 100) / 1e3 * Number(speed.value);
     last = now;
     if (instant >= duration) { instant = duration; stop(); }
     show();
