@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -74,13 +72,3 @@ def error_map(inverse: Callable[[Array], Array], domain: Domain, angles: int = 2
     )
     tip = arc_tip(theta, length)
     return ErrorMap(tip, theta, inverse(tip) - theta)
-
-
-def call_time(angle: Callable[[Array], Array], tip: Array, repeats: int = 200) -> float:
-    """Median wall time of one call of `angle` on `tip` [s]."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        angle(tip)
-        times.append(time.perf_counter() - began)
-    return statistics.median(times)
