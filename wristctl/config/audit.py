@@ -34,4 +34,4 @@ class AuditSettings(Section):
     """Which claims, and over which horizon their rollouts go."""
 
     claims: str = choice("experiments/claims.yaml", "ledger of claims")
-    horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)

@@ -67,7 +67,7 @@ class CompareSettings(Section):
         ("network", "exact"), "how tip targets become angles; overrides the references' own", min_length=1
     )
     directions: tuple[Direction, ...] = choice(("ulnar",), "directions of bending, each by its own plane", min_length=1)
-    horizon: float = quantity(5.0, "s", "duration of one rollout", "DESIGN 7", gt=0)
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
     tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")

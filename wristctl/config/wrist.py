@@ -1,4 +1,4 @@
-"""The wrist's parameters; every default carries its source (DESIGN: the paper gives few of them, C10)."""
+"""The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
 from __future__ import annotations
 
