@@ -22,6 +22,7 @@ from wristctl.config.bench import BenchSettings, Fault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.bench.film import start_film
 from wristctl.hardware.bench.frame_memory import FrameMemory, SharedCamera
 from wristctl.hardware.bench.line import FaultyLine
 from wristctl.hardware.bench.rig import Rig
@@ -49,8 +50,9 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 
     def start(*faults: Fault) -> tuple[BenchServer, Path]:
         settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
-        line = PtyLine()
-        server = BenchServer(Rig(settings, WristParameters(), 0), line, tmp_path / "frame", tmp_path / "record")
+        line, wrist = PtyLine(), WristParameters()
+        _, film = start_film(settings.camera, wrist, None, tmp_path / "frame")
+        server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record")
         server.address = line.address  # type: ignore[attr-defined]
         thread = threading.Thread(target=server.run)
         thread.start()
