@@ -72,6 +72,7 @@ def tensions(trajectory: Trajectory) -> Figure:
     """
     made, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
     acting = _apart(trajectory.acting, trajectory.tension)
+    largest = max(float(np.nanmax(each)) for each in (trajectory.tension, acting) if each is not None)
     end = float(trajectory.time[-1])
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
@@ -86,7 +87,7 @@ def tensions(trajectory: Trajectory) -> Figure:
     for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
         each.set_ylabel(name)
     for each in axes[:2, 0]:
-        each.set_ylim(0.0, 1.05 * float(np.nanmax(trajectory.tension)))
+        each.set_ylim(0.0, 1.05 * largest)
     size = 2.0 * float(np.nanmax(np.abs(trajectory.torque), initial=1e-3))
     _at_most(axes[2, 0], -size, size)
     axes[2, 0].set_xlabel("time [s]")
