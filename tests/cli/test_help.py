@@ -44,7 +44,7 @@ def test_help_and_listing_load_no_heavy_package() -> None:
 def test_help_comes_within_a_quarter_of_a_second() -> None:
     code = "from wristctl.cli.app import main; main()"
     took = []
-    for _ in range(3):
+    for _ in range(5):
         began = os.times()
         assert _python(code, "--help").returncode == 0
         ended = os.times()  # processor time: what else the machine does is not the command's

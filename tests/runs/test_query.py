@@ -87,7 +87,9 @@ def test_many_runs_list_in_the_time_a_person_waits(make: Make, results: Path) ->
         took.append(time.process_time() - began)
         assert isinstance(found, Run) or len(found) == COUNT
     print(f"{COUNT} runs: {took[0]:.2f} s without the index, {took[1]:.2f} s with it, {took[2]:.2f} s for the latest")
-    assert took[0] < 20.0 * COUNT / 10_000 and max(took[1:]) < 2.0 * COUNT / 10_000
+    assert max(took[1:]) < took[0] / 3
+    if COUNT == 10_000:
+        assert took[0] < 20.0 and max(took[1:]) < 2.0
 
 
 def test_tags_stand_beside_the_sealed_run(make: Make, results: Path) -> None:
