@@ -80,16 +80,20 @@ def test_many_runs_list_in_the_time_a_person_waits(make: Make, results: Path) ->
         path.mkdir()
         for name, text in texts.items():
             (path / name).write_text(text)
-    took = []
-    for ask in (entries, entries, lambda results: open_run("latest:gen-data", results)):
+    def seconds(ask: Callable[[Path], object]) -> float:
         began = time.process_time()
         found = ask(results)
-        took.append(time.process_time() - began)
-        assert isinstance(found, Run) or len(found) == COUNT
-    print(f"{COUNT} runs: {took[0]:.2f} s without the index, {took[1]:.2f} s with it, {took[2]:.2f} s for the latest")
-    assert max(took[1:]) < took[0] / 3
+        took = time.process_time() - began
+        assert isinstance(found, Run) or len(found) == COUNT  # type: ignore[arg-type]
+        return took
+
+    without = seconds(entries)
+    listed = min(seconds(entries) for _ in range(3))
+    latest = min(seconds(lambda folder: open_run("latest:gen-data", folder)) for _ in range(3))
+    print(f"{COUNT} runs: {without:.2f} s without the index, {listed:.2f} s with it, {latest:.2f} s for the latest")
+    assert max(listed, latest) < without / 3
     if COUNT == 10_000:
-        assert took[0] < 20.0 and max(took[1:]) < 2.0
+        assert without < 20.0 and max(listed, latest) < 2.0
 
 
 def test_tags_stand_beside_the_sealed_run(make: Make, results: Path) -> None:
