@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Session, Table, study_command
-from wristctl.cli.progress import PLAIN
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.runs import Run
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from wristctl.hardware.vision.camera import DeviceCamera, Frame
     from wristctl.hardware.vision.charuco import Album, Calibration
+
+log = logging.getLogger(__name__)
 
 _PATIENCE = 20.0
 """Seconds in which the board must be seen lying in the bending plane."""
@@ -35,7 +37,7 @@ _MEANING = {
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Where the views come from."""
     settings = study.calibrate_camera
-    source = settings.camera or "rendered pictures: no camera is named"
+    source = "rendered pictures (no camera is named)" if settings.camera is None else settings.camera
     last = "; the last view is the board in the bending plane" if settings.in_plane else ""
     return f"views of a {settings.board.columns} x {settings.board.rows} board from {source}{last}"
 
@@ -102,15 +104,16 @@ def _look(session: Session) -> Album:
 
     settings, run, names = session.settings, session.run, []
     frames: Iterable[Frame]
-    live = settings.camera is not None and is_device(settings.camera)
+    source = str(settings.camera)
+    live = settings.camera is not None and is_device(source)
     if settings.camera is None:
-        session.console.print("no camera named, so views are rendered (--camera 0, a video, or a folder)", **PLAIN)
+        log.info("no camera named, so views are rendered (--camera 0, a video, or a folder)")
         album, names, frames = Album(settings.board), [str(k) for k in range(settings.views)], _rendered(session)
     elif live:
         album = Album(settings.board, settings.views)
         frames = _live(session, album)
     else:
-        frames = open_recording(settings.camera)
+        frames = open_recording(source)
         names = [file.name for file in frames.files] if isinstance(frames, FolderCamera) else []
         album = Album(settings.board, None if names else settings.views)
     name = ""
@@ -122,7 +125,7 @@ def _look(session: Session) -> Album:
             done(frame.number + 1, views=len(album.views))
     if album.last is None or album.last_picture is None:
         fix = "show it sharp, well lit and whole; is it the board of hw calibrate board-pdf (calibrate-camera.board)?"
-        raise UserError(f"no board in {album.pictures} pictures", settings.camera or "rendered", fix, exit_code=3)
+        raise UserError(f"no board in {album.pictures} pictures", source, fix, exit_code=3)
     if names and settings.in_plane and album.last.name != name:
         what = "the last picture does not show the board, which should lie in the bending plane there"
         raise UserError(what, name, "add such a picture, or go without: --set in_plane=false", exit_code=3)
@@ -149,16 +152,15 @@ def _live(session: Session, album: Album) -> Iterator[Frame]:
     from wristctl.hardware.vision.charuco import least_seen
 
     settings = session.settings
-    camera = DeviceCamera(settings.camera, settings.device)
+    camera = DeviceCamera(str(settings.camera), settings.device)
     try:
-        session.console.print("show the board: near, in all parts of the picture, tilted 20 to 40 deg", **PLAIN)
+        log.info("show the board: near, in all parts of the picture, tilted 20 to 40 deg")
         taken = 0
         while len(album.views) < settings.views:
             yield from _newest(camera)
             if len(album.views) > taken:
                 taken = len(album.views)
-                where = least_seen(album.seen)
-                session.console.print(f"view {taken} of {settings.views}; least seen yet: {where}", **PLAIN)
+                log.info("view %d of %d; least seen yet: %s", taken, settings.views, least_seen(album.seen))
         if settings.in_plane:
             asked = "Lay the board in the bending plane, then press Enter"
             typer.prompt(asked, default="", show_default=False, err=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -20,7 +21,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from wristctl.hardware.vision.marker import Sighting
+    from wristctl.hardware.vision.view import View
 
+log = logging.getLogger(__name__)
+
+_ASKEW = 0.3
+"""Warn from here on [deg]; noise of the corners alone is below 0.1."""
 _CORNERS = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
 _UNITS = {"time": "s", "theta": "rad"} | dict.fromkeys(_CORNERS, "px")
 _MEANING = {
@@ -78,6 +84,11 @@ def track(session: Session) -> list[Table]:
     run.metric("theta_min", min(thetas), "deg", n=usable, meaning="least angle")
     run.metric("theta_max", max(thetas), "deg", n=usable, meaning="greatest angle")
     run.metric("noise", noise, "deg", "lower", usable, meaning="deviation from steady motion")
+    skew = _askew(session, sightings)
+    run.metric("askew", skew, "deg", "lower", usable, meaning="largest error, by the base's marker that is no square")
+    if skew > _ASKEW:
+        fix = "calibrate the camera where it stands now, and name that run with --calibration"
+        log.warning("angles may be up to %.1f deg off, for the base's marker looks askew - fix: %s", skew, fix)
     lasts = sightings[-1].time - sightings[0].time
     rows = [
         ("frames", total),
@@ -86,6 +97,7 @@ def track(session: Session) -> list[Table]:
         ("least angle [deg]", min(thetas)),
         ("greatest angle [deg]", max(thetas)),
         ("noise [deg]", noise),
+        ("askew [deg]", skew),
     ]
     why = [(str(verdict), count, count / total, MEANING[verdict]) for verdict, count in counts.most_common()]
     columns = ("verdict", "frames", "share", "meaning")
@@ -97,12 +109,9 @@ def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
     from wristctl.hardware.vision.annotate import Film, Picked
     from wristctl.hardware.vision.camera import open_recording
     from wristctl.hardware.vision.marker import Tracker, Verdict
-    from wristctl.hardware.vision.view import FILE, View
 
     settings = session.settings
-    earlier = session.inputs.get("calibration")
-    view = View() if earlier is None else View.load(earlier.file(FILE))
-    tracker = Tracker(settings.markers, view, settings.gates)
+    tracker = Tracker(settings.markers, _view(session), settings.gates)
     recording = open_recording(settings.video, settings.frame_rate)
     film = Film(session.run.file("data/annotated.avi"), recording.frame_rate) if settings.annotate else None
     sightings, picked, zero = [], Picked(), settings.zero == "first"
@@ -122,6 +131,23 @@ def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
         if film is not None:
             film.close()
     return sightings, picked.pictures()
+
+
+def _view(session: Session) -> View:
+    from wristctl.hardware.vision.view import FILE, View
+
+    earlier = session.inputs.get("calibration")
+    return View() if earlier is None else View.load(earlier.file(FILE))
+
+
+def _askew(session: Session, sightings: Sequence[Sighting]) -> float:
+    """How far off [deg] an angle may be, by how square the base's marker looks in the calibrated view on average."""
+    import numpy as np
+
+    from wristctl.hardware.vision.detector import askew
+
+    seen = np.array([each.corners[0] for each in sightings if math.isfinite(each.theta)])
+    return math.degrees(askew(_view(session).rectify(np.nanmean(seen, axis=0))))
 
 
 def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:
