@@ -31,7 +31,10 @@ finally:
 """
 
 
-@pytest.mark.parametrize("arguments", [["--help"], [], ["--version"], ["runs", "--help"], ["runs", "ls"]])
+_LIGHT = [["--help"], [], ["--version"], ["runs", "--help"], ["runs", "ls"], ["hw", "calibrate", "camera", "--help"]]
+
+
+@pytest.mark.parametrize("arguments", _LIGHT)
 def test_help_and_listing_load_no_heavy_package(arguments: list[str]) -> None:
     done = _python(_LOADED, *arguments)
     assert "Traceback" not in done.stderr
