@@ -26,6 +26,7 @@ lint: .venv/dev
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
 	$(BIN)/python benchmarks/board.py
+	$(BIN)/python benchmarks/vision.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:

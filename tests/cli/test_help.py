@@ -33,23 +33,13 @@ for arguments in json.loads(sys.argv[1]):
 
 
 def test_help_and_listing_load_no_heavy_package() -> None:
-    typed = [[], ["--help"], ["--version"], ["runs", "ls"], *([name, "--help"] for name in COMMANDS)]
+    named = [*([name] for name in COMMANDS), ["hw", "calibrate", "camera"]]
+    typed = [[], ["--help"], ["--version"], ["runs", "ls"], *([*name, "--help"] for name in named)]
     done = _python(_LOADED, json.dumps(typed))
     ended = [json.loads(line.removeprefix("ended:")) for line in done.stderr.splitlines() if line.startswith("ended:")]
     assert [arguments for arguments, _, _ in ended] == typed
     for arguments, code, loaded in ended:
         assert code == 0 and not set(loaded) & set(HEAVY), arguments
-
-
-def test_help_comes_within_a_quarter_of_a_second() -> None:
-    code = "from wristctl.cli.app import main; main()"
-    took = []
-    for _ in range(5):
-        began = os.times()
-        assert _python(code, "--help").returncode == 0
-        ended = os.times()  # processor time: what else the machine does is not the command's
-        took.append(ended.children_user - began.children_user + ended.children_system - began.children_system)
-    assert min(took) <= 0.25
 
 
 def test_wristctl_alone_shows_help_with_examples() -> None:

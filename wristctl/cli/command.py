@@ -84,18 +84,21 @@ def study_command(
     inputs: Sequence[Input] = (),
     shortcuts: Sequence[str] = (),
     examples: Sequence[str] = (),
+    argument: str | None = None,
 ) -> typer.Typer:
     """The command `kind`, which runs `work` on its section of the study in a run directory of its own.
 
     `plan` says what will be done and raises UserError for what can be known before anything is written.
     Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
-    section) an option for `--set`. The docstring of `work` is the help.
+    section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
+    files. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
     named = [each.leaf for each in inputs]
+    first = (argument,) if argument else ()
 
     def call(**given: Any) -> None:
-        own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
+        own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         _execute(
             command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
@@ -103,9 +106,9 @@ def study_command(
 
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
-    quoted = {*named, *switches}
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*named, *shortcuts)]
-    call.__signature__ = signature(own)  # type: ignore[attr-defined]
+    quoted = {*first, *named, *switches}
+    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*first, *named, *shortcuts)]
+    call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
     app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)
