@@ -9,6 +9,7 @@ import pytest
 
 from wristctl.config.bench import FAULTS
 from wristctl.hardware.dictionary import load
+from wristctl.hardware.vision.marker import MEANING
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
 FIRMWARE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware"
@@ -29,6 +30,12 @@ def test_every_fault_that_can_be_injected_is_explained_in_the_schemas_words() ->
     text = (DOCUMENTS / "emulated-bench.md").read_text()
     for kind, meaning in FAULTS.items():
         assert f"| {kind} | {meaning} |" in text
+
+
+def test_each_verdict_on_a_frame_is_explained_in_the_trackers_words() -> None:
+    text = (DOCUMENTS / "camera.md").read_text()
+    for verdict, meaning in MEANING.items():
+        assert f"| {verdict} | {meaning} |" in text
 
 
 def test_wiring_names_the_pins_the_firmware_uses() -> None:
