@@ -14,7 +14,7 @@ from table import Side
 from venvs import CACHE, HERE, python_of
 
 ROOT = HERE.parents[1]
-PATIENCE = 150.0
+PATIENCE = 240.0
 """Seconds that a side may take for one answer, compilation included."""
 
 
