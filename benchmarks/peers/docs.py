@@ -85,13 +85,13 @@ def roofline(result: Result) -> str:
     sizes = ", ".join(f"{size / 1024:.0f} KiB (n = {n})" for n, size in raw["scratch"].items())
     lines.append(
         f"\nFrom memory a tick of a block of 16 lanes reads one row of its reference, 24 bytes for each motion; its "
-        f"own state and scratch ({sizes}) stay in the nearest caches. So the loop is bound by arithmetic, by its "
-        "chains of dependent operations and by loads and stores of the scratch, not by memory: a roofline's flat part. "
-        f"Only products next to a sum fuse, which alone keeps it below the peak; divisions, {cost:.0f} operations' "
-        f"time each, fill up to {', '.join(notes)}. What that led to: blocks of two registers, so that two chains "
-        "overlap; one division in the allocation instead of two; tendon torques once a stage; no product with a zero "
-        "acceleration; one call for many blocks. What it suggests next: a symmetric factorisation of the mass matrix, "
-        "and for n = 8, whose scratch outgrows the first cache, blocks of one register.\n"
+        f"own state and scratch ({sizes}) fit the nearest caches. So memory's bandwidth is no limit: this is the "
+        "roofline's flat part. What keeps the loop below the peak is that only a product next to a sum fuses with it, "
+        "that one step is a chain of operations that wait for each other, loads and stores of the scratch, and "
+        f"divisions: {cost:.0f} operations' time each, {', '.join(notes)}. What that led to: blocks of two registers, "
+        "so that two chains overlap; one division in the allocation instead of two; tendon torques once a stage; no "
+        "product with a zero acceleration; one call for many blocks. What it suggests next: a symmetric factorisation "
+        "of the mass matrix, and for n = 8, whose scratch outgrows a first cache of 48 KiB, blocks of one register.\n"
     )
     return "\n".join(lines)
 
@@ -124,7 +124,7 @@ def cost_model(costs: dict[str, Any]) -> str:
     lines = ["## Cost model\n", f"Time grows as size to a power ({costs['threads']} threads):\n"]
     lines.append("| size | from | to | exponent |\n|---|---|---|---|")
     for name, value, points, over in rows:
-        ends = (f"{points[k][over]:,g}: {1e3 * points[k]['seconds']:,.3g} ms" for k in (0, -1))
+        ends = (f"{points[k][over]:,g}: {points[k]['seconds']:.3g} s" for k in (0, -1))
         lines.append(f"| {name} | {' | '.join(ends)} | {value:.2f} |")
     stream = costs["stream"]
     lines.append(

@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from rates import Result, Variant
-from report import ratio_text
+from report import number
 from table import OURS
 
 EQUAL, LARGER, MINE, LIMIT = "#4c78a8", "#b8c9dd", "#d1495b", "#8a8a8a"
@@ -27,11 +27,12 @@ def figure(result: Result, path: Path) -> None:
         measured = {v: rate for v in result.variants(n) if (rate := result.rate(v, n, threads, lanes))}
         order = sorted(measured, key=lambda v: measured[v])
         ours = next(measured[v] for v in order if v.side == OURS)
-        _bars(column[0], order, [measured[v] for v in order], [f"{measured[v]:,.0f}" for v in order])
-        column[0].set(title=f"n = {n}, {lanes:,} lanes, {threads} threads", xlabel="simulated seconds per second")
+        _bars(column[0], order, [measured[v] for v in order], [number(measured[v]) for v in order])
+        where = f"n = {n}, {lanes:,} lanes, {threads} thread{'s' if threads > 1 else ''}"
+        column[0].set(title=where, xlabel="simulated seconds per second")
         others = [v for v in reversed(order) if v.side != OURS]
         ratios = [ours / measured[v] for v in others]
-        _bars(column[1], others, ratios, [ratio_text(ratio) for ratio in ratios])
+        _bars(column[1], others, ratios, [number(ratio) for ratio in ratios])
         column[1].axvline(1.0, color="k", lw=0.8)
         column[1].set(xlabel="times that wristctl is faster")
     names = {MINE: "wristctl", EQUAL: "error at most wristctl's", LARGER: "larger error", LIMIT: "the same loop in C"}

@@ -7,14 +7,10 @@ from rates import Result, Variant
 from table import OURS
 
 
-def _number(value: float | None) -> str:
+def number(value: float | None) -> str:
+    """A rate or a ratio to two digits, whole from 10 on; a dash where there is none."""
     if value is None:
         return "-"
-    return f"{value:,.0f}" if value >= 10 else f"{value:.2g}"
-
-
-def ratio_text(value: float) -> str:
-    """A ratio to two digits, or whole from 10 on."""
     return f"{value:,.0f}" if value >= 10 else f"{value:.2g}"
 
 
@@ -32,9 +28,9 @@ def markdown(result: Result) -> str:
             for variant in result.variants(n):
                 rates = [result.rate(variant, n, threads, count) for count in lanes]
                 best = [result.rate(ours, n, threads, count) for count in lanes]
-                ratios = [ratio_text(a / b) if a and b else "-" for a, b in zip(best, rates, strict=True)]
+                ratios = [number(a / b) if a and b else "-" for a, b in zip(best, rates, strict=True)]
                 error = f"{variant.error:.1e}" + ("" if variant.equal else " (larger)")
-                cells = [variant.side, str(variant.steps), error, *map(_number, rates), " / ".join(ratios)]
+                cells = [variant.side, str(variant.steps), error, *map(number, rates), " / ".join(ratios)]
                 parts.append("| " + " | ".join(cells) + " |")
             parts.append("")
     return "\n".join(parts)
