@@ -56,5 +56,6 @@ def _trajectory(side: Side, file: Path, steps: int) -> np.ndarray:
 
 def _far(a: np.ndarray, b: np.ndarray) -> float:
     """Largest difference; infinite where a side blew up."""
-    apart = float(np.max(np.abs(a - b)))
+    with np.errstate(all="ignore"):
+        apart = float(np.max(np.abs(a - b)))
     return apart if np.isfinite(apart) else float("inf")
