@@ -36,6 +36,7 @@ def test_audit_judges_every_claim_and_cites_a_run_on_each_loop(call, tmp_path: P
     run = open_run("latest:audit")
     table = run.data("claims").set_index("claim")
     assert code == 0 and len(table) == len(claims) and table["verdict"].notna().all()
+    assert table.loc["C15-trade-off", "verdict"] == "open" and "--selection" in table.loc["C15-trade-off", "reason"]
     assert table.loc["C5-printed", "verdict"] == "not reproduced"
     assert table.loc["C5-exchanged", "reason"].startswith("holds on exact only")
     assert table.loc["C5-exchanged", "ours_low"] < 2.7e-4 < table.loc["C5-exchanged", "ours_high"]
@@ -48,16 +49,13 @@ def test_trainings_decide_the_claims_on_networks_and_are_cited(call, tmp_path: P
     """On trainings far too short, whose numbers the verdicts must follow."""
     data = yaml.safe_load(LEDGER.read_text())
     claims = [claim for claim in data["audit"]["claims"] if claim["evidence"] in ("table1", "selection")]
+    claims = [claim for claim in claims if "relu" not in claim["id"]]
     (tmp_path / "claims.yaml").write_text(yaml.safe_dump({"audit": {"claims": claims}}))
-    call("audit", "claims.yaml")
-    table = open_run("latest:audit").data("claims").set_index("claim")
-    assert set(table["verdict"]) == {"open"} and "--selection" in table.loc["C15-trade-off", "reason"]
-
     form = "hidden: [4], epochs: 2"
     rows = "".join(
         f"    - {{name: {kind}-{name}, preset: t1-{name}, {form}{more}}}\n"
         for kind, more in (("printed", ""), ("scaled", ", optimiser: adamw, standardise: true"))
-        for name in ("sigmoid", "relu", "leaky-relu", "tanh")
+        for name in ("sigmoid", "tanh")
     )
     (tmp_path / "rows.yaml").write_text(f"gen-data: {{samples: 40}}\ntrain:\n  seeds: 2\n  workers: 1\n  rows:\n{rows}")
     call("train", "rows.yaml")
