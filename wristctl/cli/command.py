@@ -21,8 +21,9 @@ from wristctl.cli.options import Options, signature
 from wristctl.cli.progress import PLAIN, Done, listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
+from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
-from wristctl.config.load import load_study
+from wristctl.config.load import read_study
 from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
 from wristctl.runs import InputRun, LiveRun, Run, open_run, require, start_run
@@ -83,18 +84,21 @@ def study_command(
     inputs: Sequence[Input] = (),
     shortcuts: Sequence[str] = (),
     examples: Sequence[str] = (),
+    argument: str | None = None,
 ) -> typer.Typer:
     """The command `kind`, which runs `work` on its section of the study in a run directory of its own.
 
     `plan` says what will be done and raises UserError for what can be known before anything is written.
     Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
-    section) an option for `--set`. The docstring of `work` is the help.
+    section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
+    files. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
     named = [each.leaf for each in inputs]
+    first = (argument,) if argument else ()
 
     def call(**given: Any) -> None:
-        own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
+        own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         _execute(
             command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
@@ -102,9 +106,9 @@ def study_command(
 
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
-    quoted = {*named, *switches}
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*named, *shortcuts)]
-    call.__signature__ = signature(own)  # type: ignore[attr-defined]
+    quoted = {*first, *named, *switches}
+    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*first, *named, *shortcuts)]
+    call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
     app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)
@@ -114,11 +118,14 @@ def study_command(
 def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> None:
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
-    study = load_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
+    study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
     with listening(options.quiet, options.verbose) as console:
         inputs = _opened(command, study, options.out)
         study = _naming(inputs, study, command, options.out)
-        plan = command.plan(study, inputs) if command.plan else ""
+        try:
+            plan = command.plan(study, inputs) if command.plan else ""
+        except UserError as error:
+            raise located(error, origins) from error
         if options.dry_run:
             return _print_plan(command.kind, study, plan, options)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]

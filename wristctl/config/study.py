@@ -8,6 +8,7 @@ from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
+from wristctl.config.vision import CalibrateCameraSettings, TrackSettings
 from wristctl.config.wrist import WristParameters
 
 
@@ -22,3 +23,5 @@ class Study(Section):
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
+    calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
+    track: TrackSettings = TrackSettings()
