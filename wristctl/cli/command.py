@@ -36,13 +36,15 @@ __all__ = ["Input", "Session", "Table", "study_command"]
 class Input:
     """An earlier run that a command reads: the leaf of a section that names it, and the kind it must be.
 
-    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked.
+    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. With
+    `several` the leaf holds any number of runs, which are the command's arguments; study files then need --config.
     """
 
     leaf: str
     kind: str | None
     optional: bool = False
     unfinished: bool = False
+    several: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def study_command(
     """
     command = _Command(kind, work, plan, inputs)
     named = [each.leaf for each in inputs]
+    listed = next((each.leaf for each in inputs if each.several), None)
 
     def call(**given: Any) -> None:
         own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
@@ -103,8 +106,10 @@ def study_command(
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
     quoted = {*named, *switches}
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*named, *shortcuts)]
-    call.__signature__ = signature(own)  # type: ignore[attr-defined]
+    options = [leaf for leaf in (*named, *shortcuts) if leaf != listed]
+    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in options]
+    runs = (listed, keys[listed].description or "") if listed else None
+    call.__signature__ = signature(own, runs)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
     app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)
@@ -136,13 +141,16 @@ def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> N
 
 
 def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
-    runs = {}
+    runs: dict[str, Run] = {}
     for each in command.inputs:
         ref = getattr(command.section(study), each.leaf)
-        if ref is not None:
+        if each.several and ref:
+            runs |= {f"{each.leaf}[{at}]": require(one, each.kind, out) for at, one in enumerate(ref)}
+        elif ref and not each.several:
             runs[each.leaf] = _stopped(ref, each, out) if each.unfinished else require(ref, each.kind, out)
         elif not each.optional:
-            fix = f"--{each.leaf} latest:{each.kind}, or the path or id of a {each.kind} run"
+            option = "" if each.several else f"--{each.leaf.replace('_', '-')} "
+            fix = f"{option}latest:{each.kind}, or the path or id of a {each.kind} run"
             raise UserError(f"{command.kind} needs a {each.kind} run", f"{command.kind}.{each.leaf}", fix)
     return runs
 
@@ -159,7 +167,13 @@ def _stopped(ref: str, wanted: Input, out: Path) -> Run:
 def _naming(inputs: dict[str, Run], study: Study, command: _Command, out: Path) -> Study:
     """The study with the inputs named for good: by id within `out`, else by path."""
     within = out.resolve()
-    names = {leaf: run.id if run.path.parent == within else str(run.path) for leaf, run in inputs.items()}
+    names: dict[str, Any] = {
+        role: run.id if run.path.parent == within else str(run.path) for role, run in inputs.items()
+    }
+    for each in command.inputs:
+        if each.several:
+            roles = [role for role in names if role.startswith(f"{each.leaf}[")]
+            names[each.leaf] = tuple(names.pop(role) for role in roles)
     section = command.section(study).model_copy(update=names)
     return study.model_copy(update={command.kind.replace("-", "_"): section})
 

@@ -48,14 +48,22 @@ class Options:
 _COMPLETED: dict[str, Callable[..., list[str]]] = {
     "controller": controllers,
     "data": run_ids,
+    "from_identified": run_ids,
     "network": run_ids,
     "tuned": run_ids,
 }
 
 
-def signature(own: Iterable[tuple[str, str, bool]]) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch)."""
-    shared = inspect.signature(Options, eval_str=True).parameters.values()
+def signature(own: Iterable[tuple[str, str, bool]], runs: tuple[str, str] | None = None) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch).
+
+    `runs` (leaf, help) is what takes runs as arguments in place of study files.
+    """
+    shared = list(inspect.signature(Options, eval_str=True).parameters.values())
+    if runs is not None:
+        argument = typer.Argument(metavar="RUN", help=runs[1], autocompletion=run_ids)
+        kind = Annotated[list[str] | None, argument]
+        shared[0] = inspect.Parameter(runs[0], inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
     named = [
         inspect.Parameter(
             leaf,

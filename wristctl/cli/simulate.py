@@ -7,13 +7,14 @@ from wristctl.cli.command import Input, Session, Table, study_command
 
 def simulate(session: Session) -> Table:
     """Simulate one closed loop and draw it."""
-    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
+    from wristctl.cli.loops import identified, network_of, tuned_of, warn_if_it_buckles
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import directions, stroboscope
     from wristctl.simulation.metrics import METRICS
     from wristctl.simulation.simulate import simulate as run_simulation
     from wristctl.simulation.trajectory import COLUMNS
 
+    session = identified(session, "simulate")
     run, wrist = session.run, session.study.wrist
     warn_if_it_buckles(session, [session.settings.loop])
     with session.progress("compiling and simulating the loop"):
@@ -48,7 +49,11 @@ def simulate(session: Session) -> Table:
 app = study_command(
     "simulate",
     work=simulate,
-    inputs=(Input("network", kind="train", optional=True), Input("tuned", kind="tune", optional=True)),
+    inputs=(
+        Input("network", kind="train", optional=True),
+        Input("tuned", kind="tune", optional=True),
+        Input("from_identified", kind="identify", optional=True),
+    ),
     shortcuts=("controller", "gains"),
     examples=(
         "wristctl simulate --controller smc --gains exchanged",
