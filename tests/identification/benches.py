@@ -79,7 +79,7 @@ def write_run(
 ) -> Run:
     """A run of kind hw-run with the trials of a rehearsed bench."""
     made, _ = bench(seed)
-    rng = np.random.default_rng([seed, 2])
+    rng = np.random.default_rng([seed, int(abs(pose.gravity_flexion))])
     tables = rehearse(pose, made(pose), [(each, moves) for each in sides], 5.0, rng)
     with start_run("hw-run", Study(wrist=pose), out=out) as run:
         for name, table in zip(("log", "frames", "trials"), tables, strict=True):

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
 import typer
 from rich.console import Console
@@ -36,15 +36,14 @@ __all__ = ["Input", "Session", "Table", "study_command"]
 class Input:
     """An earlier run that a command reads: the leaf of a section that names it, and the kind it must be.
 
-    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. With
-    `several` the leaf holds any number of runs, which are the command's arguments; study files then need --config.
+    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. A leaf
+    that is a tuple names any number of runs.
     """
 
     leaf: str
     kind: str | None
     optional: bool = False
     unfinished: bool = False
-    several: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,19 +84,21 @@ def study_command(
     inputs: Sequence[Input] = (),
     shortcuts: Sequence[str] = (),
     examples: Sequence[str] = (),
+    argument: str | None = None,
 ) -> typer.Typer:
     """The command `kind`, which runs `work` on its section of the study in a run directory of its own.
 
     `plan` says what will be done and raises UserError for what can be known before anything is written.
     Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
-    section) an option for `--set`. The docstring of `work` is the help.
+    section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
+    files. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
-    named = [each.leaf for each in inputs]
-    listed = next((each.leaf for each in inputs if each.several), None)
+    named = [each.leaf for each in inputs if each.leaf != argument]
+    first = (argument,) if argument else ()
 
     def call(**given: Any) -> None:
-        own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
+        own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         _execute(
             command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
@@ -105,11 +106,11 @@ def study_command(
 
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
-    quoted = {*named, *switches}
-    options = [leaf for leaf in (*named, *shortcuts) if leaf != listed]
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in options]
-    runs = (listed, keys[listed].description or "") if listed else None
-    call.__signature__ = signature(own, runs)  # type: ignore[attr-defined]
+    quoted = {*first, *named, *switches}
+    kinds: dict[str, Any] = dict.fromkeys(switches, bool)
+    kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
+    own = [(leaf, keys[leaf].description or "", kinds.get(leaf, str)) for leaf in (*first, *named, *shortcuts)]
+    call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
     app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)
@@ -144,12 +145,12 @@ def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
     runs: dict[str, Run] = {}
     for each in command.inputs:
         ref = getattr(command.section(study), each.leaf)
-        if each.several and ref:
+        if isinstance(ref, tuple) and ref:
             runs |= {f"{each.leaf}[{at}]": require(one, each.kind, out) for at, one in enumerate(ref)}
-        elif ref and not each.several:
+        elif ref:
             runs[each.leaf] = _stopped(ref, each, out) if each.unfinished else require(ref, each.kind, out)
         elif not each.optional:
-            option = "" if each.several else f"--{each.leaf.replace('_', '-')} "
+            option = "" if isinstance(ref, tuple) else f"--{each.leaf.replace('_', '-')} "
             fix = f"{option}latest:{each.kind}, or the path or id of a {each.kind} run"
             raise UserError(f"{command.kind} needs a {each.kind} run", f"{command.kind}.{each.leaf}", fix)
     return runs
@@ -170,10 +171,8 @@ def _naming(inputs: dict[str, Run], study: Study, command: _Command, out: Path) 
     names: dict[str, Any] = {
         role: run.id if run.path.parent == within else str(run.path) for role, run in inputs.items()
     }
-    for each in command.inputs:
-        if each.several:
-            roles = [role for role in names if role.startswith(f"{each.leaf}[")]
-            names[each.leaf] = tuple(names.pop(role) for role in roles)
+    for leaf in dict.fromkeys(role.partition("[")[0] for role in names if role.endswith("]")):
+        names[leaf] = tuple(names.pop(role) for role in inputs if role.startswith(f"{leaf}["))
     section = command.section(study).model_copy(update=names)
     return study.model_copy(update={command.kind.replace("-", "_"): section})
 

@@ -179,7 +179,8 @@ app = study_command(
     "identify",
     work=identify,
     plan=plan,
-    inputs=(Input("runs", kind="hw-run", several=True),),
+    inputs=(Input("runs", kind="hw-run"),),
+    argument="runs",
     examples=(
         "wristctl identify latest:hw-run",
         "wristctl identify UPRIGHT_RUN LEVEL_RUN --set 'fix={friction: 0.1}'",

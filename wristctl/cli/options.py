@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,30 +50,34 @@ _COMPLETED: dict[str, Callable[..., list[str]]] = {
     "data": run_ids,
     "from_identified": run_ids,
     "network": run_ids,
+    "runs": run_ids,
     "tuned": run_ids,
 }
 
 
-def signature(own: Iterable[tuple[str, str, bool]], runs: tuple[str, str] | None = None) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch).
+def signature(own: Iterable[tuple[str, str, Any]], argument: str | None = None) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, type).
 
-    `runs` (leaf, help) is what takes runs as arguments in place of study files.
+    One of its own may be the `argument` that stands first, in place of study files.
     """
-    shared = list(inspect.signature(Options, eval_str=True).parameters.values())
-    if runs is not None:
-        argument = typer.Argument(metavar="RUN", help=runs[1], autocompletion=run_ids)
-        kind = Annotated[list[str] | None, argument]
-        shared[0] = inspect.Parameter(runs[0], inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+    shared = [
+        each
+        for name, each in inspect.signature(Options, eval_str=True).parameters.items()
+        if argument is None or name != "files"
+    ]
     named = [
         inspect.Parameter(
             leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[
-                (bool if switch else str) | None,
-                typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf)),
-            ],
+            annotation=Annotated[kind | None, _parameter(leaf, text, leaf == argument)],
         )
-        for leaf, text, switch in own
+        for leaf, text, kind in own
     ]
     return inspect.Signature([*shared, *named])
+
+
+def _parameter(leaf: str, text: str, first: bool) -> Any:
+    if first:
+        return typer.Argument(metavar=leaf.upper(), help=text, autocompletion=_COMPLETED.get(leaf))
+    return typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf))

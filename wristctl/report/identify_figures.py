@@ -54,7 +54,7 @@ def residuals(fit: Fit, known: Knowledge) -> Figure:
     right.axhspan(-band, band, color=GREY, alpha=0.3, linewidth=0.0, label="95 % of white noise")
     right.vlines(lags, 0.0, alike, color=VERMILLION)
     right.set(xlabel="lag [frames]", ylabel="autocorrelation")
-    title(right, f"neighbours {known.autocorrelation:.2f}, {known.effective:.0f} independent frames of {len(every)}")
+    title(right, f"worth {known.effective:.0f} independent frames of {len(every)}")
     legend(right, loc="upper right")
     return made
 
