@@ -1,7 +1,7 @@
 """`compiled`: numba's njit with this project's settings and a cache in the user's own cache folder.
 
 numba renews a cached function when its own file changes, but not when a function that it calls does. So the cache
-folder's name holds a hash of every source file of the package: other sources, another folder.
+folder's name holds a hash of every source file that compiled code may rest on: other sources, another folder.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT_DAYS = 30.0
+_ABOVE = {"cli", "report", "benchmark", "tuning", "runs"}
+"""Packages that compiled code does not rest on."""
 
 
 @cache
@@ -29,7 +31,8 @@ def cache_folder() -> Path | None:
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(package.rglob("*.py")):
-        digest.update(source.read_bytes())
+        if source.relative_to(package).parts[0] not in _ABOVE:
+            digest.update(source.read_bytes())
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
     folder = base / digest.hexdigest()[:16]
     try:

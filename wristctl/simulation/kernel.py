@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control.law import now_of, wrist_of
+from wristctl.control.response import respond
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
@@ -15,8 +16,8 @@ from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import actuate, pulls
 from wristctl.simulation.disturbances import disturb
 from wristctl.simulation.metrics import SUMS, gather, goals_of
-from wristctl.simulation.observer import expect, observe
-from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate, reach, torque_of
+from wristctl.simulation.observer import expect, watch
+from wristctl.wrist.allocation import TENDONS_PER_SIDE, torque_of
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments
 
@@ -35,16 +36,16 @@ _NAN = float("nan")
 @compiled
 def run_block(
     law: Any, plant: Any, model: Any, limits: Any, gains: Any, goals: Any, reference: Any, now: Any, memory: Any,
-    state: Any, sums: Any, record: Any, drive: Any, motors: Any, observer: Any, disturbed: Any,
+    state: Any, sums: Any, record: Any, drive: Any, motors: Any, watched: Any, disturbed: Any,
     period: float, substeps: int, ticks: int, first: int, last: int, segments: Any,
 ) -> None:  # fmt: skip
     """Advance one block from sample `first` to `last`, `ticks` control periods each.
 
     `reference` is [sample, (angle, rate, acceleration), lane], continued between samples by its own derivatives;
     `state`, `memory` and `sums` carry the loop on, so that a long run may be done in pieces. `record` takes each
-    sample's values, or has no samples. `drive` with its state `motors` are the actuators, `observer` stands behind a
-    camera, `disturbed` holds (tip force, stiffness scale) of each sample; each of the three is None where it is ideal
-    or absent, and then not compiled in. A lane leaves the game when a segment bends beyond a full turn.
+    sample's values, or has no samples. `drive` with its state `motors` are the actuators, `watched` is a camera with
+    its observer, `disturbed` holds (tip force, stiffness scale) of each sample; each of the three is None where it is
+    ideal or absent, and then not compiled in. A lane leaves the game when a segment bends beyond a full turn.
     """
     undisturbed = load_segments(rows_of(plant))
     wrist = undisturbed
@@ -70,25 +71,19 @@ def run_block(
                 rate = rate + omega[i]
             angle_seen, rate_seen = angle, rate
             now_tick = sample * ticks + tick
-            if observer is not None:
-                observe(observer, drive, known, now_tick, angle, period)
+            if watched is not None:
+                camera, observer = watched
+                watch(camera, observer, drive, known, now_tick, angle, period)
                 angle_seen, rate_seen = rows_of(observer.now)[0], rows_of(observer.now)[1]
-            torque_low, torque_high = reach(angle_seen, known, low, high)
-            signals[0] = angle_seen
-            signals[1] = rate_seen
-            signals[2] = target[0] + since * (target[1] + 0.5 * since * target[2])
-            signals[3] = target[1] + since * target[2]
-            signals[4] = target[2]
-            signals[5] = torque_low
-            signals[6] = torque_high
-            signals[7] = period + zero
-            wanted = law(view, seen, gain, kept)
-            plus, minus = allocate(angle_seen, known, wanted, low, high)
-            given_plus, given_minus = actuate(drive, motor, known, signals[2], plus, minus, period)
+            wanted, torque_low, torque_high, plus, minus = respond(
+                law, view, signals, seen, known, gain, kept, angle_seen, rate_seen, target, since, low, high, period
+            )
+            theta_ref = view.theta_ref
+            given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
             acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
-            gather(sum_, goal, time, angle, signals[2], acting_plus / _SIDE, acting_minus / _SIDE, saturated)
+            gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
             if tick == 0 and sample < record.shape[0]:
                 row = rows_of(record[sample])
                 row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
@@ -102,8 +97,8 @@ def run_block(
                 row[8] = angle_seen
                 for i in range(n):
                     row[_COLUMNS + i] = theta[i]
-            if observer is not None:
-                expect(observer, drive, known, now_tick, given_plus, given_minus, period)
+            if watched is not None:
+                expect(watched[1], drive, known, now_tick, given_plus, given_minus, period)
             for _ in range(substeps):
                 for i in range(n):
                     old_theta[i] = theta[i]

@@ -30,21 +30,26 @@ _ONE = (0,)
 
 
 class Observer(NamedTuple):
-    """One block's observer: frames, gain (3,), what was delivered (ring, 2, LANES), pictures (F, LANES), estimates.
+    """One block's estimates: gain (3,), what was delivered (ring, 2, LANES), and x (3, LANES).
 
-    `fused` holds x at the last fused frame, `now` x at the present tick, (3, LANES); `clock` the next frame to take,
-    the next to arrive, and the tick of `fused`.
+    `fused` is x at the last fused frame, at tick `at[0]`; `now` is x at the present tick.
     """
+
+    gain: Any
+    delivered: Any
+    fused: Any
+    now: Any
+    at: Any
+
+
+class Watch(NamedTuple):
+    """One block's camera: its Frames, pictures taken (F, LANES), and the next frame to take and to arrive, `turn`."""
 
     captures: Any
     arrivals: Any
     readings: Any
-    gain: Any
-    delivered: Any
     pictures: Any
-    fused: Any
-    now: Any
-    clock: Any
+    turn: Any
 
 
 @compiled
@@ -63,30 +68,40 @@ def predict(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> 
 
 
 @compiled
-def observe(observer: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
+def watch(camera: Any, observer: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
     """Take a frame of the true angle where one is due, and fuse the frame that arrives at this tick, if any."""
-    clock = observer.clock
-    taken, arrived = clock[0], clock[1]
-    if taken < len(observer.captures) and observer.captures[taken] == tick:
-        rows_of(observer.pictures)[taken] = angle + rows_of(observer.readings[taken])[0]
-        clock[0] = taken + 1
-    if arrived < clock[0] and observer.arrivals[arrived] == tick:
-        size = observer.delivered.shape[0]
-        fused, now = rows_of(observer.fused), rows_of(observer.now)
-        captured = observer.captures[arrived]
-        for past in range(clock[2], captured):
-            sent = rows_of(observer.delivered[past % size])
-            predict(drive, known, fused, sent[0], sent[1], h)
-        seen = rows_of(observer.readings[arrived])[1]
-        innovation = seen * (rows_of(observer.pictures)[arrived] - fused[0])
-        for i in range(3):
-            fused[i] = fused[i] + observer.gain[i] * innovation
-            now[i] = fused[i]
-        for past in range(captured, tick):
-            sent = rows_of(observer.delivered[past % size])
-            predict(drive, known, now, sent[0], sent[1], h)
-        clock[1] = arrived + 1
-        clock[2] = captured
+    turn = camera.turn
+    taken, arrived = turn[0], turn[1]
+    if taken < len(camera.captures) and camera.captures[taken] == tick:
+        rows_of(camera.pictures)[taken] = angle + rows_of(camera.readings[taken])[0]
+        turn[0] = taken + 1
+    if arrived < turn[0] and camera.arrivals[arrived] == tick:
+        seen = rows_of(camera.readings[arrived])[1]
+        fuse(observer, drive, known, camera.captures[arrived], 0.0, tick, rows_of(camera.pictures)[arrived], seen, h)
+        turn[1] = arrived + 1
+
+
+@compiled
+def fuse(
+    observer: Any, drive: Any, known: Any, captured: int, since: float, tick: int, angle: Any, seen: Any, h: float
+) -> None:
+    """Fuse an angle taken `since` seconds after tick `captured` (where `seen` is 1, not 0), and predict up to `tick`.
+
+    What was delivered at every tick from the last fused one on must still be in the ring.
+    """
+    size = observer.delivered.shape[0]
+    fused, now = rows_of(observer.fused), rows_of(observer.now)
+    for past in range(observer.at[0], captured):
+        sent = rows_of(observer.delivered[past % size])
+        predict(drive, known, fused, sent[0], sent[1], h)
+    innovation = seen * (angle - fused[0] - since * fused[1])
+    for i in range(3):
+        fused[i] = fused[i] + observer.gain[i] * innovation
+        now[i] = fused[i]
+    for past in range(captured, tick):
+        sent = rows_of(observer.delivered[past % size])
+        predict(drive, known, now, sent[0], sent[1], h)
+    observer.at[0] = captured
 
 
 @compiled
@@ -127,39 +142,43 @@ def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters,
     return gain
 
 
-def observers_of(
+def observer_of(
+    sensor: Sensor, drive: Drive | None, wrist: WristParameters, period: float, ticks: int, theta: float
+) -> Observer:
+    """An observer that knows the angle [rad] at which the wrist rests, and remembers the last `ticks` periods."""
+    start = np.zeros((3, LANES))
+    start[0] = theta
+    gain = stationary_gain(sensor, drive, wrist, period)
+    return Observer(gain, np.zeros((ticks, 2, LANES)), start, start.copy(), np.zeros(1, np.int64))
+
+
+def cameras_of(
     sensor: Sensor,
     drive: Drive | None,
     wrist: WristParameters,
     period: float,
     horizon: float,
     seeds: NDArray[np.int64],
-    theta: Array,
-) -> list[Observer] | list[None]:
-    """One observer for each block of the rollouts with these seeds (count,); None for each where the sensor is ideal.
-
-    They know the angles (n,) at which the wrist starts.
-    """
+    theta: float,
+) -> list[tuple[Watch, Observer]] | list[None]:
+    """A camera and an observer for each block of rollouts with these seeds (count,); None where sensors are ideal."""
     count, blocks = len(seeds), -(-len(seeds) // LANES)
     if sensor.level == "ideal":
         return [None] * blocks
     taken = frames(sensor, period, horizon, seeds)
-    gain = stationary_gain(sensor, drive, wrist, period)
     longest = int((taken.arrivals - taken.captures).max() + np.diff(taken.captures).max(initial=1)) + 2
-    start = np.zeros((3, LANES))
-    start[0] = theta.sum()
+    fresh = observer_of(sensor, drive, wrist, period, longest, theta)
     lanes = np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
     return [
-        Observer(
-            captures=taken.captures,
-            arrivals=taken.arrivals,
-            readings=np.ascontiguousarray(taken.readings[..., members]),
-            gain=gain,
-            delivered=np.zeros((longest, 2, LANES)),
-            pictures=np.zeros((len(taken.captures), LANES)),
-            fused=start.copy(),
-            now=start.copy(),
-            clock=np.zeros(3, np.int64),
+        (
+            Watch(
+                captures=taken.captures,
+                arrivals=taken.arrivals,
+                readings=np.ascontiguousarray(taken.readings[..., members]),
+                pictures=np.zeros((len(taken.captures), LANES)),
+                turn=np.zeros(2, np.int64),
+            ),
+            fresh._replace(**{name: getattr(fresh, name).copy() for name in ("delivered", "fused", "now", "at")}),
         )
         for members in lanes
     ]

@@ -20,7 +20,7 @@ from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.kernel import RECORDED, run_block
 from wristctl.simulation.metrics import SUMS, summary
-from wristctl.simulation.observer import observers_of
+from wristctl.simulation.observer import cameras_of
 from wristctl.simulation.plant import plant_of
 from wristctl.simulation.reference import Motion
 from wristctl.wrist.segments import segments
@@ -93,7 +93,7 @@ def rollout(
     references = _References(motions, which)
     total = len(blocks["gains"])
     streams = np.zeros(count, np.int64) if seeds is None else seeds
-    observers = observers_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest)
+    cameras = cameras_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest.sum())
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
     stop, done = threading.Event(), [0] * total
 
@@ -109,7 +109,7 @@ def rollout(
             run_block(
                 controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block],
                 reference, now, memory, state, blocks["sums"][block], recorded[block], drive, motors,
-                observers[block], disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
+                cameras[block], disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
             )  # fmt: skip
             done[block] = min(first + piece, samples)
 
