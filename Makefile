@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware test-trust clean venv
+.PHONY: run test lint bench bench-peers firmware test-firmware test-trust test-identify clean venv
 
 run: .venv/run
 	@set -e; \
@@ -36,6 +36,10 @@ firmware:
 test-firmware: .venv/dev firmware
 	$(MAKE) -C tests/firmware
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
+
+# Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
+test-identify: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/identification
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)

@@ -21,7 +21,7 @@ from wristctl.runs import Run, start_run
 
 KNOWN, TENDONS = WristParameters(), Actuator(level="tendon")
 UPRIGHT = KNOWN
-LEVEL = KNOWN.model_copy(update={"gravity": (0.0, 9.81), "gravity_flexion": 9.81})
+LEVEL = KNOWN.model_copy(update={"gravity": (0.0, 6.94), "gravity_flexion": 6.94})
 STEPS = Reference(kind="multi-step", angles_deg=(25.0, -10.0, 30.0, 0.0, 20.0, -15.0, 30.0, 0.0), duration=0.6)
 SLOW = Reference()
 DIRECTIONS = ("ulnar", "radial", "flexion", "extension")

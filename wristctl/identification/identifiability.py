@@ -33,7 +33,8 @@ def width_text(name: str, half: float) -> str:
     """Half an interval in words: a percentage, or in the parameter's own unit."""
     unknown = UNKNOWNS[name]
     if unknown.log:
-        return f"{100.0 * np.expm1(half):.2g} %" if half < np.log(11.0) else "more than 1000 %"
+        percent = 100.0 * np.expm1(min(half, 7.0))
+        return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %" if percent <= 1000.0 else "over 1000 %"
     return f"{1e3 * half:.2g} ms" if unknown.unit == "s" else f"{half:.2g}"
 
 
@@ -63,7 +64,9 @@ class Addition:
 
 Added = Callable[[Trial], Trial]
 
-_POSE = "with gravity across (wrist.gravity: [0, 9.81], wrist.gravity_flexion: 9.81)"
+_ACROSS = 6.94
+"""Gravity across each of the two bending planes of a level forearm that is rolled by 45 deg [m/s^2]."""
+_POSE = f"of a level forearm rolled by 45 deg (wrist.gravity: [0, {_ACROSS}], wrist.gravity_flexion: {_ACROSS})"
 _MASS = "with 0.2 kg more in the hand, added to wrist.hand_mass"
 
 
@@ -76,7 +79,7 @@ def _fast(trial: Trial) -> Trial:
 
 
 def _across(trial: Trial) -> Trial:
-    return replace(trial, wrist=trial.wrist.model_copy(update={"gravity": (0.0, 9.81)}))
+    return replace(trial, wrist=trial.wrist.model_copy(update={"gravity": (0.0, _ACROSS)}))
 
 
 def _heavier(trial: Trial) -> Trial:
