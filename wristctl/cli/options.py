@@ -48,6 +48,7 @@ class Options:
 _COMPLETED: dict[str, Callable[..., list[str]]] = {
     "controller": controllers,
     "data": run_ids,
+    "calibration": run_ids,
     "from_identified": run_ids,
     "network": run_ids,
     "runs": run_ids,

@@ -9,6 +9,7 @@ from wristctl.config.control import CompareSettings, SimulateSettings, TuneSetti
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
+from wristctl.config.vision import CalibrateCameraSettings, TrackSettings
 from wristctl.config.wrist import WristParameters
 
 
@@ -24,3 +25,5 @@ class Study(Section):
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
     identify: IdentifySettings = IdentifySettings()
+    calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
+    track: TrackSettings = TrackSettings()
