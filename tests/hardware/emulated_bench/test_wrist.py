@@ -1,0 +1,188 @@
+"""What the board's step pulses do to motors, tendons and the wrist."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.hardware.emulated_bench.conftest import TAUT, HostOn
+from wristctl.config.bench import BenchSettings, Motors
+from wristctl.config.plant import Actuator, Disturbances, Plant, Push
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.bench import Bench
+from wristctl.hardware.bench.wrist import Truth
+from wristctl.simulation.plant import plant_of
+from wristctl.wrist.model import integrate, terms
+from wristctl.wrist.segments import segments
+from wristctl.wrist.statics import equilibrium
+
+SETTINGS, WRIST = BenchSettings(motors=TAUT), WristParameters()
+ACTUATOR, PLANT, N = SETTINGS.actuator, plant_of(WRIST, SETTINGS.plant), SETTINGS.segments
+PUSH = Push(force=2.0, start=0.1, duration=0.3)
+BEND = (-110, -110, 130, 130)
+"""Steps of the axes of tendons 1, 2, 4, 5: a bend of about 0.12 rad toward ulnar."""
+
+
+def simulated(steps: Truth, start: float) -> np.ndarray:
+    """Angles (T, n) from rest under these reeled lengths and PUSH, tendon by tendon: 1 ms of `integrate` at a time."""
+    theta, omega = np.zeros(N), np.zeros(N)
+    force = PUSH.force * np.sin(np.pi * (steps.time - 1e-3 - start - PUSH.start) / PUSH.duration).clip(0.0)
+    force[(steps.time - 1e-3 < start + PUSH.start) | (steps.time - 1e-3 > start + PUSH.start + PUSH.duration)] = 0.0
+    angles = []
+    for reeled, tip_force in zip(steps.reeled, force, strict=True):
+        wrist = segments(PLANT, N, (0.0, tip_force))
+        here = terms(wrist, theta, omega)
+        pull = np.zeros(2)
+        for axis, side in enumerate((1, 1, 0, 0)):
+            stretch = max(0.0, reeled[axis] - PLANT.length + here.tendon_lengths[:, side].sum())
+            sliding = np.tanh(here.moment_arms[:, side] @ omega / 5e-3)
+            x = 0.5 * ACTUATOR.friction * np.abs(theta).sum() * sliding
+            pull[side] += ACTUATOR.tendon_stiffness * stretch * (1.0 - x) / (1.0 + x)
+        after = integrate(wrist, theta, omega, pull, [1e-3])
+        theta, omega = after[0][0], after[1][0]
+        angles.append(theta)
+    return np.array(angles)
+
+
+def test_a_bench_moves_as_the_simulation_does_under_the_same_reeled_lengths_and_push(host_on: HostOn) -> None:
+    host = host_on()
+    host.bench.begin(host.start, Disturbances(push=PUSH))
+    host.turn((-600.0, -600.0, 700.0, 700.0), 0.15)
+    host.turn((100.0, 90.0, -150.0, -140.0), 0.3)
+    truth = host.bench.truth()
+    moved = truth.theta[truth.time > host.start].sum(axis=1)
+    assert np.ptp(moved) > 0.05
+    np.testing.assert_allclose(truth.theta, simulated(truth, host.start), atol=1e-9)
+
+
+def test_at_rest_the_wrist_stands_where_statics_put_it_under_the_same_pulls(host_on: HostOn) -> None:
+    host = host_on()
+    host.reel(BEND)
+    host.rest(4.0)
+    truth = host.bench.truth()
+    minus, plus = truth.pull[-1].reshape(2, 2).mean(axis=1)
+    assert plus > minus > 1.0
+    assert truth.theta[-1].sum() > 0.1
+    np.testing.assert_allclose(truth.theta[-1], equilibrium(PLANT, N, (plus, minus)), atol=1e-5)
+
+
+def test_the_other_side_and_the_other_plane_bend_alike(host_on: HostOn) -> None:
+    courses = {}
+    for direction, steps in {
+        "ulnar": BEND,
+        "radial": (130, 130, -110, -110),
+        "flexion": (-110, 130, -110, 130),
+        "extension": (130, -110, 130, -110),
+    }.items():
+        host = host_on()
+        host.bench.face(direction)
+        host.reel(steps)
+        host.rest(0.5)
+        courses[direction] = host.bench.truth().theta[-1].sum()
+    assert courses["ulnar"] > 0.1
+    for direction, sign in (("radial", -1), ("flexion", 1), ("extension", -1)):
+        # the axes' interrupts do not fall together: their steps differ by microseconds, and so by whole periods
+        assert courses[direction] == pytest.approx(sign * courses["ulnar"], abs=1e-6)
+
+
+def test_tendons_only_pull_and_a_slack_one_not_at_all(host_on: HostOn) -> None:
+    host = host_on()
+    host.reel((-400, -400, 100, 100))
+    host.rest(0.5)
+    pull = host.bench.truth().pull
+    assert pull.min() >= 0.0
+    assert (pull[-1, :2] == 0.0).all() and (pull[-1, 2:] > 0.5).all()
+
+
+def test_a_motor_reels_by_its_steps_its_sense_and_from_its_slack(host_on: HostOn) -> None:
+    motors = Motors(slack=(1e-4, 2e-4, 3e-4, 4e-4), reversed=(False, True, False, True))
+    host = host_on(BenchSettings(motors=motors))
+    host.reel((40, -50, -30, 20))
+    host.rest(0.1)
+    signed = np.array([40, 50, -30, -20])
+    assert host.bench.motion().steps == tuple(signed)
+    expected = signed * ACTUATOR.step_length - np.array(motors.slack)
+    np.testing.assert_allclose(host.bench.truth().reeled[-1], expected, atol=1e-15)
+
+
+def test_released_motors_let_go_down_to_their_detent_and_never_reel_in(host_on: HostOn) -> None:
+    host = host_on()
+    host.reel((0, 0, 200, 200))
+    host.rest(1.0)
+    held = host.bench.truth()
+    host.board.emergency_stop()
+    released = host.bench.transport.now()
+    host.bench.transport.wait(1.0)
+    after = host.bench.truth(released)
+    detent = SETTINGS.motors.detent_torque / ACTUATOR.pulley_radius
+    assert held.pull[-1].max() > 2 * detent
+    assert after.pull[30:].max() < 1.2 * detent and after.pull[-1].max() == pytest.approx(detent, rel=0.02)
+    assert (np.diff(after.reeled, axis=0) <= 0.0).all()
+    assert np.abs(np.diff(after.theta.sum(axis=1))).max() < 0.02  # no whip: less than 20 rad/s
+    assert not any(host.bench.motion().energised)
+
+
+def test_a_motor_switched_on_again_falls_into_a_place_that_fits_its_count(host_on: HostOn) -> None:
+    host = host_on()
+    host.reel((0, 0, 200, 200))
+    host.board.emergency_stop()
+    host.bench.transport.wait(0.5)
+    before = host.bench.truth().reeled[-1]
+    host.board.clear()
+    host.board.enable()
+    reeled, counted = host.bench.truth().reeled[-1], np.array(host.bench.motion().steps)
+    full_step = ACTUATOR.microstep * ACTUATOR.step_length
+    turns = (reeled - counted * ACTUATOR.step_length) / (4 * full_step)
+    np.testing.assert_allclose(turns, np.rint(turns), atol=1e-9)
+    assert turns.min() <= -1.0 + 1e-9
+    assert np.abs(reeled - before).max() <= 2 * full_step + 1e-12
+
+
+def test_an_overloaded_motor_slips_by_whole_turns_of_its_field(host_on: HostOn) -> None:
+    host = host_on(BenchSettings(motors=Motors(slack=TAUT.slack, holding_torque=0.15)))
+    host.reel((120, 120, 120, 120))
+    host.rest(0.5)
+    truth = host.bench.truth()
+    holding = 0.15 / ACTUATOR.pulley_radius
+    assert 0.5 * holding < truth.pull.max() < holding + 2.0
+    assert truth.pull[-1].max() <= holding
+    slip = (np.array(host.bench.motion().steps) * ACTUATOR.step_length - truth.reeled[-1]) / ACTUATOR.step_length
+    np.testing.assert_allclose(slip, np.repeat(64 * np.rint(slip[0] / 64), 4), atol=1e-6)
+    assert slip[0] >= 64
+
+
+def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:
+    courses = []
+    for looks in (1, 7):
+        bench = Bench(BenchSettings(), WRIST, seed=3)
+        for _ in range(looks):
+            bench.transport.wait(0.35 / looks)
+            bench.truth()
+        bench.transport.wait(0.5 - bench.transport.now())
+        courses.append(b"".join(column.tobytes() for column in bench.truth()))
+    assert courses[0] == courses[1]
+
+
+def test_a_softer_plant_bends_further(host_on: HostOn) -> None:
+    angles = []
+    for scale in (0.7, 1.0):
+        host = host_on(BenchSettings(motors=TAUT, plant=Plant(stiffness_scale=scale)))
+        host.reel((-300, -300, 60, 60))
+        host.rest(2.0)
+        angles.append(host.bench.truth().theta[-1].sum())
+    assert angles[0] > angles[1] > 0.02
+
+
+def test_the_last_minute_is_remembered_with_its_times() -> None:
+    bench = Bench(BenchSettings(), WRIST, 0)
+    bench.transport.wait(130.0)
+    truth = bench.truth()
+    assert 60.0 <= len(truth.time) * 1e-3 <= 120.0
+    assert truth.time[-1] == pytest.approx(130.0, abs=1.1e-3)
+    np.testing.assert_allclose(np.diff(truth.time), 1e-3, atol=1e-9)
+    assert len(bench.truth(129.0).time) == pytest.approx(1000, abs=1)
+
+
+def test_the_bench_needs_elastic_tendons() -> None:
+    with pytest.raises(ValueError, match=r"actuator\.level must be tendon"):
+        BenchSettings(actuator=Actuator())

@@ -1,0 +1,69 @@
+"""The emulated bench: motors, tendons and the wrist behind an emulated board, the camera before it, and faults."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from wristctl.config.plant import Actuator, Plant
+from wristctl.config.section import Section, choice, quantity
+
+FAULTS = {
+    "port-lost": "the cable is pulled: the port is gone for good",
+    "board-reset": "the board restarts once: drives off, positions lost",
+    "frames-dropped": "no frame arrives",
+    "marker-covered": "something covers the marker on the last disc",
+    "markers-swapped": "the two markers change places",
+    "camera-frozen": "frames keep coming, with new times, but show what the last one before showed",
+    "host-silent": "nothing that the host sends reaches the board",
+    "controller-exception": "the controller raises an exception",
+    "model-nan": "the model gives NaN",
+    "disk-full": "nothing can be written to the run",
+}
+"""Every kind of fault that can be injected: the last three are the control loop's, the others the bench's."""
+
+FaultKind = Literal[
+    "port-lost", "board-reset", "frames-dropped", "marker-covered", "markers-swapped", "camera-frozen", "host-silent",
+    "controller-exception", "model-nan", "disk-full",
+]  # fmt: skip
+
+
+class Fault(Section):
+    """Something that goes wrong during each trial."""
+
+    kind: FaultKind = choice("port-lost", "; ".join(f"{kind}: {what}" for kind, what in FAULTS.items()))
+    at: float = quantity(1.0, "s", "time since the start of the trial's motion", ge=0)
+    duration: float | None = quantity(None, "s", "how long it lasts; null: for good", gt=0)
+
+
+class Motors(Section):
+    """What a stepper and its spool do beyond the steps they are sent; one entry for tendons 1, 2, 4, 5 each."""
+
+    slack: tuple[float, float, float, float] = quantity(
+        (3e-4, 2e-4, 4e-4, 2.5e-4), "m", "slack of each tendon at power-on, of the straight wrist", "assumed"
+    )
+    reversed: tuple[bool, bool, bool, bool] = choice(
+        (False, False, False, False), "whether the motor is wired the other way round, so that it pays out"
+    )
+    holding_torque: float = quantity(1.2, "N m", "beyond it an energised motor slips four full steps", "assumed", gt=0)
+    detent_torque: float = quantity(0.03, "N m", "what a released motor still holds", "assumed: NEMA 23", ge=0)
+    release_time: float = quantity(
+        5e-3, "s", "time constant with which a released motor lets its tendon go", "assumed", gt=0
+    )
+
+
+class BenchSettings(Section):
+    """The wrist on the emulated bench. Its controller does not know how `plant` differs."""
+
+    segments: int = choice(4, "constant-curvature segments of the wrist", "assumed", ge=1, le=8)
+    plant: Plant = choice(Plant(stiffness_scale=0.7), "the wrist as it is", "paper: springs lose stiffness")
+    actuator: Actuator = choice(Actuator(level="tendon"), "elastic tendons on stepper motors")
+    motors: Motors = Motors()
+    faults: tuple[Fault, ...] = choice((), "what goes wrong in each trial")
+
+    @model_validator(mode="after")
+    def _tendons_are_elastic(self) -> Self:
+        if self.actuator.level != "tendon":
+            raise ValueError("the bench has elastic tendons on motors: actuator.level must be tendon")
+        return self

@@ -1,0 +1,173 @@
+"""Four steppers with their spools and tendons, and the wrist these pull, in steps of 1 ms.
+
+An energised motor stands where its drive counts, and turns back by whole electrical turns (four full steps) when its
+tendon pulls harder than it can hold. A released one is held by its detent torque alone: its tendon pays out until it
+pulls no harder, and nothing reels that in again. Energised anew, the rotor falls into the nearest place that
+fits the drive's count: up to two full steps away, so that positions are lost with the release.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wristctl.config.bench import BenchSettings
+from wristctl.hardware.emulator.chip import FREQUENCY
+from wristctl.hardware.messages import AXES
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.functions import ARC_LIMIT
+from wristctl.lanes.lane import where
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.lanes.types import LANES
+from wristctl.simulation.actuator import pulls
+from wristctl.simulation.disturbances import disturb
+from wristctl.wrist.integrator import step
+from wristctl.wrist.segments import load_segments
+
+PERIOD = 1e-3
+CYCLES = round(PERIOD * FREQUENCY)
+
+_FULL_STEPS_PER_TURN = 4  # electrical, of a two-phase motor
+_PORT_A, _PORT_C = ord("A"), ord("C")
+
+
+class Motor(NamedTuple):
+    """What the four motors have in common; lengths of tendon [m] and pulls [N] at the spool."""
+
+    step: float
+    turn: float  # of the field: four full steps
+    holding: float
+    detent: float
+    release: float  # share of its surplus stretch that a released tendon loses in one period
+
+
+def motor_of(settings: BenchSettings) -> Motor:
+    """The motors of these settings."""
+    actuator, motors = settings.actuator, settings.motors
+    return Motor(
+        step=actuator.step_length,
+        turn=_FULL_STEPS_PER_TURN * actuator.microstep * actuator.step_length,
+        holding=motors.holding_torque / actuator.pulley_radius,
+        detent=motors.detent_torque / actuator.pulley_radius,
+        release=PERIOD / (motors.release_time + PERIOD),
+    )
+
+
+class Spools(NamedTuple):
+    """State of the four axes, (4,) or (4, LANES); `latch` holds port A as last heard of.
+
+    `reeled` [m] counts from where the tendon of the straight wrist is taut without pulling.
+    """
+
+    counted: Any  # microsteps reeled in
+    slipped: Any  # electrical turns that the rotor is ahead of the count
+    energised: Any
+    stepped: Any  # cycle of the last step, -1: never
+    sense: Any  # 1, or -1 where the motor is wired the other way round
+    slack: Any  # [m] at power-on
+    latch: Any
+    reeled: Any
+    pull: Any
+
+
+def spools_of(settings: BenchSettings) -> Spools:
+    """The axes at power-on: released, each tendon with its slack."""
+    slack = np.array(settings.motors.slack)
+    none = np.zeros(AXES, np.int64)
+    return Spools(
+        counted=none.copy(),
+        slipped=none.copy(),
+        energised=none.copy(),
+        stepped=none - 1,
+        sense=np.where(settings.motors.reversed, -1, 1),
+        slack=slack,
+        latch=np.zeros(1, np.int64),
+        reeled=np.repeat(-slack[:, None], LANES, axis=1),
+        pull=np.zeros((AXES, LANES)),
+    )
+
+
+@compiled
+def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
+    """Take in one change of an output latch: STEP and DIR alternate on port A, ENA (high: off) is on port C."""
+    if port == _PORT_A:
+        risen = value & ~spools.latch[0]
+        for axis in range(AXES):
+            if risen >> 2 * axis & 1:
+                turned = -1 if value >> (2 * axis + 1) & 1 else 1
+                spools.counted[axis] += turned * spools.sense[axis]
+                spools.stepped[axis] = cycle
+        spools.latch[0] = value
+    elif port == _PORT_C:
+        for axis in range(AXES):
+            on = 1 - (value >> axis & 1)
+            if on and not spools.energised[axis]:
+                counted = motor.step * spools.counted[axis] - spools.slack[axis]
+                spools.slipped[axis] = int(np.rint((spools.reeled[axis, 0] - counted) / motor.turn))
+            spools.energised[axis] = on
+
+
+@compiled
+def _turn(spools: Any, motor: Any, stiffness: float) -> None:
+    """Where the spools stand after a period, by the pulls at its start."""
+    for axis in range(AXES):
+        pull = spools.pull[axis, 0]
+        if spools.energised[axis]:
+            if pull > motor.holding:
+                spools.slipped[axis] -= 1
+            place = motor.step * spools.counted[axis] + motor.turn * spools.slipped[axis] - spools.slack[axis]
+        else:
+            place = spools.reeled[axis, 0] - motor.release * max(0.0, pull - motor.detent) / stiffness
+        for k in range(LANES):
+            spools.reeled[axis, k] = place
+
+
+@compiled
+def follow(
+    tendon: Any, motor: Any, plant: Any, sides: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int,
+    out: Any, segments: Any,
+) -> int:  # fmt: skip
+    """Advance spools and wrist by a period for each row (tip force, stiffness scale) of `acting`; the edges used up.
+
+    `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on, `sides`
+    the axes of two tendons on the + and two on the - side, `tendon` the Drive of one tendon. A row of `out` is what
+    is so at a period's end: angles, rates, pulls, reeled lengths. A wrist bent beyond a full turn stops there.
+    """
+    undisturbed = load_segments(rows_of(plant))
+    reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
+    n = len(segments)
+    theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
+    old = lanes_like(theta)
+    zero = 0.0 * reeled[0]
+    at = 0
+    for k in range(acting.shape[0]):
+        end = (first + k + 1) * CYCLES
+        while at < edges.shape[0] and edges[at, 0] < end:
+            _hear(spools, motor, edges[at, 0], edges[at, 1], edges[at, 2])
+            at += 1
+        _turn(spools, motor, tendon.stiffness)
+        wrist = disturb(undisturbed, acting[k, 0], acting[k, 1])
+        plus, minus = zero, zero
+        for pair in range(2):
+            one, other = sides[pair], sides[2 + pair]
+            pull_plus, pull_minus = pulls(tendon, wrist, theta, omega, 1.0, reeled[one], reeled[other])
+            pull[one] = pull_plus
+            pull[other] = pull_minus
+            plus = plus + pull_plus
+            minus = minus + pull_minus
+        for i in range(n):
+            old[i] = theta[i]
+        step(wrist, theta, omega, plus, minus, PERIOD + zero)
+        alive = 1.0 + zero
+        for i in range(n):
+            alive = where(abs(theta[i]) < ARC_LIMIT, alive, zero)
+        for i in range(n):
+            theta[i] = where(alive > zero, theta[i], old[i])
+            omega[i] = where(alive > zero, omega[i], zero)
+        for i in range(2 * n):
+            out[k, i] = state[i, 0]
+        for axis in range(AXES):
+            out[k, 2 * n + axis] = spools.pull[axis, 0]
+            out[k, 2 * n + AXES + axis] = spools.reeled[axis, 0]
+    return at

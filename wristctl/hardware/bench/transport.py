@@ -1,0 +1,60 @@
+"""The wire to the bench's board in virtual time, and what may go wrong on it."""
+
+from __future__ import annotations
+
+import math
+
+from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.emulator.atmega2560 import Atmega2560
+from wristctl.hardware.emulator.chip import FREQUENCY
+from wristctl.hardware.emulator.virtual import VirtualTransport
+from wristctl.hardware.errors import PortLost
+
+_USB_FRAME = FREQUENCY // 1000
+"""Cycles between two times at which a board's USB chip hands over what has come."""
+
+
+class BenchTransport(VirtualTransport):
+    """The wire to an emulated chip in the same process, with faults: port-lost, board-reset and host-silent.
+
+    A lost port stays lost; the board runs on, also while the host can only `wait`.
+    """
+
+    def __init__(self, chip: Atmega2560, faults: Faults) -> None:
+        super().__init__(chip)
+        self._faults, self._lost, self._reset = faults, False, -math.inf
+
+    def write(self, data: bytes) -> None:
+        """Put bytes on the line. Raises PortLost."""
+        self._see_port()
+        if not self._faults.on("host-silent", self.now()):
+            super().write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What the chip has sent; runs it for up to `timeout` s until there is something. Raises PortLost."""
+        self._see_port()
+        end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
+        while not (data := self.chip.read()) and self.chip.cycles < end:
+            self._run(min(end, (self.chip.cycles // _USB_FRAME + 1) * _USB_FRAME))
+            self._see_port()
+        return data
+
+    def wait(self, seconds: float) -> None:
+        """Run the chip for so long."""
+        end = self.chip.cycles + round(seconds * FREQUENCY)
+        while self.chip.cycles < end:
+            self._run(end)
+
+    def _run(self, end: int) -> None:
+        """Run towards `end`, at most to the next reset that is due, and do that."""
+        due = self._faults.next("board-reset", self._reset)
+        stop = end if math.isinf(due) else min(end, round(due * FREQUENCY))
+        self.chip.run(max(0, stop - self.chip.cycles))
+        if self.now() >= due:
+            self.chip.reset()
+            self._reset = due
+
+    def _see_port(self) -> None:
+        self._lost = self._lost or self._faults.on("port-lost", self.now())
+        if self._lost:
+            raise PortLost(self.name, OSError("injected fault"))

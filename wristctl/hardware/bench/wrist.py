@@ -1,0 +1,137 @@
+"""The wrist that hangs on the emulated board, and what it has done."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.bench import BenchSettings
+from wristctl.config.plant import Disturbances
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.spools import CYCLES, PERIOD, follow, motor_of, spools_of
+from wristctl.hardware.emulator.chip import FREQUENCY
+from wristctl.hardware.messages import AXES
+from wristctl.lanes.blocks import to_blocks
+from wristctl.simulation.actuator import drive_of
+from wristctl.simulation.disturbances import course
+from wristctl.simulation.plant import plant_of
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.segments import segments
+
+Array = NDArray[np.float64]
+
+TENDONS = (1, 2, 4, 5)
+"""The tendon on each axis of the board."""
+
+_KEPT = 60_000
+"""Periods that are remembered at least."""
+
+_PLANES = {"ulnar": ("ulnar", "radial"), "flexion": ("flexion", "extension")}
+
+
+class Truth(NamedTuple):
+    """What a wrist of n segments did, once a millisecond."""
+
+    time: Array
+    """(T,) [s] on the board's clock"""
+    theta: Array
+    """(T, n) segment angles [rad]"""
+    rate: Array
+    """(T, n) [rad/s]"""
+    pull: Array
+    """(T, 4) at the wrist [N], of tendons 1, 2, 4, 5"""
+    reeled: Array
+    """(T, 4) tendon on the spools [m], 0 where it is taut without pulling on the straight wrist"""
+
+
+class Motion(NamedTuple):
+    """What the board made of its motors, axis by axis."""
+
+    steps: tuple[int, ...]
+    """microsteps that reeled in, less those that paid out, since power-on"""
+    last_step: tuple[float | None, ...]
+    """[s] on the board's clock; None: never"""
+    energised: tuple[bool, ...]
+
+
+class BenchWrist:
+    """Straight and at rest at power-on, facing ulnar; it follows the board's pins in whole milliseconds."""
+
+    def __init__(self, settings: BenchSettings, wrist: WristParameters) -> None:
+        drive = drive_of(settings.actuator)
+        assert drive is not None
+        self._settings, self._wrist, self._n = settings, wrist, settings.segments
+        self._tendon = drive._replace(stiffness=settings.actuator.tendon_stiffness)
+        self._motor, self._spools = motor_of(settings), spools_of(settings)
+        self._state = to_blocks(np.zeros((1, 2 * self._n)))[0]
+        self._edges = np.empty((0, 3), np.int64)
+        self._periods = self._rows = 0
+        self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
+        self.disturb(Disturbances(), 0.0)
+        self._face("ulnar")
+
+    @property
+    def time(self) -> float:
+        """Seconds on the board's clock up to which the wrist is known."""
+        return self._periods * PERIOD
+
+    @property
+    def motion(self) -> Motion:
+        """What the board made of its motors up to `time`."""
+        spools = self._spools
+        last = tuple(None if cycle < 0 else float(cycle) / FREQUENCY for cycle in spools.stepped)
+        return Motion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
+
+    def face(self, direction: str) -> None:
+        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
+        if DIRECTIONS[direction].plane != self._plane:
+            self._state[:] = 0.0
+            self._face(direction)
+
+    def disturb(self, disturbances: Disturbances, start: float) -> None:
+        """Let these act from here on, in place of others; their times count from `start` on the board's clock."""
+        self._disturbances, self._start = disturbances, start
+
+    def hear(self, edges: NDArray[np.void]) -> None:
+        """Changes of the chip's output latches, as it gives them: to be followed later."""
+        if len(edges):
+            columns = [edges[name].astype(np.int64) for name in ("cycle", "port", "value")]
+            self._edges = np.concatenate([self._edges, np.stack(columns, axis=1)])
+
+    def follow(self, cycles: int) -> None:
+        """Go on to the last whole millisecond of the board's clock; all edges up to there have been heard."""
+        while (count := min(cycles // CYCLES - self._periods, _KEPT)) > 0:
+            self._make_room(count)
+            time = PERIOD * np.arange(self._periods, self._periods + count, dtype=np.float64)
+            acting = course(self._disturbances, time - self._start)
+            if acting is None:
+                acting = np.tile((0.0, 1.0), (count, 1))
+            out = self._record[self._rows : self._rows + count]
+            heard = follow(
+                self._tendon, self._motor, self._plant, self._sides, self._spools, self._state, acting, self._edges,
+                self._periods, out, (0,) * self._n,
+            )  # fmt: skip
+            self._edges = self._edges[heard:]
+            self._rows += count
+            self._periods += count
+
+    def truth(self, since: float = 0.0) -> Truth:
+        """What it did after `since` [s], as far back as the last minute."""
+        fresh = max(0, min(self._rows, self._periods - round(since / PERIOD)))
+        rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
+        time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
+        return Truth(time, *np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1))
+
+    def _face(self, direction: str) -> None:
+        self._plane = DIRECTIONS[direction].plane
+        plant = plant_of(in_plane(self._wrist, direction), self._settings.plant)
+        self._plant = to_blocks(segments(plant, self._n)[None])[0]
+        pulling = (tendon for name in _PLANES[self._plane] for tendon in DIRECTIONS[name].tendons)
+        self._sides = np.array([TENDONS.index(tendon) for tendon in pulling])
+
+    def _make_room(self, count: int) -> None:
+        if self._rows + count > len(self._record):
+            self._record[:_KEPT] = self._record[self._rows - _KEPT : self._rows].copy()
+            self._rows = _KEPT
