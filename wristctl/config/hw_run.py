@@ -6,10 +6,12 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.bench import BenchSettings
 from wristctl.config.control import Row
 from wristctl.config.loop import Direction, Reference
 from wristctl.config.plant import Actuator, Push, Sensor
 from wristctl.config.section import Section, choice, quantity
+from wristctl.config.vision import Device, Gates, Markers
 
 
 class Homing(Section):
@@ -43,17 +45,21 @@ class Safety(Section):
         return self
 
 
-class Rig(Section):
+class RigSettings(Section):
     """Motors, camera and how they are known. Without a port the whole rig is emulated."""
 
     port: str | None = choice(None, "serial port of the motor board; without one the whole rig is emulated")
     baud: int = choice(250_000, "of the serial line", gt=0)
-    camera: int | str = choice(0, "camera beside a real board: its number, or device path")
+    camera: str = choice("0", "camera beside a real board: its number, or device path")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
     sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
     homing: Homing = Homing()
     safety: Safety = Safety()
+    markers: Markers = Markers()
+    gates: Gates = Gates()
+    device: Device = Device()
+    bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
 
     @model_validator(mode="after")
@@ -63,13 +69,13 @@ class Rig(Section):
         return self
 
 
-class CalibrateWristSettings(Rig):
+class CalibrateWristSettings(RigSettings):
     """Zero, senses of turning and steps per radian of a rig."""
 
     plane: Literal["ulnar", "flexion"] = choice("ulnar", "bending plane that the camera looks at")
 
 
-class HwRunSettings(Rig):
+class HwRunSettings(RigSettings):
     """The paper's experiment: directions x repetitions, with and without a push, for each row of controllers."""
 
     rows: tuple[Row, ...] = choice(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from wristctl.config.errors import UserError
-from wristctl.config.hw_run import HwRunSettings, Rig
+from wristctl.config.hw_run import HwRunSettings, RigSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 Gains = Mapping[str, Mapping[str, float]]
 
 
-class Bench(Protocol):
+class Rig(Protocol):
     """What an experiment stands on besides the board: the wrist in front of the camera."""
 
     emulated: bool
@@ -56,9 +56,9 @@ class Bench(Protocol):
         """Give everything back."""
 
 
-def prepare(board: Board, rig: Rig) -> None:
+def prepare(board: Board, settings: RigSettings) -> None:
     """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on."""
-    limits, spools = rig.safety, spools_of(rig.actuator)
+    limits, spools = settings.safety, spools_of(settings.actuator)
     if board.read().state == State.FAULT:
         board.clear()
     board.configure(
@@ -118,11 +118,11 @@ class Experiment:
     """Trials on a bench; `outcomes` holds how each trial that began has ended."""
 
     def __init__(
-        self, settings: HwRunSettings, wrist: WristParameters, bench: Bench, trials: list[Trial], log_: TrialLog,
+        self, settings: HwRunSettings, wrist: WristParameters, rig: Rig, trials: list[Trial], log_: TrialLog,
         tuned: Gains | None = None, known: Zero | None = None, stored: Mapping[str, Any] | None = None,
         shown: Callable[[dict[str, Any]], None] | None = None,
     ) -> None:  # fmt: skip
-        self._settings, self._wrist, self._bench, self._trials, self._log = settings, wrist, bench, trials, log_
+        self._settings, self._wrist, self._rig, self._trials, self._log = settings, wrist, rig, trials, log_
         self._known, self._stored, self._shown = known, stored, shown
         rows = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in rows]
@@ -156,13 +156,13 @@ class Experiment:
         for trial in self._trials:
             if trial.plane != plane:
                 first, plane = not plane, trial.plane
-                self._bench.face(trial.direction)
+                self._rig.face(trial.direction)
                 loop, eye = self._loop(board, trial.plane, first)
             self._one(loop, trial)
 
     def _loop(self, board: Board, plane: str, first: bool) -> tuple[ControlLoop, Eye]:
         """A loop at rest at zero in this plane."""
-        settings, eye = self._settings, self._bench.eye()
+        settings, eye = self._settings, self._rig.eye()
         if first:
             self.zero = self._home(board, eye, plane)
             eye.zero = self.zero.marker
@@ -194,8 +194,8 @@ class Experiment:
         self._now, start = trial.number, loop.next_tick
         self.starts[trial.number] = start
         self.outcomes[trial.number] = "begun"
-        self._bench.begin(start, Disturbances(push=push))
-        faults = HostFaults(settings.bench.faults) if self._bench.emulated else None
+        self._rig.begin(start, Disturbances(push=push))
+        faults = HostFaults(settings.bench.faults) if self._rig.emulated else None
         loop.follow(followed, law, gains, trial.number, faults)
         self._keep_truth()
         self.outcomes[trial.number], self._now = "ok", -1
@@ -203,9 +203,9 @@ class Experiment:
         loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
 
     def _keep_truth(self) -> None:
-        if self._bench.emulated:
+        if self._rig.emulated:
             number = self._now
-            self._log.truth([number, *row] for row in self._bench.truth(self.starts[number]))
+            self._log.truth([number, *row] for row in self._rig.truth(self.starts[number]))
 
     def _ended(self, board: Board, error: BaseException | None) -> None:
         """Stop the motors, and note why where it was before the end."""

@@ -1,9 +1,9 @@
 """Zero of a rig, by small guarded moves: where each tendon is just taut on the straight wrist, and which way it turns.
 
-One motor after the other reels in by small moves until the marker shows a bend, then a little further, and lets go
-again. The bend grows linearly with the tendon beyond the taut point, so a line through the bent readings crosses the
-straight angle there; its slope gives steps per radian. A motor whose positive steps pay out shows no bend and is tried
-the other way round.
+One motor after the other reels in by small moves until the marker shows a bend, and lets go again; one whose positive
+steps pay out shows none and is tried the other way round. Then all tendons are slackened, so that none holds against
+another, and each in turn is reeled in through its taut point. From there the bend grows linearly with the tendon, so a
+line through the bent readings crosses the straight angle at the taut point; its slope gives steps per radian.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from wristctl.config.hw_run import Homing
 from wristctl.hardware.board import Board
+from wristctl.hardware.messages import AXES
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.spools import TENDONS, Spools, on_plus_side
@@ -82,71 +83,85 @@ class Patience:
 
 
 class _Finder:
+    """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
+
     def __init__(self, board: Board, patience: Patience, spools: Spools, settings: Homing, plane: str) -> None:
-        self._board, self._patience, self._spools, self._settings = board, patience, spools, settings
+        self._board, self._patience, self._settings = board, patience, settings
         self._plus = on_plus_side(plane)
-        self._move = max(1, round(settings.move / spools.step))
-        self._start = list(board.read().position)
+        self._slack, self._pull, self._move = (
+            max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
+        )
+        self._start = board.read().position
+        self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
+        self.straight = patience.angle(4 * settings.frames)
 
-    def straight(self) -> float:
-        return self._patience.angle(4 * self._settings.frames)
+    def sense(self, axis: int, tried: Sequence[int]) -> int:
+        """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
+        for self._signs[axis] in tried:
+            for reeled in range(2 * self._move, self._slack + 2 * self._move, 2 * self._move):
+                self._reel(axis, reeled)
+                if abs(self._bent(axis)) > self._bend:
+                    self._let_go(axis, 0)
+                    return reeled
+            self._let_go(axis, 0)
+        slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
+        what = f"axis {axis} (tendon {TENDONS[axis]}) does not bend the wrist within {slack:g} mm"
+        raise SafetyStop(what, "homing", f"{fix}; or raise homing.slack")
 
-    def find(self, axis: int, senses: Sequence[int], straight: float) -> tuple[int, float, float]:
-        """Sense of turning, taut point [steps reeled in] and steps per radian of one axis."""
-        for sense in senses:
-            reeled, bends = self._pull(axis, sense, straight)
-            if bends:
-                break
-        else:
-            tendon, slack = TENDONS[axis], 1e3 * self._settings.slack
-            fix = "see that the tendon is on its pulley and the motor has power; or raise homing.slack"
-            raise SafetyStop(f"axis {axis} (tendon {tendon}) does not bend the wrist within {slack:g} mm", "homing", fix)
+    def slacken(self) -> None:
+        """Let all tendons go, so far that none holds against another while it is measured."""
+        self._at[:] = -2 * self._pull
+        self._go()
+
+    def taut(self, axis: int, about: int) -> tuple[float, float]:
+        """The taut point [steps] and steps per radian of an axis that bends the wrist at `about`. Lets go again."""
+        reeled, bends = [], []
+        for at in range(about - 3 * self._move, about + self._pull, self._move):
+            self._reel(axis, at)
+            bend = self._bent(axis)
+            if abs(bend) > self._bend:
+                reeled.append(at)
+                bends.append(bend)
+        self._let_go(axis, -2 * self._pull)
+        if len(reeled) < 3:
+            raise SafetyStop(f"tendon {TENDONS[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, bends, 1)
         if (slope > 0.0) != bool(self._plus[axis]):
             what = f"axis {axis} bends the wrist to the other side than tendon {TENDONS[axis]} should"
             raise SafetyStop(what, "homing", "check which tendon is on which motor, and markers.positive")
-        return sense, float(-offset / slope), float(1.0 / abs(slope))
+        return float(-offset / slope), float(1.0 / abs(slope))
 
-    def _pull(self, axis: int, sense: int, straight: float) -> tuple[list[float], list[float]]:
-        """Reel in until the wrist bends, and on; positions [steps] and angles of the bent readings. Lets go again."""
-        reeled, bends = [], []
-        furthest, beyond = self._settings.slack / self._spools.step, self._settings.pull / self._spools.step
-        at = 0
-        while at < furthest and (not reeled or at < reeled[0] + beyond):
-            at += self._move
-            self._jog(axis, sense * at)
-            bend = self._read() - straight
-            if abs(bend) > math.radians(_FURTHEST_DEG):
-                self._jog(axis, 0)
-                what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
-                raise SafetyStop(what, "homing", "slacken all tendons first")
-            if abs(bend) > self._bend:
-                reeled.append(float(at))
-                bends.append(bend)
-                furthest = math.inf
-        self._jog(axis, 0)
-        self._let_go(straight)
-        return reeled, bends
+    def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
+        """Take up every tendon's slack, all at once, and call that zero. Senses of turning."""
+        self._at[:] = np.rint(taut)
+        self._go()
+        self._board.home()
+        return tuple(map(int, self._signs))
 
-    def _let_go(self, straight: float) -> None:
+    def _bent(self, axis: int) -> float:
+        """Angle [rad] from straight. Raises SafetyStop where it is too large."""
+        self._patience.wait(self._settings.rest)
+        bend = self._patience.angle(self._settings.frames) - self.straight
+        if abs(bend) > math.radians(_FURTHEST_DEG):
+            self._reel(axis, -2 * self._pull)
+            what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
+            raise SafetyStop(what, "homing", "slacken all tendons first")
+        return bend
+
+    def _let_go(self, axis: int, reeled: int) -> None:
+        self._reel(axis, reeled)
         clock = self._board.transport
         deadline = clock.now() + self._settings.let_go
-        while abs(self._read() - straight) > 0.5 * self._bend and clock.now() < deadline:
+        while abs(self._bent(axis)) > 0.5 * self._bend and clock.now() < deadline:
             pass
 
-    def _read(self) -> float:
-        self._patience.wait(self._settings.rest)
-        return self._patience.angle(self._settings.frames)
+    def _reel(self, axis: int, reeled: int) -> None:
+        self._at[axis] = reeled
+        self._go()
 
-    def _jog(self, axis: int, reeled: int) -> None:
-        self._board.jog([start + reeled * (k == axis) for k, start in enumerate(self._start)])
-
-    def settle(self, signs: Sequence[int], taut: Sequence[float]) -> None:
-        """Take up every tendon's slack, all at once, and call that zero."""
-        there = [start + sign * round(reeled) for start, sign, reeled in zip(self._start, signs, taut, strict=True)]
-        self._board.jog(there)
-        self._board.home()
+    def _go(self) -> None:
+        self._board.jog(list(self._start + self._signs * self._at))
 
 
 def find_zero(
@@ -157,12 +172,11 @@ def find_zero(
     Raises SafetyStop where a tendon does not bend the wrist, bends it too far or the wrong way, or the marker is lost.
     """
     finder = _Finder(board, Patience(board, eye), spools, settings, plane)
-    straight = finder.straight()
-    found = []
-    for axis, tendon in enumerate(TENDONS):
-        found.append(finder.find(axis, (1, -1) if signs is None else (signs[axis],), straight))
-        sense, taut, steps = found[-1]
-        log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * taut * spools.step, steps)
-    senses, taut_points, slopes = zip(*found, strict=True)
-    finder.settle(senses, taut_points)
-    return Zero(senses, slopes, straight, tuple(spools.step * taut for taut in taut_points))
+    about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
+    finder.slacken()
+    taut, slopes = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
+    senses = finder.settle(taut)
+    slack = tuple(spools.step * each for each in taut)
+    for each in zip(TENDONS, senses, slack, slopes, strict=True):
+        log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", each[0], each[1], 1e3 * each[2], each[3])
+    return Zero(senses, slopes, finder.straight, slack)

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.config.hw_run import Rig
+from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.hardware.board import Board
@@ -62,7 +62,7 @@ class ControlLoop:
     """Drives a homed, enabled board in one bending plane."""
 
     def __init__(
-        self, board: Board, eye: Eye, rig: Rig, wrist: WristParameters, plane: str, signs: tuple[int, ...],
+        self, board: Board, eye: Eye, rig: RigSettings, wrist: WristParameters, plane: str, signs: tuple[int, ...],
         period: float, log: TrialLog, timing: Timing, shown: Callable[[dict[str, Any]], None] | None = None,
     ) -> None:  # fmt: skip
         self._board, self._eye, self._log, self._timing, self._shown = board, eye, log, timing, shown
