@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
 from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
-from wristctl.report.wrist_shape import Planar, backbone, beside, coil, discs, hand
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
+from wristctl.wrist.shape import Planar, backbone, beside, coil, discs, hand
 
 Array = NDArray[np.float64]
 

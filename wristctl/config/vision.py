@@ -1,0 +1,110 @@
+"""What the camera sees and how it is read: markers, gates, the rendered scene, calibration, recordings."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from wristctl.config.section import Section, choice, quantity
+
+
+class Markers(Section):
+    """The two square markers (dictionary 4x4_50), top edge toward the hand, facing the camera."""
+
+    base: int = choice(0, "id of the marker on the clamp", ge=0, lt=50)
+    tip: int = choice(1, "id of the marker on the last disc", ge=0, lt=50)
+    side: float = quantity(0.020, "m", "side of the black square", "assumed", gt=0)
+    positive: Literal["right", "left"] = choice(
+        "right", "side of the picture, hand up, toward which the angle counts positive"
+    )
+
+    @model_validator(mode="after")
+    def _two_markers(self) -> Self:
+        if self.base == self.tip:
+            raise ValueError(f"base and tip need different ids, both are {self.tip}")
+        return self
+
+
+class Gates(Section):
+    """What a sighting must pass before its angle is used."""
+
+    rate: float = quantity(21.0, "rad/s", "largest rate from one used frame to the next",
+                           "20,000 steps/s of tendon over its lever", gt=0)  # fmt: skip
+    margin_deg: float = quantity(1.0, "deg", "jump allowed beside that rate: noise", "ten standard deviations", ge=0)
+    side_ratio: float = quantity(1.12, "", "longest side over shortest, rectified", "measured: a hidden corner", gt=1)
+    corner_deg: float = quantity(6.0, "deg", "largest deviation of a corner from 90 deg", "as side_ratio", gt=0)
+    base_memory: float = quantity(0.5, "s", "the clamped base is averaged, and believed unseen", "assumed", gt=0)
+    base_shift: float = quantity(0.1, "", "displacement of the base that is refused, in sides", "assumed", gt=0)
+
+
+class SceneSettings(Section):
+    """The rendered camera and what it looks at."""
+
+    width: int = quantity(640, "px", "picture width", ge=160)
+    height: int = quantity(480, "px", "picture height", ge=120)
+    field_deg: float = quantity(60.0, "deg", "horizontal field of view", "assumed: a webcam", gt=5, lt=150)
+    distance: float = quantity(0.28, "m", "from the lens to the bending plane", "assumed: markers of 44 px", gt=0.05)
+    height_above: float = quantity(0.060, "m", "of the point looked at, beyond the base disc", "assumed")
+    tilt_deg: float = quantity(0.0, "deg", "camera above (+) the level of that point", "assumed", gt=-60, lt=60)
+    pan_deg: float = quantity(0.0, "deg", "camera beside that point, + toward theta > 0", "assumed", gt=-60, lt=60)
+    roll_deg: float = quantity(0.0, "deg", "camera turned about its axis", "assumed", ge=-180, le=180)
+    distortion: float = quantity(-0.05, "", "radial distortion k1 of the lens", "assumed", ge=-0.4, le=0.4)
+    marker_offset: float = quantity(0.028, "m", "markers in front of the bending plane", "assumed: on flags", ge=0)
+    blur: float = quantity(0.8, "px", "standard deviation of the lens's blur", "assumed", ge=0)
+    gradient: float = quantity(0.5, "", "difference of light across the picture, over its mean", "assumed", ge=0, lt=2)
+    contrast: float = quantity(0.75, "", "of the markers' print", "assumed", gt=0, le=1)
+    noise: float = quantity(4.0, "", "standard deviation of each pixel, of 255", "assumed", ge=0)
+
+
+class Board(Section):
+    """The ChArUco board for calibration (dictionary 5x5_50, whose ids no wrist marker shares)."""
+
+    columns: int = choice(7, "squares across", ge=3, le=12)
+    rows: int = choice(9, "squares down", ge=3, le=12)
+    square: float = quantity(0.025, "m", "side of a square", "fits A4 and letter", gt=0)
+    marker: float = quantity(0.018, "m", "side of a marker in a white square", gt=0)
+
+    @model_validator(mode="after")
+    def _marker_in_square(self) -> Self:
+        if not 0.4 * self.square <= self.marker <= 0.85 * self.square:
+            raise ValueError(f"a marker of {self.marker} m needs a square of 1.2 to 2.5 times that")
+        if self.columns * self.rows // 2 > 50:
+            raise ValueError(f"{self.columns} x {self.rows} squares need more than the 50 markers of the dictionary")
+        return self
+
+
+class Device(Section):
+    """What is asked of a camera device; null leaves it as it is."""
+
+    width: int | None = quantity(None, "px", "picture width", gt=0)
+    height: int | None = quantity(None, "px", "picture height", gt=0)
+    frame_rate: float | None = quantity(None, "1/s", "frames per second", gt=0)
+    exposure: float | None = quantity(None, "", "in the device's own unit; switches its automatic exposure off", gt=0)
+    delay: float = quantity(0.0, "s", "from the middle of the exposure to the device's time stamp", "assumed", ge=0)
+
+
+class CalibrateCameraSettings(Section):
+    """Intrinsics and distortion from views of the board; the last view has the board lie in the bending plane."""
+
+    camera: str | None = choice(None, "device (0, /dev/video0), video file or folder of pictures; null renders views")
+    views: int = choice(20, "views to take (device, video, rendered)", ge=8, le=200)
+    in_plane: bool = choice(True, "the last view shows the board lying in the bending plane")
+    coverage: float = quantity(0.6, "", "least share of the picture in which corners were seen", "assumed", gt=0, le=1)
+    tilt_deg: float = quantity(15.0, "deg", "least tilt of the most tilted view", "assumed", ge=0, lt=60)
+    error: float = quantity(1.0, "px", "largest reprojection error (RMS)", "assumed", gt=0)
+    board: Board = Board()
+    device: Device = Device()
+    scene: SceneSettings = SceneSettings()
+
+
+class TrackSettings(Section):
+    """Angles from a recording."""
+
+    video: str | None = choice(None, "video file or folder of pictures")
+    frame_rate: float | None = quantity(None, "1/s", "frames per second; null reads it from the video", gt=0)
+    calibration: str | None = choice(None, "calibrate-camera run; without one the camera is taken to stand square")
+    zero: Literal["none", "first"] = choice("none", "angle that counts as 0: markers aligned, or the first one seen")
+    annotate: bool = choice(False, "write the video with corners and angle drawn in, data/annotated.avi")
+    markers: Markers = Markers()
+    gates: Gates = Gates()

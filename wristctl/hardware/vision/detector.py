@@ -1,0 +1,78 @@
+"""Finding square markers in a picture, their print, and the angle of a square."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.hardware.vision.camera import Image
+
+Array = NDArray[np.float64]
+Found = dict[int, list[Array]]
+"""Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print."""
+
+CELLS = 6
+"""Cells along a marker's side, with the black border; one more on either side stays white."""
+DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+_NEAR_SIDES = 3.0
+"""Side of the part searched around the last place, in sides of the marker."""
+
+
+def print_of(number: int) -> Image:
+    """A marker's cells (8, 8) with its quiet zone: 0 is black, 255 white."""
+    inner = cv2.aruco.generateImageMarker(DICTIONARY, number, CELLS)
+    return np.pad(inner.astype(np.uint8), 1, constant_values=255)
+
+
+def square_angle(corners: Array) -> float:
+    """Angle [rad] by which a square of corners (4, 2) is turned, + clockwise where y goes down, by least squares.
+
+    The square of angle 0 has its top edge up.
+    """
+    z = corners[:, 0] + 1j * corners[:, 1]
+    upright = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
+    return float(np.angle(np.vdot(upright, z - z.mean())))
+
+
+class Detector:
+    """Finds markers in the whole picture, or around where one was.
+
+    One threshold window and a 3x3 blur: faster than the default passes and more accurate, as long as a marker has 40 px
+    or more. Corners are refined in a window of half a cell; the default shrinks to 1 px on small markers and costs
+    0.7 deg.
+    """
+
+    def __init__(self) -> None:
+        self._whole = cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.03))
+        self._near = cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.5))  # of the part's own size
+
+    def everywhere(self, image: Image) -> Found:
+        """All markers of the picture."""
+        return _detect(self._whole, image, 0, 0)
+
+    def around(self, image: Image, corners: Array) -> Found:
+        """The markers around the place where one had these corners (4, 2) [px]."""
+        half = 0.5 * _NEAR_SIDES * float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).mean())
+        (x, y), (height, width) = corners.mean(axis=0), image.shape
+        left, top = max(0, int(x - half)), max(0, int(y - half))
+        part = image[top : min(height, int(y + half)), left : min(width, int(x + half))]
+        return _detect(self._near, part, left, top) if min(part.shape, default=0) > 0 else {}
+
+
+def _parameters(least_perimeter: float) -> cv2.aruco.DetectorParameters:
+    made = cv2.aruco.DetectorParameters()
+    made.adaptiveThreshWinSizeMin = made.adaptiveThreshWinSizeMax = 15
+    made.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    made.relativeCornerRefinmentWinSize = 0.5
+    made.minMarkerPerimeterRate = least_perimeter
+    return made
+
+
+def _detect(detector: cv2.aruco.ArucoDetector, image: Image, left: int, top: int) -> Found:
+    corners, ids, _ = detector.detectMarkers(cv2.GaussianBlur(image, (3, 3), 0))
+    found: Found = {}
+    offset = np.array([left, top], float)
+    for each, number in zip(corners, () if ids is None else ids.ravel(), strict=True):
+        found.setdefault(int(number), []).append(each.reshape(4, 2).astype(np.float64) + offset)
+    return found

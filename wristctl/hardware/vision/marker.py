@@ -1,0 +1,166 @@
+"""The wrist's angle from its two markers, frame by frame, and the gates that an angle must pass."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.vision import Gates, Markers
+from wristctl.hardware.vision.camera import Frame
+from wristctl.hardware.vision.detector import Detector, square_angle
+from wristctl.hardware.vision.view import View
+
+Array = NDArray[np.float64]
+
+_UNSEEN = np.full((4, 2), np.nan)
+
+
+class Verdict(StrEnum):
+    """Whether a sighting can be used, and if not why."""
+
+    OK = "ok"
+    NO_TIP = "no tip"
+    NO_BASE = "no base"
+    TWICE = "twice"
+    SHAPE = "shape"
+    BASE_MOVED = "base moved"
+    SWAPPED = "swapped"
+    JUMP = "jump"
+
+
+MEANING = {
+    Verdict.OK: "both markers seen, or the tip's with a base seen shortly before",
+    Verdict.NO_TIP: "the marker on the last disc is not seen",
+    Verdict.NO_BASE: "the marker on the clamp has not been seen whole for longer than base_memory",
+    Verdict.TWICE: "a marker's id is seen in two places",
+    Verdict.SHAPE: "the tip's marker is no square: a corner is hidden, or it is bent or smeared",
+    Verdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
+    Verdict.SWAPPED: "the markers have changed places",
+    Verdict.JUMP: "the angle has changed faster than the motors can move the wrist",
+}
+
+
+class Sighting(NamedTuple):
+    """What one frame tells."""
+
+    time: float
+    """Of the frame [s]"""
+    number: int
+    """Of the frame"""
+    theta: float
+    """Bending angle [rad], nan unless the verdict is ok"""
+    verdict: Verdict
+    corners: Array
+    """(2, 4, 2) [px] of the base's and the tip's marker, nan where it is not seen"""
+
+
+class _Base(NamedTuple):
+    """The clamped marker, averaged."""
+
+    corners: Array  # (4, 2) rectified
+    frames: int
+    seen: float
+
+
+class Tracker:
+    """Follows the two markers; `zero` [rad] is the angle between them on the straight wrist.
+
+    The base is clamped, so its place is averaged over `base_memory` and believed for as long while it is not seen.
+    Markers are looked for around their last place, and in the whole picture where they are not found there.
+    """
+
+    def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
+        self._markers, self._view, self._gates, self.zero = markers, view, gates, zero
+        self._detector = Detector()
+        self._last_seen: dict[int, Array] = {}
+        self._base: _Base | None = None
+        self._used: tuple[float, float] | None = None
+
+    def see(self, frame: Frame) -> Sighting:
+        """The angle in a frame; frames come in the order of time. Raises UserError for pictures of another size."""
+        self._view.check_size(frame.image.shape[1], frame.image.shape[0], "camera")
+        found = self._find(frame)
+        bases, tips = (found.get(number, []) for number in (self._markers.base, self._markers.tip))
+        verdict, theta = self._judge(frame.time, bases, tips)
+        if verdict is Verdict.OK:
+            self._used = frame.time, theta
+        shown = np.stack([each[0] if each else _UNSEEN for each in (bases, tips)])
+        return Sighting(frame.time, frame.number, theta, verdict, shown)
+
+    def _find(self, frame: Frame) -> dict[int, list[Array]]:
+        wanted = (self._markers.base, self._markers.tip)
+        found = {}
+        for number, corners in self._last_seen.items():
+            near = self._detector.around(frame.image, corners)
+            if number in near:
+                found[number] = near[number]
+        if len(found) < 2:
+            everywhere = self._detector.everywhere(frame.image)
+            found = {number: each for number, each in everywhere.items() if number in wanted}
+        self._last_seen = {number: each[0] for number, each in found.items()}
+        return found
+
+    def _judge(self, time: float, bases: list[Array], tips: list[Array]) -> tuple[Verdict, float]:
+        if len(bases) > 1 or len(tips) > 1:
+            return Verdict.TWICE, math.nan
+        base, tip = ([self._view.rectify(each) for each in corners] for corners in (bases, tips))
+        base = [each for each in base if self._is_square(each)]
+        if tip and not self._is_square(tip[0]):
+            return Verdict.SHAPE, math.nan
+        if self._base is not None and time - self._base.seen > self._gates.base_memory:
+            self._base = None
+        moved = base and self._has_moved(base[0])
+        if tip and (known := [self._base.corners] if self._base else base) and not _ahead(known[0], tip[0]):
+            return Verdict.SWAPPED, math.nan
+        if moved:
+            return Verdict.BASE_MOVED, math.nan
+        if base:
+            self._average(time, base[0])
+        if not tip:
+            return Verdict.NO_TIP, math.nan
+        if self._base is None:
+            return Verdict.NO_BASE, math.nan
+        theta = self._angle(self._base.corners, tip[0])
+        if self._used is not None:
+            before, last = self._used
+            allowed = self._gates.rate * (time - before) + math.radians(self._gates.margin_deg)
+            if abs(theta - last) > allowed:
+                return Verdict.JUMP, math.nan
+        return Verdict.OK, theta
+
+    def _angle(self, base: Array, tip: Array) -> float:
+        sign = 1.0 if self._markers.positive == "right" else -1.0
+        turned = sign * (square_angle(tip) - square_angle(base)) - self.zero
+        return math.remainder(turned, math.tau)
+
+    def _is_square(self, corners: Array) -> bool:
+        edges = np.roll(corners, -1, axis=0) - corners
+        sides = np.hypot(edges[:, 0], edges[:, 1])
+        cosines = np.einsum("ij,ij->i", edges, np.roll(edges, 1, axis=0)) / (sides * np.roll(sides, 1))
+        skew = math.degrees(math.asin(min(1.0, float(np.abs(cosines).max()))))
+        return bool(sides.max() <= self._gates.side_ratio * sides.min()) and skew <= self._gates.corner_deg
+
+    def _has_moved(self, corners: Array) -> bool:
+        if self._base is None:
+            return False
+        side = float(np.linalg.norm(self._base.corners[1] - self._base.corners[0]))
+        away = float(np.linalg.norm(corners - self._base.corners, axis=1).max())
+        return away > self._gates.base_shift * side
+
+    def _average(self, time: float, corners: Array) -> None:
+        if self._base is None:
+            self._base = _Base(corners, 1, time)
+            return
+        count = self._base.frames + 1
+        share = max(1.0 / count, -math.expm1((self._base.seen - time) / self._gates.base_memory))
+        self._base = _Base(self._base.corners + share * (corners - self._base.corners), count, time)
+
+
+def _ahead(base: Array, tip: Array) -> bool:
+    """Whether the tip's marker lies before the base's, in the direction of its top edge, by a side at least."""
+    up = base[0] + base[1] - base[2] - base[3]
+    return float(up @ (tip.mean(axis=0) - base.mean(axis=0))) > 0.5 * float(up @ up)

@@ -1,0 +1,131 @@
+"""Pictures of the wrist as a camera before it takes them: pose, lens, light, exposure and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from wristctl.config.vision import Markers, SceneSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.vision.camera import Image
+from wristctl.hardware.vision.detector import print_of
+from wristctl.hardware.vision.pinhole import Pinhole
+from wristctl.hardware.vision.scene_parts import BASE_AT, Stroke, clamp, fingers, last_disc, moving
+from wristctl.hardware.vision.view import View
+
+Array = NDArray[np.float64]
+
+_CELL, _FINE, _BITS = 16, 4, 4
+"""Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners."""
+_WALL, _EDGE = 122, 48
+_LEVELS = 2**16
+
+
+class Scene:
+    """A camera before the wrist, with the two markers on flags in front of the bending plane."""
+
+    def __init__(self, settings: SceneSettings, wrist: WristParameters, markers: Markers | None = None) -> None:
+        self._settings, self._wrist, self._markers = settings, wrist, markers or Markers()
+        self.camera = Pinhole(settings, self._markers.positive)
+        numbers = self._markers.base, self._markers.tip
+        self._prints = [np.kron(print_of(each), np.ones((_CELL, _CELL), np.uint8)) for each in numbers]
+        self._film = Film(settings)
+        still = np.full((settings.height, settings.width), _WALL, np.uint8)
+        self._draw(still, *self._projected([clamp()]))
+        self._still = [self._with_marker(still.copy(), each, complex(BASE_AT), 1.0) for each in self._prints]
+
+    @property
+    def view(self) -> View:
+        """What a perfect calibration of this camera finds."""
+        return self.camera.view
+
+    def render(self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False) -> Image:
+        """A picture (height, width) of segment angles (k, n) [rad] at k instants of the exposure, which it averages.
+
+        `covered`: a hand lies over the tip's marker; `swapped`: the two markers have changed places.
+        """
+        instants = np.atleast_2d(theta)
+        total = np.zeros(self._still[0].shape, np.float32)
+        drawings = self._projected([moving(each, self._wrist) for each in instants])
+        for angles, drawing in zip(instants, drawings, strict=True):
+            image = self._still[swapped].copy()
+            self._draw(image, drawing)
+            place = last_disc(angles, self._wrist)
+            self._with_marker(image, self._prints[not swapped], *place)
+            if covered:
+                self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)]))
+            cv2.accumulate(image, total)
+        return self._film.expose(total / np.float32(len(instants)), rng)
+
+    def _projected(self, drawings: Sequence[Sequence[Stroke]]) -> list[list[tuple[Stroke, Array]]]:
+        """Each stroke with its pixels; all are projected at once."""
+        strokes = [stroke for drawing in drawings for stroke in drawing]
+        pixels = self.camera.project(np.concatenate([stroke.points for stroke in strokes]))
+        parts = iter(np.split(pixels, np.cumsum([len(stroke.points) for stroke in strokes])[:-1]))
+        return [[(stroke, next(parts)) for stroke in drawing] for drawing in drawings]
+
+    def _draw(self, image: Image, drawing: Sequence[tuple[Stroke, Array]]) -> None:
+        for stroke, pixels in drawing:
+            if stroke.how == "line":
+                cv2.polylines(image, [_fixed(pixels)], False, stroke.grey, stroke.thickness, cv2.LINE_AA, _BITS)
+            elif stroke.how == "hull":
+                hull = _fixed(cv2.convexHull(pixels.astype(np.float32))[:, 0])
+                cv2.fillConvexPoly(image, hull, stroke.grey, cv2.LINE_AA, _BITS)
+                cv2.polylines(image, [hull], True, _EDGE, 1, cv2.LINE_AA, _BITS)
+            elif self.camera.side * cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0.0:
+                cv2.fillConvexPoly(image, _fixed(pixels), stroke.grey, cv2.LINE_AA, _BITS)
+
+    def _with_marker(self, image: Image, print_: Image, centre: complex, along: complex) -> Image:
+        """Paint a print on its flag, its top edge toward `along`. The lens's distortion within it is left out."""
+        half = 0.5 * self._markers.side * print_.shape[0] / (print_.shape[0] - 2 * _CELL)
+        right = 1j * self.camera.side
+        places = centre + along * half * np.array([1 - right, 1 + right, -1 + right, -1 - right])
+        depth = np.full(4, -self._settings.marker_offset)
+        corners = self.camera.project(np.stack([places.real, places.imag, depth], axis=-1))
+        start = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
+        width, height = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 2, self.camera.size) - start
+        if width <= 0 or height <= 0:
+            return image
+        size = len(print_)
+        ends = np.array([[0, 0], [size, 0], [size, size], [0, size]], np.float32) - 0.5
+        onto = ((corners - start + 0.5) * _FINE - 0.5).astype(np.float32)
+        warp, fine = cv2.getPerspectiveTransform(ends, onto), (int(width) * _FINE, int(height) * _FINE)
+        ink = cv2.warpPerspective(print_, warp, fine, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        mask = np.zeros(fine[::-1], np.uint8)
+        cv2.fillConvexPoly(mask, _fixed(onto), 255, cv2.LINE_AA, _BITS)
+        ink, mask = (cv2.resize(each, (int(width), int(height)), interpolation=cv2.INTER_AREA) for each in (ink, mask))
+        part = image[start[1] : start[1] + height, start[0] : start[0] + width]
+        shown = 128 + self._settings.contrast * (ink.astype(np.float32) - 128)
+        part[:] = np.rint(part + mask * ((shown - part) / np.float32(255)))
+        return image
+
+
+class Film:
+    """Light, blur and noise on the way from what is there to a picture."""
+
+    def __init__(self, settings: SceneSettings) -> None:
+        self._blur = settings.blur
+        x, y = np.meshgrid(np.linspace(-0.5, 0.5, settings.width), np.linspace(-0.5, 0.5, settings.height))
+        self._light = (1.0 - settings.gradient * (0.6 * x + 0.8 * y)).astype(np.float32)  # a lamp above, to the left
+        # Normal noise by its quantiles: a fifth of the time of drawing it otherwise, which is half a picture's.
+        self._noise = (settings.noise * ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)).astype(np.float32)
+
+    def expose(self, scene: NDArray[np.float32], rng: np.random.Generator) -> Image:
+        """A picture of grey levels (height, width)."""
+        seen: NDArray[Any] = scene * self._light
+        if self._blur:
+            seen = cv2.GaussianBlur(seen, (0, 0), self._blur)
+        seen = seen + self._noise.take(rng.integers(0, _LEVELS, seen.shape, np.uint16))
+        picture: Image = np.rint(seen).clip(0, 255).astype(np.uint8)
+        return picture
+
+
+def _fixed(pixels: NDArray[Any]) -> NDArray[np.int32]:
+    """Pixels as OpenCV draws fractions of them."""
+    whole: NDArray[np.int32] = np.rint(pixels * 2**_BITS).astype(np.int32)
+    return whole

@@ -1,0 +1,106 @@
+"""What a camera before the wrist sees, as outlines and lines in space: clamp, discs, springs, tendons, hand."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.wrist import WristParameters
+from wristctl.wrist.shape import Planar, backbone, beside, capsule, coil, discs, hand
+
+Array = NDArray[np.float64]
+
+RIM, THICK = 1.25, 0.0035
+"""Radius of the discs over that of the circle of tendons; their thickness [m]."""
+BASE_AT = -0.022
+"""Middle of the base's marker, which is on the clamp, along x [m]."""
+_CLAMP_FOOT, _CLAMP_HALF, _CLAMP_DEPTH = -0.050, 0.036, 0.024
+_FINGERS = ((0.004 + 0.004j, 0.016 + 0.18j), (-0.010 + 0.002j, -0.008 + 0.18j))
+_AROUND = np.linspace(0.0, 2.0 * np.pi, 36)
+
+
+class Stroke(NamedTuple):
+    """Something drawn in one grey, over what was drawn before."""
+
+    points: Array
+    """(m, 3) along x, along y, depth away from the camera [m]"""
+    grey: int
+    how: Literal["line", "fill", "hull", "face"]
+    """A line; a filled outline; what holds all the points, filled and edged; an outline filled if it turns clockwise
+    from x to depth for the camera"""
+    thickness: int = 1
+    """Of a line [px]"""
+
+
+def clamp() -> list[Stroke]:
+    """Table, and the vice that holds the first disc."""
+    table = _box((_CLAMP_FOOT - 0.02, _CLAMP_FOOT), (-0.3, 0.3), (-0.05, 0.3))
+    body = _box((_CLAMP_FOOT, -0.5 * THICK), (-_CLAMP_HALF, _CLAMP_HALF), (-_CLAMP_DEPTH, _CLAMP_DEPTH))
+    front = body[[0, 2, 6, 4]]
+    places = [complex(x, y) for x in (-0.041, -0.009) for y in (-0.029, 0.029)]
+    screws = [_flat(place + 0.0035 * np.exp(1j * _AROUND), -_CLAMP_DEPTH) for place in places]
+    return [
+        Stroke(table, 84, "hull"),
+        Stroke(body, 58, "hull"),
+        Stroke(front, 76, "hull"),
+        *(Stroke(screw, 128, "hull") for screw in screws),
+    ]
+
+
+def moving(theta: Array, wrist: WristParameters) -> list[Stroke]:
+    """The wrist with segment angles (n,) [rad], and its hand."""
+    frames = discs(theta, wrist.length, wrist.discs)
+    centres, normals = frames
+    c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
+    parts = [
+        Stroke(_flat(centres[-1] + normals[-1] * outline, 0.0), 164, "hull")
+        for outline in reversed(hand(max(wrist.hand_offset, 0.02), edge_on=False))
+    ]
+    line, _ = backbone(theta, wrist.length, np.linspace(0.0, wrist.length, 24))
+    parts += _pairs(frames, c, behind=True)
+    parts.append(Stroke(_flat(line, 0.0), 92, "line", 4))
+    for centre, normal in zip(*frames, strict=True):
+        rims = [_rim(centre + normal * end * THICK, normal, radius) for end in (-0.5, 0.5)]
+        parts.append(Stroke(np.concatenate(rims), 150, "hull"))
+        parts += [Stroke(rims[0], 196, "face"), Stroke(rims[1][::-1], 196, "face")]
+    return parts + _pairs(frames, c, behind=False)
+
+
+def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:
+    """Two fingers of somebody who holds the last disc, over its marker."""
+    return [Stroke(_flat(tip + along * capsule(*ends, 0.0085), depth), 172, "hull") for ends in _FINGERS]
+
+
+def last_disc(theta: Array, wrist: WristParameters) -> tuple[complex, complex]:
+    """Centre [m] of the last disc and its unit normal."""
+    centres, normals = discs(theta, wrist.length, wrist.discs)
+    return complex(centres[-1]), complex(normals[-1])
+
+
+def _pairs(frames: tuple[Planar, Planar], c: float, behind: bool) -> list[Stroke]:
+    """On either side the tendon and the springs around it, behind the backbone or in front of it."""
+    parts = []
+    for offset in (-c, c):
+        tendon = beside(frames, offset)
+        depth = c if behind else -c
+        for start, end in pairwise(tendon):
+            turns = coil(complex(start), complex(end), 0.17 * c, turns=3)[::2]
+            parts.append(Stroke(_flat(turns, depth), 140 if behind else 158, "line"))
+        parts.append(Stroke(_flat(tendon, depth), 62 if behind else 40, "line", 2))
+    return parts
+
+
+def _rim(centre: complex, normal: complex, radius: float) -> Array:
+    places = centre + 1j * normal * radius * np.cos(_AROUND)
+    return np.stack([places.real, places.imag, radius * np.sin(_AROUND)], axis=-1)
+
+
+def _flat(places: Planar, depth: float) -> Array:
+    return np.stack([places.real, places.imag, np.full(len(places), depth)], axis=-1)
+
+
+def _box(x: tuple[float, float], y: tuple[float, float], depth: tuple[float, float]) -> Array:
+    return np.array([[a, b, c] for a in x for b in y for c in depth])

@@ -1,0 +1,79 @@
+"""How a camera sees the bending plane: lens, distortion, and the homography that sets the plane square."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.errors import UserError
+
+Array = NDArray[np.float64]
+
+SCHEMA, FILE = "wristctl.camera/1", "data/camera.json"
+_ARRAYS = "camera_matrix", "distortion", "plane"
+
+
+def _nominal() -> Array:
+    return np.eye(3)
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera's intrinsics and its place before the bending plane. The default one stands square, with no distortion.
+
+    Rectified points are metres in the bending plane where it was calibrated, else pixels; x goes right and y down
+    either way, so that a marker's angle is the same up to a constant.
+    """
+
+    camera_matrix: Array = field(default_factory=_nominal)
+    """(3, 3) [px]"""
+    distortion: Array = field(default_factory=lambda: np.zeros(4))
+    """k1, k2, p1, p2"""
+    plane: Array = field(default_factory=_nominal)
+    """(3, 3) undistorted pixels to the bending plane"""
+    size: tuple[int, int] | None = None
+    """(width, height) [px] of the pictures it holds for; None: any"""
+
+    def rectify(self, points: Array) -> Array:
+        """Pixels (k, 2) to points (k, 2) of the bending plane. Exact also for parallel planes, but for a scale."""
+        if self.distortion.any():
+            points = self.undistort(points)
+        homogeneous = points @ self.plane[:, :2].T + self.plane[:, 2]
+        return homogeneous[:, :2] / homogeneous[:, 2:]
+
+    def undistort(self, points: Array) -> Array:
+        """Pixels (k, 2) as a lens without distortion would give them."""
+        lens = self.camera_matrix, self.distortion
+        found = cv2.undistortPoints(points.reshape(-1, 1, 2), *lens, P=self.camera_matrix)
+        return found.reshape(-1, 2).astype(np.float64)
+
+    def check_size(self, width: int, height: int, where: str) -> None:
+        """Raises UserError where pictures have another size than those it was calibrated with."""
+        if self.size is not None and self.size != (width, height):
+            what = f"pictures of {width} x {height}, but the calibration is of {self.size[0]} x {self.size[1]}"
+            raise UserError(what, where, "calibrate the camera at this size: wristctl hw calibrate camera", 4)
+
+    def save(self, file: Path, **more: Any) -> None:
+        """Write it as JSON, with what else is known of the calibration."""
+        arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
+        text = json.dumps({"schema": SCHEMA, "size": self.size, **arrays, **more}, indent=2, allow_nan=False)
+        file.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """Read what `save` wrote. Raises UserError."""
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+            if found["schema"] != SCHEMA:
+                raise ValueError(found["schema"])
+            matrix, distortion, plane = (np.array(found[name], float) for name in _ARRAYS)
+            width, height = found["size"]
+            return cls(matrix, distortion, plane, (int(width), int(height)))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise UserError("not a camera calibration", str(file), "wristctl hw calibrate camera") from error
