@@ -28,6 +28,7 @@ COMMANDS = {
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
+    "hw-run": ("wristctl.cli.hw_run", _HARDWARE, "Perform the paper's experiment, on hardware or all emulated."),
     "hw": ("wristctl.cli.hw", _HARDWARE, "Find, check, flash, emulate and stop the motor board."),
     "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }

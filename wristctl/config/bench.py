@@ -8,6 +8,7 @@ from pydantic import model_validator
 
 from wristctl.config.plant import Actuator, Plant
 from wristctl.config.section import Section, choice, quantity
+from wristctl.config.vision import SceneSettings
 
 FAULTS = {
     "port-lost": "the cable is pulled: the port is gone for good",
@@ -53,6 +54,24 @@ class Motors(Section):
     )
 
 
+class RenderedCamera(Section):
+    """The camera before the bench."""
+
+    frame_rate: float = quantity(60.0, "1/s", "frames per second", "assumed", gt=0, le=1000)
+    delay_frames: float = quantity(
+        2.0, "", "frames from the middle of an exposure to its arrival", "assumed", ge=0, le=20
+    )
+    exposure: float = quantity(4e-3, "s", "exposure; a motion in it smears the picture", "assumed", gt=0, le=0.1)
+    dropped: float = quantity(0.05, "", "share of frames that never arrive", "assumed", ge=0, lt=1)
+    scene: SceneSettings = SceneSettings()
+
+    @model_validator(mode="after")
+    def _one_exposure_at_a_time(self) -> Self:
+        if self.exposure * self.frame_rate > 1.0:
+            raise ValueError(f"an exposure of {self.exposure} s is longer than a frame at {self.frame_rate} per second")
+        return self
+
+
 class BenchSettings(Section):
     """The wrist on the emulated bench. Its controller does not know how `plant` differs."""
 
@@ -60,6 +79,7 @@ class BenchSettings(Section):
     plant: Plant = choice(Plant(stiffness_scale=0.7), "the wrist as it is", "paper: springs lose stiffness")
     actuator: Actuator = choice(Actuator(level="tendon"), "elastic tendons on stepper motors")
     motors: Motors = Motors()
+    camera: RenderedCamera = RenderedCamera()
     faults: tuple[Fault, ...] = choice((), "what goes wrong in each trial")
 
     @model_validator(mode="after")

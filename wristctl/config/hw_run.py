@@ -8,8 +8,8 @@ from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.control import Row
-from wristctl.config.loop import Direction, Reference
-from wristctl.config.plant import Actuator, Push, Sensor
+from wristctl.config.loop import Direction, Loop, Reference
+from wristctl.config.plant import Actuator, Plant, Push, Sensor
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
 
@@ -95,12 +95,28 @@ class HwRunSettings(RigSettings):
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
+    network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames as a video, annotated")
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:
         if self.push.force == 0.0 and not self.without_push:
             raise ValueError("without_push: false and push.force: 0 leave no trial")
+        if self.sensor.frame_rate * self.control_period > 1.0:
+            raise ValueError("sensor.frame_rate is above one frame per control_period")
         if self.positions == "stored" and self.calibration is None:
             raise ValueError("positions: stored needs a calibration run")
         return self
+
+    @property
+    def loop(self) -> Loop:
+        """The same loop in simulation: the emulated wrist's plant, or where the wrist is real the known one."""
+        emulated = self.port is None
+        return Loop(
+            plant_segments=self.bench.segments,
+            plant=self.bench.plant if emulated else Plant(),
+            actuator=self.actuator,
+            sensor=self.sensor,
+            control_period=self.control_period,
+            substeps=max(1, round(self.control_period / 1e-3)),
+        )

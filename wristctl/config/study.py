@@ -6,6 +6,7 @@ from pydantic import Field
 
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
 from wristctl.config.wrist import WristParameters
@@ -22,3 +23,5 @@ class Study(Section):
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
+    calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
+    hw_run: HwRunSettings = Field(HwRunSettings(), alias="hw-run")

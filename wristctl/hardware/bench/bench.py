@@ -4,50 +4,44 @@ from __future__ import annotations
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
+from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.bench.rig import Rig
 from wristctl.hardware.bench.transport import BenchTransport
-from wristctl.hardware.bench.wrist import BenchWrist, Motion, Truth
-from wristctl.hardware.emulator.atmega2560 import Atmega2560
+from wristctl.hardware.bench.virtual_camera import VirtualCamera
+from wristctl.hardware.bench.wrist import Motion, Truth
 
 
 class Bench:
-    """A wrist pulled by the step pulses of an emulated board; time passes while `transport` is waited on.
+    """A wrist pulled by the step pulses of an emulated board, and a camera that sees it.
 
-    The wrist does not act back on the board, so it follows only when somebody looks; what it does is the same
-    however often that is.
+    Time passes while `transport` is waited on, and is of its clock.
     """
 
-    def __init__(self, settings: BenchSettings, wrist: WristParameters, seed: int) -> None:
-        self._chip = Atmega2560()
-        self._faults = Faults(settings.faults)
-        self._wrist = BenchWrist(settings, wrist)
-        self.transport = BenchTransport(self._chip, self._faults)
+    def __init__(
+        self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None
+    ) -> None:
+        self._rig = Rig(settings, wrist, seed, markers)
+        self.transport = BenchTransport(self._rig.chip, self._rig.faults)
+        self.camera = VirtualCamera(self._rig)
 
     def face(self, direction: str) -> None:
         """Turn the bench so that this direction's plane is the one that bends and is seen."""
-        self._catch_up()
-        self._wrist.face(direction)
+        self._rig.face(direction)
 
     def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
-        """A trial's motion starts at `start` on the transport's clock: from there count disturbances and faults."""
-        self._catch_up()
-        self._wrist.disturb(disturbances or Disturbances(), start)
-        self._faults.begin(start)
+        """A trial's motion starts at `start`: from there count disturbances and faults."""
+        self._rig.begin(start, disturbances)
 
     def truth(self, since: float = 0.0) -> Truth:
-        """What the wrist did after `since` [s on the transport's clock], as far back as the last minute."""
-        self._catch_up()
-        return self._wrist.truth(since)
+        """What the wrist did after `since`, as far back as the last minute."""
+        self._rig.catch_up()
+        return self._rig.wrist.truth(since)
 
     def motion(self) -> Motion:
         """What the board has made of its motors so far."""
-        self._catch_up()
-        return self._wrist.motion
+        self._rig.catch_up()
+        return self._rig.wrist.motion
 
     def close(self) -> None:
         """Nothing to give back: here so that every bench ends alike."""
-
-    def _catch_up(self) -> None:
-        self._wrist.hear(self._chip.events())
-        self._wrist.follow(self._chip.cycles)

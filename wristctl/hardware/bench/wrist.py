@@ -124,6 +124,12 @@ class BenchWrist:
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
         return Truth(time, *np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1))
 
+    def angles(self, times: Array) -> Array:
+        """Segment angles (k, n) [rad] at k times within what `truth` remembers, straight lines between milliseconds."""
+        first = max(0, round((times.min()) / PERIOD) - 2)
+        known = self.truth(first * PERIOD)
+        return np.stack([np.interp(times, known.time, angle) for angle in known.theta.T], axis=-1)
+
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
         plant = plant_of(in_plane(self._wrist, direction), self._settings.plant)

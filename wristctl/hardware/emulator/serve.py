@@ -14,6 +14,9 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wristctl.config.errors import UserError
 from wristctl.hardware.emulator.atmega2560 import Atmega2560, Halted
 from wristctl.hardware.emulator.chip import FREQUENCY
@@ -134,8 +137,16 @@ class TcpLine:
             each.close()
 
 
-def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: True) -> None:
-    """Run the chip in real time on this line for as long as `running` says; a program that crashes is reset."""
+def serve(
+    chip: Atmega2560,
+    line: Line,
+    running: Callable[[], bool] = lambda: True,
+    watch: Callable[[NDArray[np.void], float], None] = lambda edges, start: None,
+) -> None:
+    """Run the chip in real time on this line for as long as `running` says; a program that crashes is reset.
+
+    `watch` is told what the chip's latches did, and when its clock was 0 (`time.monotonic`): later where it lagged.
+    """
     start = time.monotonic() - chip.cycles / FREQUENCY
     there = False
     while running():
@@ -153,4 +164,4 @@ def serve(chip: Atmega2560, line: Line, running: Callable[[], bool] = lambda: Tr
             chip.reset()
         if data := chip.read():
             line.send(data)
-        chip.events()
+        watch(chip.events(), start)

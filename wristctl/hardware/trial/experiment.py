@@ -1,11 +1,9 @@
-"""The experiment from the first command to the last: connect, home, trials, return, and the stop if it comes to that."""
+"""The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings, RigSettings
@@ -13,47 +11,167 @@ from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.hardware.board import Board
-from wristctl.hardware.errors import BoardError
 from wristctl.hardware.messages import Configure, Limits, State
+from wristctl.hardware.trial.calibration import Calibration
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.faults import HostFaults
 from wristctl.hardware.trial.halt import Halt, halt
 from wristctl.hardware.trial.homing import Patience, Zero, find_zero
 from wristctl.hardware.trial.log import TrialLog
 from wristctl.hardware.trial.loop import ControlLoop, Timing
-from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.moves import at_rest, back, motion_of
+from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.stands import Stand
 from wristctl.hardware.trial.trials import Trial
-from wristctl.hardware.transport import Transport
 from wristctl.runs.interrupt import undisturbed
 from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.kinematics import Inverse
 
-log = logging.getLogger(__name__)
+Shown = Callable[[dict[str, Any]], None]
+"""Takes each tick's row of the log, to show it."""
 
-Gains = Mapping[str, Mapping[str, float]]
+
+class Stop:
+    """Why and how an experiment was stopped before its end."""
+
+    def __init__(self, error: BaseException, trial: int | None, halted: Halt) -> None:
+        self.reason = f"{type(error).__name__}: {error}"
+        if isinstance(error, UserError):
+            self.reason = error.what
+        elif isinstance(error, KeyboardInterrupt):
+            self.reason = "interrupted by the operator"
+        self.trial, self.halt = trial, halted
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        status = self.halt.status
+        known = {"state": None, "faults": None, "position": None, "rate": None}
+        if status is not None:
+            faults = status.faults.name or "none"
+            known |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
+        return {
+            "reason": self.reason,
+            "trial": self.trial,
+            "motors_stand": self.halt.verified,
+            "how": self.halt.how,
+            "seconds": self.halt.seconds,
+            **known,
+        }
 
 
-class Rig(Protocol):
-    """What an experiment stands on besides the board: the wrist in front of the camera."""
+class Experiment:
+    """Trials; `outcomes` holds how each trial that began has ended, `stop` why they ended early.
 
-    emulated: bool
-    transport: Transport
+    Raises UserError for what is wrong with controllers, gains or motions.
+    """
 
-    def eye(self) -> Eye:
-        """The camera with a fresh tracker."""
+    def __init__(
+        self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
+        network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
+        calibration: Calibration | None = None,
+    ) -> None:  # fmt: skip
+        self._settings, self._wrist, self._trials, self._log = settings, wrist, trials, kept
+        self._calibration = calibration
+        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
+        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
+        self._back = controller("feedforward")
+        self.motions = {each: motion_of(settings, wrist, each, network) for each in settings.directions}
+        self.timing = Timing(settings.control_period)
+        self.outcomes: dict[int, str] = {}
+        self.stop: Stop | None = None
+        self.zero: Zero | None = None
+        self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
 
-    def face(self, direction: str) -> None:
-        """Turn the wrist so that this direction's plane is the one that bends and is seen. May ask the operator."""
+    def run(self, stand: Stand, shown: Shown | None = None) -> None:
+        """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
 
-    def begin(self, start: float, disturbances: Disturbances) -> None:
-        """A trial's motion starts at `start` on the transport's clock."""
+        Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
+        """
+        board = Board(stand.transport)
+        try:
+            board.connect()
+            try:
+                self._all(stand, board, shown)
+            except BaseException as error:
+                with undisturbed():
+                    self._stopped(stand, board, error)
+                if isinstance(error, OSError):
+                    what = f"the log cannot be written: {error.strerror}"
+                    raise SafetyStop(what, str(error.filename or "data"), "free space") from error
+                raise
+            with undisturbed():
+                halt(board, self._settings.safety.watchdog)
+                board.close()
+        finally:
+            stand.close()
 
-    def truth(self, since: float) -> list[list[float]]:
-        """Rows (time since then, segment angles, their sum, pulls) of an emulated wrist; none of a real one."""
+    def _all(self, stand: Stand, board: Board, shown: Shown | None) -> None:
+        stand.confirm()
+        prepare(board, self._settings)
+        plane = ""
+        for trial in self._trials:
+            if trial.plane != plane:
+                stand.face(trial.direction, Patience(board))
+                loop = self._loop(stand, board, trial.plane, shown)
+                plane = trial.plane
+            self._one(stand, loop, trial)
 
-    def close(self) -> None:
-        """Give everything back."""
+    def _loop(self, stand: Stand, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
+        """A loop at rest at zero in this plane; the first one homes the board, later ones read the marker's zero."""
+        settings, eye = self._settings, stand.eye()
+        if self.zero is None:
+            self.zero = self._home(board, eye, plane)
+            eye.zero = self.zero.marker
+        else:
+            eye.zero = Patience(board).angle(eye, 4 * settings.homing.frames)
+        toward = "ulnar" if plane == "ulnar" else "flexion"
+        loop = ControlLoop(
+            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, settings.control_period,
+            self._log, self.timing, shown,
+        )  # fmt: skip
+        loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
+        return loop
+
+    def _home(self, board: Board, eye: Eye, plane: str) -> Zero:
+        settings, known = self._settings, self._calibration
+        if known is not None and settings.positions == "stored":
+            known.restore(board)
+            return known.zero
+        signs = known.zero.signs if known else None
+        return find_zero(board, eye, spools_of(settings.actuator), settings.homing, plane, signs)
+
+    def _one(self, stand: Stand, loop: ControlLoop, trial: Trial) -> None:
+        """One trial, and the way back to zero."""
+        settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
+        law, gains = self._laws[trial.row]
+        against = -DIRECTIONS[trial.direction].sign * trial.push
+        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
+        stand.begin(start, Disturbances(push=settings.push.model_copy(update={"force": against})))
+        faults = HostFaults(settings.bench.faults) if stand.emulated else None
+        loop.follow(followed, law, gains, trial.number, faults)
+        self._trial_ended(stand, "ok")
+        self._log.flush()
+        loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
+
+    def _trial_ended(self, stand: Stand, outcome: str) -> None:
+        if self._under_way is not None:
+            number, start = self._under_way
+            self.outcomes[number], self._under_way = outcome, None
+            self._log.truth([number, *row] for row in stand.truth(start))
+
+    def _stopped(self, stand: Stand, board: Board, error: BaseException) -> None:
+        """Stop the motors and let the board go, then note what happened."""
+        halted = halt(board, self._settings.safety.watchdog)
+        if self._settings.safety.hold and halted.verified:
+            board.transport.close()  # the board's watchdog ends it, and holds
+        else:
+            board.close(emergency=not halted.verified)
+        self.stop = Stop(error, self._under_way[0] if self._under_way else None, halted)
+        try:
+            self._trial_ended(stand, self.stop.reason)
+        except (OSError, UserError) as lost:
+            error.add_note(f"what the bench knows of the trial is lost: {lost}")
 
 
 def prepare(board: Board, settings: RigSettings) -> None:
@@ -61,160 +179,7 @@ def prepare(board: Board, settings: RigSettings) -> None:
     limits, spools = settings.safety, spools_of(settings.actuator)
     if board.read().state == State.FAULT:
         board.clear()
-    board.configure(
-        Configure(
-            watchdog=limits.watchdog,
-            hold_on_fault=int(limits.hold),
-            acceleration=round(spools.acceleration),
-        )
-    )
+    board.configure(Configure(limits.watchdog, int(limits.hold), round(spools.acceleration)))
     furthest = round(limits.travel / spools.step)
     board.send(Limits((-furthest,) * 4, (furthest,) * 4))
     board.enable()
-
-
-def check_unmoved(board: Board, stored: Mapping[str, Any]) -> None:
-    """Raises BoardError where the zero positions of a calibration no longer hold: the board has restarted or moved."""
-    hello = board.hello or board.connect()
-    position = list(board.read().position)
-    if hello.boot_nonce != stored["boot_nonce"]:
-        what = "the calibration's zero positions are lost: the board has restarted since"
-    elif position != stored["position"]:
-        what = f"the calibration left the motors at {stored['position']}, the board says {position}"
-    else:
-        return
-    fix = "leave out positions: stored, and zero is found anew; senses of turning are kept"
-    raise BoardError("host", what, board.transport.name, fix)
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Why and how an experiment was stopped before its end."""
-
-    reason: str
-    where: str
-    trial: int
-    """Being done at the time; -1: none."""
-    halt: Halt
-
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        status = self.halt.status
-        return {
-            "reason": self.reason,
-            "where": self.where,
-            "trial": None if self.trial < 0 else self.trial,
-            "motors_stand": self.halt.verified,
-            "how": self.halt.how,
-            "seconds": self.halt.seconds,
-            "state": status.state.name if status else None,
-            "faults": status.faults.name or "none" if status else None,
-            "position": list(status.position) if status else None,
-            "rate": list(status.rate) if status else None,
-        }
-
-
-class Experiment:
-    """Trials on a bench; `outcomes` holds how each trial that began has ended."""
-
-    def __init__(
-        self, settings: HwRunSettings, wrist: WristParameters, rig: Rig, trials: list[Trial], log_: TrialLog,
-        tuned: Gains | None = None, known: Zero | None = None, stored: Mapping[str, Any] | None = None,
-        shown: Callable[[dict[str, Any]], None] | None = None,
-    ) -> None:  # fmt: skip
-        self._settings, self._wrist, self._rig, self._trials, self._log = settings, wrist, rig, trials, log_
-        self._known, self._stored, self._shown = known, stored, shown
-        rows = [(controller(row.controller), row.gains) for row in settings.rows]
-        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in rows]
-        self._back = controller("feedforward")
-        self._motions = {name: motion_of(settings, wrist, name) for name in settings.directions}
-        self.timing = Timing(settings.control_period)
-        self.outcomes: dict[int, str] = {}
-        self.starts: dict[int, float] = {}
-        self.stop: Stop | None = None
-        self.zero: Zero | None = None
-        self._now = -1
-
-    def run(self, board: Board) -> None:
-        """Do all trials on a connected board. Whatever ends them early, the motors are stopped before it is raised."""
-        try:
-            if self._stored is not None:
-                check_unmoved(board, self._stored)
-            prepare(board, self._settings)
-            self._all(board)
-            with undisturbed():
-                self._ended(board, None)
-        except BaseException as error:
-            with undisturbed():
-                self._ended(board, error)
-            if isinstance(error, OSError):
-                raise SafetyStop(f"the log cannot be written: {error.strerror}", "data/log.csv", "free space") from error
-            raise
-
-    def _all(self, board: Board) -> None:
-        plane = ""
-        for trial in self._trials:
-            if trial.plane != plane:
-                first, plane = not plane, trial.plane
-                self._rig.face(trial.direction)
-                loop, eye = self._loop(board, trial.plane, first)
-            self._one(loop, trial)
-
-    def _loop(self, board: Board, plane: str, first: bool) -> tuple[ControlLoop, Eye]:
-        """A loop at rest at zero in this plane."""
-        settings, eye = self._settings, self._rig.eye()
-        if first:
-            self.zero = self._home(board, eye, plane)
-            eye.zero = self.zero.marker
-        else:
-            eye.zero = Patience(board, eye).angle(4 * settings.homing.frames)
-        assert self.zero is not None
-        wrist = in_plane(self._wrist, "ulnar" if plane == "ulnar" else "flexion")
-        loop = ControlLoop(
-            board, eye, settings, wrist, plane, self.zero.signs, settings.control_period, self._log, self.timing,
-            self._shown,
-        )  # fmt: skip
-        loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
-        return loop, eye
-
-    def _home(self, board: Board, eye: Eye, plane: str) -> Zero:
-        settings = self._settings
-        if settings.positions == "stored":
-            assert self._known is not None and self._stored is not None
-            board.home(self._stored["position"])
-            return self._known
-        signs = self._known.signs if self._known else None
-        return find_zero(board, eye, spools_of(settings.actuator), settings.homing, plane, signs)
-
-    def _one(self, loop: ControlLoop, trial: Trial) -> None:
-        settings, followed = self._settings, self._motions[trial.direction]
-        law, gains = self._laws[trial.row]
-        against = -DIRECTIONS[trial.direction].sign * trial.push
-        push = settings.push.model_copy(update={"force": against})
-        self._now, start = trial.number, loop.next_tick
-        self.starts[trial.number] = start
-        self.outcomes[trial.number] = "begun"
-        self._rig.begin(start, Disturbances(push=push))
-        faults = HostFaults(settings.bench.faults) if self._rig.emulated else None
-        loop.follow(followed, law, gains, trial.number, faults)
-        self._keep_truth()
-        self.outcomes[trial.number], self._now = "ok", -1
-        self._log.flush()
-        loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
-
-    def _keep_truth(self) -> None:
-        if self._rig.emulated:
-            number = self._now
-            self._log.truth([number, *row] for row in self._rig.truth(self.starts[number]))
-
-    def _ended(self, board: Board, error: BaseException | None) -> None:
-        """Stop the motors, and note why where it was before the end."""
-        stopped = halt(board, self._settings.safety.watchdog)
-        if error is None:
-            return
-        reason = error.what if isinstance(error, UserError) else "interrupted" if isinstance(error, KeyboardInterrupt) else f"{type(error).__name__}: {error}"
-        where = error.where if isinstance(error, UserError) else ""
-        self.stop = Stop(reason, where, self._now, stopped)
-        if self._now >= 0:
-            self.outcomes[self._now] = reason
-            self._keep_truth()

@@ -25,7 +25,7 @@ class Eye(Protocol):
         """What was seen since the last look, oldest first; never waits for a frame."""
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Look no more; the camera stays open."""
 
 
 class InlineEye:
@@ -46,8 +46,7 @@ class InlineEye:
         return [seen._replace(theta=seen.theta - self.zero)]
 
     def close(self) -> None:
-        """Give the camera back."""
-        self._camera.close()
+        """Nothing goes on between looks."""
 
 
 class ThreadedEye:
@@ -75,7 +74,6 @@ class ThreadedEye:
         """Stop looking."""
         self._stop.set()
         self._thread.join(timeout=2.0)
-        self._inner.close()
 
     def _watch(self) -> None:
         try:

@@ -32,6 +32,8 @@ _FURTHEST_DEG = 10.0
 """A bend at which homing stops."""
 _PULSE = 0.02
 """Seconds between two signs of life to the board while waiting."""
+_READING = 2.0
+"""Seconds within which the marker must be read."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,8 @@ class Zero:
 class Patience:
     """Waits and reads the marker while it keeps the board's link alive."""
 
-    def __init__(self, board: Board, eye: Eye) -> None:
-        self._board, self._eye = board, eye
+    def __init__(self, board: Board) -> None:
+        self._board = board
 
     def wait(self, seconds: float) -> None:
         """Let time pass."""
@@ -65,18 +67,18 @@ class Patience:
             self._board.ping()
             self._board.transport.wait(min(left, _PULSE))
 
-    def angle(self, frames: int, patience: float = 2.0) -> float:
+    def angle(self, eye: Eye, frames: int) -> float:
         """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
         found: list[float] = []
-        self._eye.look()
+        eye.look()
         began, verdict = self._board.transport.now(), "no frame"
         while len(found) < frames:
             self.wait(_PULSE)
-            for seen in self._eye.look():
+            for seen in eye.look():
                 verdict = str(seen.verdict)
                 if seen.time >= began and math.isfinite(seen.theta):
                     found.append(seen.theta)
-            if self._board.transport.now() - began > patience:
+            if self._board.transport.now() - began > _READING:
                 fix = "see that the camera sees both markers, sharp and well lit"
                 raise SafetyStop(f"the marker's angle could not be read ({verdict})", "homing", fix)
         return float(np.median(found))
@@ -85,8 +87,8 @@ class Patience:
 class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
-    def __init__(self, board: Board, patience: Patience, spools: Spools, settings: Homing, plane: str) -> None:
-        self._board, self._patience, self._settings = board, patience, settings
+    def __init__(self, board: Board, eye: Eye, spools: Spools, settings: Homing, plane: str) -> None:
+        self._board, self._eye, self._patience, self._settings = board, eye, Patience(board), settings
         self._plus = on_plus_side(plane)
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
@@ -94,7 +96,7 @@ class _Finder:
         self._start = board.read().position
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
-        self.straight = patience.angle(4 * settings.frames)
+        self.straight = self._patience.angle(eye, 4 * settings.frames)
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
         """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
@@ -142,7 +144,7 @@ class _Finder:
     def _bent(self, axis: int) -> float:
         """Angle [rad] from straight. Raises SafetyStop where it is too large."""
         self._patience.wait(self._settings.rest)
-        bend = self._patience.angle(self._settings.frames) - self.straight
+        bend = self._patience.angle(self._eye, self._settings.frames) - self.straight
         if abs(bend) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
             what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
@@ -171,7 +173,7 @@ def find_zero(
 
     Raises SafetyStop where a tendon does not bend the wrist, bends it too far or the wrong way, or the marker is lost.
     """
-    finder = _Finder(board, Patience(board, eye), spools, settings, plane)
+    finder = _Finder(board, eye, spools, settings, plane)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
     taut, slopes = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)

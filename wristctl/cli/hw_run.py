@@ -1,0 +1,56 @@
+"""`wristctl hw-run`: the paper's experiment on the whole chain, from marker to motor."""
+
+from __future__ import annotations
+
+from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.study import Study
+from wristctl.runs import Run
+
+
+def plan(study: Study, inputs: dict[str, Run]) -> str:
+    """What would be done; opens nothing."""
+    settings = study.hw_run
+    pushes = settings.without_push + (settings.push.force != 0.0)
+    count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
+    each = settings.horizon + settings.back + settings.rest
+    return f"{stands_on(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
+
+
+def stands_on(settings: HwRunSettings) -> str:
+    """What is real and what is emulated, in one line."""
+    if settings.port is not None:
+        return f"on hardware: board at {settings.port}, camera {settings.camera}"
+    clock = "against the wall clock" if settings.real_time else "in virtual time"
+    return f"all emulated, {clock}: motor board with its firmware, motors, tendons, wrist and camera"
+
+
+def hw_run(session: Session) -> list[Table]:
+    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
+    session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
+    from wristctl.cli.hw_tables import tables
+    from wristctl.cli.hw_trials import performed
+
+    table = performed(session)
+    return tables(session, table)
+
+
+app = study_command(
+    "hw-run",
+    work=hw_run,
+    plan=plan,
+    inputs=(
+        Input("calibration", kind="calibrate-wrist", optional=True),
+        Input("optics", kind="calibrate-camera", optional=True),
+        Input("tuned", kind="tune", optional=True),
+        Input("network", kind="train", optional=True),
+    ),
+    shortcuts=("port", "camera", "repetitions", "real_time", "video"),
+    flags={"yes": "Ask nobody before the motors of real hardware move."},
+    examples=(
+        "wristctl hw-run",
+        "wristctl hw-run --set directions=\\[ulnar] --set push.force=0",
+        "wristctl hw-run --dry-run --port /dev/ttyACM0",
+        "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
+    ),
+)

@@ -1,0 +1,131 @@
+"""The emulated bench in real time, started in a process of its own and used like the one in virtual time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+import signal
+import tempfile
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from wristctl.config.bench import BenchSettings
+from wristctl.config.errors import UserError
+from wristctl.config.plant import Disturbances
+from wristctl.config.vision import Markers
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.frame_memory import SharedCamera
+from wristctl.hardware.bench.wrist import Motion, Truth
+from wristctl.hardware.errors import BoardError
+from wristctl.hardware.messages import BAUD
+from wristctl.hardware.transport import SerialTransport
+
+_END = 5.0
+
+
+class RealTimeBench:
+    """The client's side of a bench in another process; times are of `time.monotonic`.
+
+    Closing it, or leaving it as a context manager, ends that process; a client that dies leaves it to end by itself.
+    BoardError where the process has died.
+    """
+
+    def __init__(self, process: Any, control: Connection, address: str, pictures: Path) -> None:
+        self._process, self._control = process, control
+        self.transport = SerialTransport(address, BAUD)
+        self.camera = SharedCamera(pictures)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def face(self, direction: str) -> None:
+        """As `Bench.face`."""
+        self._ask("face", direction)
+
+    def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
+        """As `Bench.begin`."""
+        self._ask("begin", start, disturbances)
+
+    def truth(self, since: float = 0.0) -> Truth:
+        """As `Bench.truth`."""
+        truth: Truth = self._ask("truth", since)
+        return truth
+
+    def motion(self) -> Motion:
+        """As `Bench.motion`."""
+        motion: Motion = self._ask("motion")
+        return motion
+
+    def close(self) -> None:
+        """End the bench's process."""
+        self.transport.close()
+        self._control.close()
+        self._process.terminate()
+        self._process.join(_END)
+
+    def _ask(self, *request: Any) -> Any:
+        try:
+            self._control.send(request)
+            return self._control.recv()
+        except (EOFError, OSError) as error:
+            raise BoardError("host", "the emulated bench's process has died", fix="start again") from error
+
+
+def connect(
+    settings: BenchSettings,
+    wrist: WristParameters,
+    seed: int,
+    markers: Markers | None = None,
+    record: Path | None = None,
+) -> RealTimeBench:
+    """Start a bench in a process of its own. What its board did is left in the file `record`.
+
+    It takes as long to start as its parts take to be compiled, if this is the first time.
+    """
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, settings, wrist, seed, markers, record), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        told = ours.recv()
+    except EOFError as error:
+        fix = "wristctl hw emulate --wrist shows why"
+        raise BoardError("host", "the emulated bench did not start", fix=fix) from error
+    if isinstance(told, UserError):
+        raise told
+    return RealTimeBench(process, ours, *told)
+
+
+def _serve(
+    control: Connection,
+    settings: BenchSettings,
+    wrist: WristParameters,
+    seed: int,
+    markers: Markers | None,
+    record: Path | None,
+) -> None:
+    """The bench's process: Ctrl-C is the client's affair."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from wristctl.hardware.bench.rig import Rig
+    from wristctl.hardware.bench.server import BenchServer
+    from wristctl.hardware.emulator.serve import PtyLine
+
+    folder = Path(tempfile.mkdtemp(prefix="wristctl-bench-"))
+    try:
+        rig, line = Rig(settings, wrist, seed, markers), PtyLine()
+        server = BenchServer(rig, line, folder / "frame", record, control)
+        signal.signal(signal.SIGTERM, lambda *_: server.stop())
+        control.send((line.address, folder / "frame"))
+        server.run()
+    except UserError as error:
+        control.send(error)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

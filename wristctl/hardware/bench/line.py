@@ -1,0 +1,51 @@
+"""The bench's line in real time, and what may go wrong on it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.emulator.serve import Line
+
+
+class FaultyLine:
+    """Another line with faults: port-lost, for good, and host-silent; `clock` is the board's."""
+
+    def __init__(self, line: Line, faults: Faults, clock: Callable[[], float]) -> None:
+        self.address = line.address
+        self.there = False
+        """Whether a client is there."""
+        self.heard: float | None = None
+        """When the board was last sent something [s on its clock]; None: never."""
+        self._line, self._faults, self._clock = line, faults, clock
+        self._lost = False
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
+        if not self._lost and self._faults.on("port-lost", self._clock()):
+            self.close()
+        if self._lost:
+            time.sleep(timeout)  # the board still has its power: it is not to be reset
+        else:
+            self.there = self._line.wait(timeout)
+        return self.there
+
+    def receive(self) -> bytes:
+        """What clients have sent, as far as the board hears it."""
+        received = b"" if self._lost else self._line.receive()
+        if not received or self._faults.on("host-silent", self._clock()):
+            return b""
+        self.heard = self._clock()
+        return received
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to every client."""
+        if not self._lost:
+            self._line.send(data)
+
+    def close(self) -> None:
+        """Send the clients away."""
+        if not self._lost:
+            self._lost = True
+            self._line.close()

@@ -1,0 +1,62 @@
+"""What stands on the emulated bench, in virtual as in real time: board, wrist, camera, and what goes wrong."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.bench import BenchSettings
+from wristctl.config.plant import Disturbances
+from wristctl.config.vision import Markers
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.camera import Shutter
+from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.bench.wrist import BenchWrist
+from wristctl.hardware.emulator.atmega2560 import Atmega2560
+from wristctl.hardware.vision.scene import Scene
+
+
+class Rig:
+    """A wrist that hangs on a chip's pins, before a camera; all times are of the chip's clock [s].
+
+    The wrist does not act back on the board, so it may follow when somebody looks; what it does is the same however
+    often that is.
+    """
+
+    def __init__(
+        self,
+        settings: BenchSettings,
+        wrist: WristParameters,
+        seed: int,
+        markers: Markers | None = None,
+        chip: Atmega2560 | None = None,
+    ) -> None:
+        self.settings = settings
+        self.chip = chip or Atmega2560()
+        self.faults = Faults(settings.faults)
+        self.wrist = BenchWrist(settings, wrist)
+        self.shutter = Shutter(settings.camera, self.faults, self.wrist, seed)
+        self._drawn = settings.camera.scene, wrist, markers
+
+    @cached_property
+    def scene(self) -> Scene:
+        """What draws the camera's pictures; made when the first is wanted."""
+        return Scene(*self._drawn)
+
+    def catch_up(self, edges: NDArray[np.void] | None = None) -> None:
+        """Let the wrist follow the chip; `edges` where somebody has taken them from it already."""
+        self.wrist.hear(self.chip.events() if edges is None else edges)
+        self.wrist.follow(self.chip.cycles)
+
+    def face(self, direction: str) -> None:
+        """Turn the bench so that this direction's plane is the one that bends and is seen."""
+        self.catch_up()
+        self.wrist.face(direction)
+
+    def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
+        """A trial's motion starts at `start`: from there count disturbances and faults."""
+        self.catch_up()
+        self.wrist.disturb(disturbances or Disturbances(), start)
+        self.faults.begin(start)

@@ -1,0 +1,134 @@
+"""The emulated bench in real time: the board on a line, its pictures in a file, for any client."""
+
+from __future__ import annotations
+
+import logging
+import math
+import sys
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.plant import Disturbances
+from wristctl.hardware.bench.film import Film
+from wristctl.hardware.bench.frame_memory import FrameMemory
+from wristctl.hardware.bench.line import FaultyLine
+from wristctl.hardware.bench.record import Record
+from wristctl.hardware.bench.rig import Rig
+from wristctl.hardware.bench.spools import PERIOD
+from wristctl.hardware.bench.wrist import Motion, Truth
+from wristctl.hardware.emulator.chip import FREQUENCY
+from wristctl.hardware.emulator.serve import Line, serve
+
+log = logging.getLogger(__name__)
+
+_LINGER = 2.0
+"""Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors."""
+_TURN = 5e-4
+"""Seconds after which the drawing thread hands over to the board's."""
+
+
+class BenchServer:
+    """Runs a rig against the wall clock. Frames go to the file `pictures`, what the board did to the file `record`.
+
+    Requests of a client come through `control` as a method's name and its arguments, and are answered; their times
+    are of `time.monotonic`. When that client has gone the bench ends after a while; without `control` at `stop`.
+    """
+
+    def __init__(
+        self, rig: Rig, line: Line, pictures: Path, record: Path | None = None, control: Connection | None = None
+    ) -> None:
+        self._rig, self._control = rig, control
+        self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY)
+        self._record = None if record is None else Record(record, rig.wrist, self._line)
+        scene = rig.settings.camera.scene
+        self._film = Film(rig.shutter, rig.scene, FrameMemory(pictures, (scene.height, scene.width)))
+        self._start, self._until = time.monotonic(), math.inf
+        self._taken, self._reset = -1, -math.inf
+        self._energised = False
+        rig.chip.run(FREQUENCY // 100)
+        rig.catch_up()  # so that what is to be compiled is, before real time begins
+
+    def run(self) -> None:
+        """Serve until the end; then the line is closed."""
+        threads, turn = cv2.getNumThreads(), sys.getswitchinterval()
+        cv2.setNumThreads(1)
+        sys.setswitchinterval(_TURN)
+        try:
+            serve(self._rig.chip, self._line, lambda: time.monotonic() < self._until, self._round)
+        finally:
+            cv2.setNumThreads(threads)
+            sys.setswitchinterval(turn)
+            self._line.close()
+            self._film.close()
+            if self._record is not None:
+                self._record.write(self._start, ended=True)
+
+    def face(self, direction: str) -> None:
+        """As `Bench.face`."""
+        self._rig.wrist.face(direction)
+
+    def begin(self, start: float, disturbances: Disturbances | None) -> None:
+        """As `Bench.begin`."""
+        self._rig.begin(start - self._start, disturbances)
+
+    def truth(self, since: float) -> Truth:
+        """As `Bench.truth`."""
+        truth = self._rig.wrist.truth(since - self._start)
+        return truth._replace(time=truth.time + self._start)
+
+    def motion(self) -> Motion:
+        """As `Bench.motion`."""
+        motion = self._rig.wrist.motion
+        return motion._replace(last_step=tuple(at if at is None else at + self._start for at in motion.last_step))
+
+    def stop(self) -> None:
+        """End soon."""
+        self._until = -math.inf
+
+    def _round(self, edges: NDArray[np.void], start: float) -> None:
+        """What is due about every half millisecond: `edges` are the chip's newest, its clock was 0 at `start`."""
+        self._start = start
+        self._rig.catch_up(edges)
+        self._reset_board()
+        self._take_frame()
+        if self._control is not None:
+            self._answer(self._control)
+        if self._record is not None:
+            self._record.look(start)
+        self._tell()
+
+    def _reset_board(self) -> None:
+        due = self._rig.faults.next("board-reset", self._reset)
+        if due <= self._rig.wrist.time:
+            self._rig.chip.reset()
+            self._reset = due
+
+    def _take_frame(self) -> None:
+        shutter = self._rig.shutter
+        number = shutter.newest(0.0)
+        if number > self._taken:
+            self._taken = number
+            if self._line.there and shutter.arrives(number):
+                self._film.expose(shutter.expose(number), self._start)
+
+    def _answer(self, control: Connection) -> None:
+        try:
+            while self._until == math.inf and control.poll():
+                name, *arguments = control.recv()
+                request: Any = getattr(self, name)
+                control.send(request(*arguments))
+        except (EOFError, OSError):
+            self._until = min(self._until, time.monotonic() + _LINGER)
+
+    def _tell(self) -> None:
+        energised = any(self._rig.wrist.motion.energised)
+        if energised != self._energised:
+            self._energised = energised
+            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).theta.sum()
+            log.info("drives %s, wrist at %.1f deg", "on" if energised else "off", np.rad2deg(theta))

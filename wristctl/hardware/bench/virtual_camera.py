@@ -1,0 +1,27 @@
+"""The bench's camera in virtual time: only the frames that somebody sees are drawn."""
+
+from __future__ import annotations
+
+from wristctl.hardware.bench.rig import Rig
+from wristctl.hardware.vision.camera import Frame
+
+
+class VirtualCamera:
+    """Sees what stands on a rig; frames arrive as the chip's clock goes on."""
+
+    name = "rendered"
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig, self._seen = rig, -1
+
+    def newest(self) -> Frame | None:
+        """The newest frame that has arrived since the last call, None if none has."""
+        self._rig.catch_up()
+        shutter = self._rig.shutter
+        newest = shutter.newest(shutter.delay)
+        unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
+        number = next(filter(shutter.arrives, unseen), None)
+        return None if number is None else shutter.picture(shutter.expose(number), self._rig.scene)
+
+    def close(self) -> None:
+        """Nothing to give back."""
