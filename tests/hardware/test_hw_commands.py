@@ -43,7 +43,7 @@ def emulate(tmp_path: Path) -> Iterator[Served]:
         assert child.wait(10) == 130
 
 
-@pytest.mark.parametrize("how", [[], ["--tcp", "0"]], ids=["pty", "tcp"])
+@pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"]], ids=["pty", "tcp", "wrist"])
 def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, how: list[str]) -> None:
     port = emulate(*how)
     done = hw("check", "--port", port, "--rounds", "20", "--json", "-q")

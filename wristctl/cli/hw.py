@@ -151,6 +151,9 @@ def emulate(
     boot_loader: Annotated[
         Path | None, typer.Option("--boot-loader", help="Start this boot loader (Intel hex).")
     ] = None,
+    wrist: Annotated[
+        bool, typer.Option("--wrist", help="Hang a simulated wrist on it, before a rendered camera.")
+    ] = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -162,12 +165,33 @@ def emulate(
 
             chip = Atmega2560(image or FIRMWARE, boot_loader=boot_loader)
         line = PtyLine() if tcp is None else TcpLine(tcp)
+        if wrist:
+            _serve_with_wrist(chip, line, console, quiet)
+            return
         log.info("serving; try: wristctl hw check --port %s", line.address)
         print(line.address, flush=True)
         try:
             serve(chip, line)
         finally:
             line.close()
+
+
+def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory(prefix="wristctl-bench-") as folder:
+        pictures = Path(folder) / "frame"
+        with progress(console, _no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+            from wristctl.config.bench import BenchSettings
+            from wristctl.config.wrist import WristParameters
+            from wristctl.hardware.bench.rig import Rig
+            from wristctl.hardware.bench.server import BenchServer
+
+            server = BenchServer(Rig(BenchSettings(), WristParameters(), 0, chip=chip), line, pictures)
+        log.info("serving, with a wrist of the default settings on axes 0 to 3; its camera's frames: %s", pictures)
+        log.info("try: wristctl hw check --port %s --wiring 3", line.address)
+        print(line.address, flush=True)
+        server.run()
 
 
 @app.command("stop")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,8 +37,8 @@ def beside(frames: tuple[Planar, Planar], offset: float) -> Planar:
     return centres + 1j * offset * normals
 
 
-def coil(start: complex, end: complex, radius: float, turns: int = 4) -> Planar:
-    """A spring from start to end, seen from the side."""
+def coil(start: Any, end: Any, radius: float, turns: int = 4) -> Planar:
+    """A spring from start to end (complex), seen from the side; of several, (k, 1), one in each row."""
     share = np.linspace(0.0, 1.0, 16 * turns + 1)
     across = 1j * (end - start) / abs(end - start)
     points: Planar = start + share * (end - start) + radius * np.sin(2.0 * np.pi * turns * share) * across

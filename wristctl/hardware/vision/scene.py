@@ -20,7 +20,7 @@ from wristctl.hardware.vision.view import View
 
 Array = NDArray[np.float64]
 
-_CELL, _FINE, _BITS = 16, 4, 4
+_CELL, _FINE, _BITS = 16, 3, 4
 """Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners."""
 _WALL, _EDGE = 122, 48
 _LEVELS = 2**16
@@ -33,7 +33,7 @@ class Scene:
         self._settings, self._wrist, self._markers = settings, wrist, markers or Markers()
         self.camera = Pinhole(settings, self._markers.positive)
         numbers = self._markers.base, self._markers.tip
-        self._prints = [np.kron(print_of(each), np.ones((_CELL, _CELL), np.uint8)) for each in numbers]
+        self._prints = [self._printed(each) for each in numbers]
         self._film = Film(settings)
         still = np.full((settings.height, settings.width), _WALL, np.uint8)
         self._draw(still, *self._projected([clamp()]))
@@ -60,7 +60,12 @@ class Scene:
             if covered:
                 self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)]))
             cv2.accumulate(image, total)
-        return self._film.expose(total / np.float32(len(instants)), rng)
+        return self._film.expose(total, len(instants), rng)
+
+    def _printed(self, number: int) -> Image:
+        """A marker as ink on paper."""
+        grey = 128 + self._settings.contrast * (print_of(number).astype(float) - 128)
+        return np.rint(grey).astype(np.uint8).repeat(_CELL, axis=0).repeat(_CELL, axis=1)
 
     def _projected(self, drawings: Sequence[Sequence[Stroke]]) -> list[list[tuple[Stroke, Array]]]:
         """Each stroke with its pixels; all are projected at once."""
@@ -96,12 +101,12 @@ class Scene:
         onto = ((corners - start + 0.5) * _FINE - 0.5).astype(np.float32)
         warp, fine = cv2.getPerspectiveTransform(ends, onto), (int(width) * _FINE, int(height) * _FINE)
         ink = cv2.warpPerspective(print_, warp, fine, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        mask = np.zeros(fine[::-1], np.uint8)
-        cv2.fillConvexPoly(mask, _fixed(onto), 255, cv2.LINE_AA, _BITS)
-        ink, mask = (cv2.resize(each, (int(width), int(height)), interpolation=cv2.INTER_AREA) for each in (ink, mask))
+        ink = cv2.resize(ink, (int(width), int(height)), interpolation=cv2.INTER_AREA)
         part = image[start[1] : start[1] + height, start[0] : start[0] + width]
-        shown = 128 + self._settings.contrast * (ink.astype(np.float32) - 128)
-        part[:] = np.rint(part + mask * ((shown - part) / np.float32(255)))
+        mask = np.zeros(part.shape, np.uint8)
+        cv2.fillConvexPoly(mask, _fixed(corners - start), 255, cv2.LINE_AA, _BITS)
+        share = mask * np.float32(1 / 255)
+        part[:] = np.rint(part + share * (ink - np.float32(1) * part))
         return image
 
 
@@ -112,17 +117,16 @@ class Film:
         self._blur = settings.blur
         x, y = np.meshgrid(np.linspace(-0.5, 0.5, settings.width), np.linspace(-0.5, 0.5, settings.height))
         self._light = (1.0 - settings.gradient * (0.6 * x + 0.8 * y)).astype(np.float32)  # a lamp above, to the left
-        # Normal noise by its quantiles: a fifth of the time of drawing it otherwise, which is half a picture's.
+        # Normal noise by its quantiles: a fifth of the time of drawing it otherwise, which was most of a picture's.
         self._noise = (settings.noise * ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)).astype(np.float32)
 
-    def expose(self, scene: NDArray[np.float32], rng: np.random.Generator) -> Image:
-        """A picture of grey levels (height, width)."""
-        seen: NDArray[Any] = scene * self._light
+    def expose(self, total: NDArray[np.float32], instants: int, rng: np.random.Generator) -> Image:
+        """A picture (height, width) of the sum of so many instants; the sum is used up."""
+        cv2.multiply(total, self._light, total, 1.0 / instants)
         if self._blur:
-            seen = cv2.GaussianBlur(seen, (0, 0), self._blur)
-        seen = seen + self._noise.take(rng.integers(0, _LEVELS, seen.shape, np.uint16))
-        picture: Image = np.rint(seen).clip(0, 255).astype(np.uint8)
-        return picture
+            cv2.GaussianBlur(total, (0, 0), self._blur, total)
+        noise = self._noise.take(rng.integers(0, _LEVELS, total.shape, np.uint16), mode="wrap")
+        return cv2.add(total, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
 
 
 def _fixed(pixels: NDArray[Any]) -> NDArray[np.int32]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -57,7 +57,7 @@ def moving(theta: Array, wrist: WristParameters) -> list[Stroke]:
     c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
     parts = [
         Stroke(_flat(centres[-1] + normals[-1] * outline, 0.0), 164, "hull")
-        for outline in reversed(hand(max(wrist.hand_offset, 0.02), edge_on=False))
+        for outline in _hand(max(wrist.hand_offset, 0.02))
     ]
     line, _ = backbone(theta, wrist.length, np.linspace(0.0, wrist.length, 24))
     parts += _pairs(frames, c, behind=True)
@@ -86,11 +86,16 @@ def _pairs(frames: tuple[Planar, Planar], c: float, behind: bool) -> list[Stroke
     for offset in (-c, c):
         tendon = beside(frames, offset)
         depth = c if behind else -c
-        for start, end in pairwise(tendon):
-            turns = coil(complex(start), complex(end), 0.17 * c, turns=3)[::2]
-            parts.append(Stroke(_flat(turns, depth), 140 if behind else 158, "line"))
+        springs = coil(tendon[:-1, None], tendon[1:, None], 0.17 * c, turns=3)[:, ::2].ravel()
+        parts.append(Stroke(_flat(springs, depth), 140 if behind else 158, "line"))
         parts.append(Stroke(_flat(tendon, depth), 62 if behind else 40, "line", 2))
     return parts
+
+
+@cache
+def _hand(size: float) -> list[Planar]:
+    """From back to front, as the palm is over the roots of the fingers."""
+    return hand(size, edge_on=False)[::-1]
 
 
 def _rim(centre: complex, normal: complex, radius: float) -> Array:

@@ -1,0 +1,156 @@
+"""The bench against the wall clock: in a thread here, and in a process that outlives its clients."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.hardware.emulated_bench import client
+from tests.hardware.emulated_bench.conftest import TAUT
+from wristctl.config.bench import BenchSettings, Fault, RenderedCamera
+from wristctl.config.vision import SceneSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.frame_memory import FrameMemory, SharedCamera
+from wristctl.hardware.bench.rig import Rig
+from wristctl.hardware.bench.server import BenchServer
+from wristctl.hardware.board import Board
+from wristctl.hardware.emulator.serve import PtyLine
+from wristctl.hardware.errors import PortLost
+from wristctl.hardware.messages import BAUD
+from wristctl.hardware.transport import SerialTransport
+from wristctl.hardware.vision.camera import Frame
+
+SMALL = SceneSettings(width=160, height=120)
+STOPPED_WITHIN = 0.1 + 0.03
+"""Seconds from the last that the board heard to its last step: watchdog and ramp."""
+
+Serving = Callable[..., tuple[BenchServer, Path]]
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Serving]:
+    """Starts a bench's server in a thread; gives it, and the folder of its `frame` and `record`."""
+    running: list[tuple[BenchServer, threading.Thread]] = []
+
+    def start(*faults: Fault) -> tuple[BenchServer, Path]:
+        settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
+        line = PtyLine()
+        server = BenchServer(Rig(settings, WristParameters(), 0), line, tmp_path / "frame", tmp_path / "record")
+        server.address = line.address  # type: ignore[attr-defined]
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        running.append((server, thread))
+        return server, tmp_path
+
+    yield start
+    for server, thread in running:
+        server.stop()
+        thread.join()
+
+
+def board_of(server: BenchServer) -> Board:
+    board = Board(SerialTransport(server.address, BAUD))  # type: ignore[attr-defined]
+    board.connect()
+    board.enable()
+    board.home()
+    return board
+
+
+def wait_for(what: Callable[[], Any], patience: float = 60.0) -> Any:
+    """What it gives once that is true."""
+    until = time.monotonic() + patience
+    while not (got := what()):
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.02)
+    return got
+
+
+def read(record: Path) -> dict[str, Any]:
+    told: dict[str, Any] = json.loads(record.read_text()) if record.exists() else {}
+    return told
+
+
+def last_step(told: dict[str, Any]) -> float:
+    return max(at for at in told["last_step"] if at is not None)
+
+
+def is_released(told: dict[str, Any]) -> bool:
+    return bool(told) and any(told["last_step"]) and not any(told["energised"])
+
+
+def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:
+    server, folder = serving()
+    began = time.monotonic()
+    board, camera = board_of(server), SharedCamera(folder / "frame")
+    frames = []
+    while len(frames) < 10:
+        board.turn((-100.0, -100.0, 100.0, 100.0))
+        if (frame := camera.newest()) is not None:
+            frames.append((time.monotonic(), frame))
+    board.close()
+    assert (np.diff([frame.number for _, frame in frames]) >= 1).all()
+    assert all(now - frame.time >= 2 / 60 for now, frame in frames)
+    assert len({frame.image.tobytes() for _, frame in frames}) == 10
+    truth = server.truth(began)
+    assert began <= truth.time[0] and truth.time[-1] <= time.monotonic()
+    assert truth.theta[-1].sum() > 0.0
+    assert server.motion().steps[2] == -server.motion().steps[0] > 0
+
+
+def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving: Serving) -> None:
+    server, folder = serving(Fault(kind="port-lost", at=0.2), Fault(kind="marker-covered", at=0.1))
+    board = board_of(server)
+    server.begin(time.monotonic(), None)
+    with pytest.raises(PortLost):
+        while True:
+            board.turn((0.0, 0.0, 50.0, 50.0))
+    told = wait_for(lambda: is_released(r := read(folder / "record")) and r)
+    assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
+
+
+def test_a_stopped_client_and_a_killed_one_leave_the_board_to_stop_the_motors(tmp_path: Path) -> None:
+    record = tmp_path / "record"
+    command = [sys.executable, client.__file__, str(record)]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "turning\n"
+        wait_for(lambda: any(read(record).get("energised", ())))
+        process.send_signal(signal.SIGSTOP)
+        told = wait_for(lambda: is_released(r := read(record)) and r)
+        assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
+        process.send_signal(signal.SIGCONT)
+        assert process.stdout.readline() == "LINK\n"
+        assert process.stdout.readline() == "turning\n"
+        wait_for(lambda: last_step(read(record)) > last_step(told))
+        process.kill()
+    told = wait_for(lambda: (r := read(record))["ended"] and r)
+    assert is_released(told)
+    assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
+
+
+def test_a_frame_being_written_is_not_seen_and_none_is_seen_twice(tmp_path: Path) -> None:
+    writer, reader = FrameMemory(tmp_path / "frame", (3, 4)), FrameMemory(tmp_path / "frame")
+    assert reader.newest() is None
+    image = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    writer.write(Frame(image, 1.5, 7))
+    seen = reader.newest()
+    assert seen is not None and (seen.image == image).all() and (seen.time, seen.number) == (1.5, 7)
+    assert reader.newest() is None
+    writer.write(Frame(image + 1, 1.6, 8))
+    writer._head["writes"] += 1
+    assert reader.newest() is None
+    writer._head["writes"] += 1
+    seen = reader.newest()
+    assert seen is not None and seen.number == 8 and (seen.image == image + 1).all()
