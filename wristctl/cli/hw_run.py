@@ -28,11 +28,11 @@ def stands_on(settings: HwRunSettings) -> str:
 def hw_run(session: Session) -> list[Table]:
     """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
     session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
-    from wristctl.cli.hw_tables import tables
+    from wristctl.cli.hw_tables import reported
     from wristctl.cli.hw_trials import performed
 
     table = performed(session)
-    return tables(session, table)
+    return reported(session, table)
 
 
 app = study_command(

@@ -13,8 +13,6 @@ from wristctl.cli.command import Session, Table
 from wristctl.cli.hw_view import trials_shown
 from wristctl.cli.loops import network_of, tuned_of
 from wristctl.cli.operator import operator
-from wristctl.config.errors import UserError
-from wristctl.hardware.board import Board
 from wristctl.hardware.trial.calibration import Calibration
 from wristctl.hardware.trial.evaluation import JUDGED, evaluated
 from wristctl.hardware.trial.experiment import Experiment

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ def evaluated(
     plus = on_plus_side(trial.plane)
     sides = np.stack([tensions[:, plus].mean(axis=1), tensions[:, ~plus].mean(axis=1)], axis=1)
     tension = np.stack([np.interp(grid, time, side) for side in sides.T], axis=1)
-    saturated = np.abs(course["torque_wanted"] - course["torque"]).to_numpy(float) > 1e-9
+    saturated = np.abs(course["torque_wanted"].to_numpy(float) - course["torque"].to_numpy(float)) > 1e-9
 
     def judged(angle: Array) -> dict[str, float]:
         flags = np.interp(grid, time, saturated.astype(float)) > 0.5
@@ -65,17 +65,3 @@ def evaluated(
             ended = push.start + push.duration
             found["true_recovery"] = recovery(grid, angle - followed.theta_ref, followed.move, ended)
     return found
-
-
-def table_row(trial: Trial, controller: str, gains: str, outcome: str, found: dict[str, float]) -> dict[str, Any]:
-    """One row of trials.csv."""
-    return {
-        "trial": trial.number,
-        "direction": trial.direction,
-        "repetition": trial.repetition,
-        "push": trial.push,
-        "controller": controller,
-        "gains": gains,
-        "outcome": outcome,
-        **found,
-    }

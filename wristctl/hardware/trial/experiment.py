@@ -46,7 +46,7 @@ class Stop:
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         status = self.halt.status
-        known = {"state": None, "faults": None, "position": None, "rate": None}
+        known: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
         if status is not None:
             faults = status.faults.name or "none"
             known |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}

@@ -124,7 +124,7 @@ class ControlLoop:
         # The command acts once the board has read it; the last one has moved the spools by then for a whole period.
         gap = target + moving * self._underway - (position + self._sent * self._period)
         rates = self._spools.rate(gap, moving, self._sent, self._period)
-        sent, self._status = self._board.turn(self._signs * rates)
+        sent, self._status = self._board.turn((self._signs * rates).tolist())
         self._sent = self._signs * np.array(sent)
         self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
         reeled = self._reeled(self._status)
@@ -163,7 +163,8 @@ class ControlLoop:
         return answer
 
     def _reeled(self, status: Status) -> Array:
-        return self._signs * np.array(status.position, float)
+        reeled: Array = self._signs * np.array(status.position, float)
+        return reeled
 
     def _log_tick(
         self, trial: int, k: int, time: float, clock: float, estimate: Any, used: Sighting | None,

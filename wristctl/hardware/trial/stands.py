@@ -62,7 +62,7 @@ class EmulatedStand:
 
     def __init__(self, bench: Bench | RealTimeBench, settings: RigSettings, view: View, keep: Kept | None) -> None:
         self._bench, self._settings, self._view, self._keep = bench, settings, view, keep
-        self.transport = bench.transport
+        self.transport: Transport = bench.transport
         self._eye: Eye | None = None
 
     def confirm(self) -> None:
@@ -105,7 +105,7 @@ class RealStand:
 
     def __init__(self, settings: RigSettings, view: View, keep: Kept | None, ask: Ask) -> None:
         self._settings, self._view, self._keep, self._ask = settings, view, keep, ask
-        self.transport = open_transport(settings.port, settings.baud)
+        self.transport: Transport = open_transport(settings.port, settings.baud)
         try:
             self._camera = DeviceCamera(settings.camera, settings.device)
         except BaseException:
