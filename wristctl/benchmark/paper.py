@@ -27,8 +27,7 @@ EXPERIMENT: dict[str, Printed] = {
     "pushed, radial": Printed(0.207, 3.0, 0.029),
     "pushed, flexion": Printed(0.291, 3.0, 0.031),
 }
-"""The experiment: the mean of the directions, and two with a person's push (RMSE and steady-state error printed in m and
-s)."""
+"""The experiment: the mean of the directions, and two with a person's push (whose units are printed as m and s)."""
 
 
 class Trained(NamedTuple):

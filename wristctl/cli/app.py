@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 import signal
 import sys
 import traceback
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import typer
-from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from wristctl import __version__
+from wristctl.cli.on_call import on_call
 from wristctl.config.errors import UserError
 
 _REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
@@ -29,7 +28,8 @@ COMMANDS = {
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
     "hw-run": ("wristctl.cli.hw_run", _HARDWARE, "Perform the paper's experiment, on hardware or all emulated."),
-    "hw": ("wristctl.cli.hw", _HARDWARE, "Find, check, flash, emulate and stop the motor board."),
+    "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop; calibrate."),
+    "track": ("wristctl.cli.track", _HARDWARE, "Find the wrist's angle in a recorded video."),
     "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""
@@ -49,27 +49,7 @@ wristctl runs show latest:compare
 """
 
 
-class _OnCall(TyperCommand):
-    """A command known by its line in the help; its module is imported when it is called."""
-
-    def __init__(self, name: str, module: str, panel: str, line: str) -> None:
-        super().__init__(name, help=line, rich_help_panel=panel)
-        self._module = module
-
-    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        real = get_command(importlib.import_module(self._module).app)
-        real.name = self.name
-        return real.make_context(info_name, args, parent=parent, **extra)
-
-
-class _Commands(TyperGroup):
-    def __init__(self, **attributes: Any) -> None:
-        super().__init__(**attributes)
-        for name, entry in COMMANDS.items():
-            self.add_command(_OnCall(name, *entry))
-
-
-app = typer.Typer(cls=_Commands, epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
+app = typer.Typer(cls=on_call(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
 
 
 @app.callback(invoke_without_command=True)

@@ -87,19 +87,21 @@ def study_command(
     shortcuts: Sequence[str] = (),
     flags: Mapping[str, str] = MappingProxyType({}),
     examples: Sequence[str] = (),
+    argument: str | None = None,
 ) -> typer.Typer:
     """The command `kind`, which runs `work` on its section of the study in a run directory of its own.
 
     `plan` says what will be done and raises UserError for what can be known before anything is written.
     Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
-    section) an option for `--set`. `flags` (name and help) are switches that belong to this call and not to the study.
-    The docstring of `work` is the help.
+    section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
+    files. `flags` (name and help) are switches of this call that are no settings. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
     named = [each.leaf for each in inputs]
+    first = (argument,) if argument else ()
 
     def call(**given: Any) -> None:
-        own = {leaf: given.pop(leaf) for leaf in (*named, *shortcuts)}
+        own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if given.pop(name))
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
@@ -107,10 +109,11 @@ def study_command(
 
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
-    quoted = {*named, *switches}
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*named, *shortcuts)]
+    texts = {leaf for leaf in shortcuts if keys[leaf].annotation in (str, str | None)}
+    quoted = {*first, *named, *switches, *texts}
+    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*first, *named, *shortcuts)]
     own += [(name, text, True) for name, text in flags.items()]
-    call.__signature__ = signature(own)  # type: ignore[attr-defined]
+    call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
     app.command(kind, help=inspect.getdoc(work), epilog=epilog)(call)

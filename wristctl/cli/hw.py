@@ -1,4 +1,4 @@
-"""`wristctl hw`: the motor board."""
+"""`wristctl hw`: the motor board, and what to calibrate."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.progress import listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
@@ -17,8 +18,10 @@ from wristctl.config.errors import UserError
 log = logging.getLogger(__name__)
 
 app = typer.Typer(
-    help="Find, check, flash, emulate and stop the motor board.", no_args_is_help=True, add_completion=False
+    help="The motor board: find, check, flash, emulate, stop; calibrate.", no_args_is_help=True, add_completion=False
 )
+
+app.add_typer(calibrations, name="calibrate")
 
 Port = Annotated[
     str | None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wristctl.cli.command import Input, Session, Table, study_command
-from wristctl.config.hw_run import HwRunSettings
+from wristctl.cli.stands_on import stands_on
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
@@ -15,14 +15,6 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest
     return f"{stands_on(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
-
-
-def stands_on(settings: HwRunSettings) -> str:
-    """What is real and what is emulated, in one line."""
-    if settings.port is not None:
-        return f"on hardware: board at {settings.port}, camera {settings.camera}"
-    clock = "against the wall clock" if settings.real_time else "in virtual time"
-    return f"all emulated, {clock}: motor board with its firmware, motors, tendons, wrist and camera"
 
 
 def hw_run(session: Session) -> list[Table]:

@@ -1,4 +1,4 @@
-"""Tables and figures of hw-run: beside the paper's experiment and a simulation of the same trials, and trial by trial."""
+"""Tables and figures of hw-run: beside the paper's experiment and a simulation of the same trials."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pandas as pd
 from wristctl.benchmark.paper import EXPERIMENT
 from wristctl.cli.command import Session, Table
 from wristctl.cli.loops import network_of, tuned_of
-from wristctl.hardware.trial.spools import TENDONS
 from wristctl.hardware.trial.trials import Trial
 from wristctl.hardware.trial.twin import twin
 from wristctl.report import trial_figures
 from wristctl.simulation.simulate import Simulation
+from wristctl.wrist.directions import DIRECTIONS, TENDONS
 
 Twins = dict[int, Simulation]
 """The simulation of each trial, by its number."""
@@ -34,7 +34,7 @@ _BY_TRIAL = {
 
 def reported(session: Session, trials: pd.DataFrame) -> list[Table]:
     """Tables of all trials; metrics and figures on the way."""
-    trials = trials.assign(label=trials["controller"] + "/" + trials["gains"])
+    trials = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
     twins = _twins(session, trials)
     rows = [*_means(session, trials, twins), *_papers()]
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
@@ -46,7 +46,7 @@ def reported(session: Session, trials: pd.DataFrame) -> list[Table]:
 def _twins(session: Session, trials: pd.DataFrame) -> Twins:
     """Each trial in simulation; repetitions share one."""
     network, tuned, rows = network_of(session), tuned_of(session), session.settings.rows
-    names = [f"{row.controller}/{row.gains if isinstance(row.gains, str) else 'own'}" for row in rows]
+    names = [row.label for row in rows]
     done: dict[tuple[Any, ...], Simulation] = {}
     found = {}
     with session.progress("simulating the same trials"):
@@ -71,7 +71,7 @@ def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tup
         for name, unit in zip(_MEANS, ("rad", "rad", "s", "s", "rad", "rad"), strict=True):
             if name == "recovery" and not pushed:
                 continue
-            full = "_".join([*["pushed"] * pushed, name, *[label.replace("/", "-")] * several])
+            full = "_".join([*["pushed"] * pushed, name, *[label.replace("/", "-").replace(" ", "-")] * several])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
             session.run.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
         yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)
@@ -95,7 +95,7 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
                 label=each.label,
                 repetition=each.repetition,
                 **{name: course[name].to_numpy(float) for name in ("time", "theta", "theta_ref", "theta_desired")},
-                tension=course[[f"tension_{tendon}" for tendon in TENDONS]].to_numpy(float),
+                tension=_sides(course, each.direction),
                 simulated=(simulated.time, simulated.theta, simulated.error),
                 push=(push.start, push.start + push.duration) if each.push else None,
             )
@@ -107,9 +107,17 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
         if some:
             run.figure(f"{prefix}directions", trial_figures.desired_and_obtained(some))
             run.figure(f"{prefix}errors", trial_figures.errors(some))
-            first = [course for course in some if course.label == some[0].label and course.repetition == 0]
-            run.figure(f"{prefix}tensions", trial_figures.tensions(first, first[0].label))
+            row = session.settings.rows[0]
+            first = [each for each in some if each.label == row.label and each.repetition == 0]
+            run.figure(f"{prefix}tensions", trial_figures.tensions(first, row.label))
     if session.settings.real_time or session.settings.port is not None:
         between = pd.read_csv(run.file("data/between.csv"))
         late = np.concatenate([table["late"].to_numpy(float) for table in (log, between)])
         run.figure("lateness", trial_figures.lateness(late, session.settings.control_period))
+
+
+def _sides(course: pd.DataFrame, direction: str) -> Any:
+    """Commanded tension (T, 2) of one tendon of the direction's side and of one of the other."""
+    pulling = DIRECTIONS[direction].tendons
+    holding = next(tendon for tendon in TENDONS if tendon not in (3, *pulling))
+    return course[[f"tension_{pulling[0]}", f"tension_{holding}"]].to_numpy(float)

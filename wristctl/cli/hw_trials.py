@@ -35,7 +35,7 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
     "outcome": ("", "ok, or why it ended early"),
     **{name: (metric.unit, metric.formula) for name, metric in METRICS.items()},
     **{f"true_{name}": (METRICS[name].unit, f"{METRICS[name].formula}; of the true angle") for name in JUDGED},
-    "recovery": ("s", "from the end of the push, as the load estimate shows it, until |e| stays within 2 % of the move"),
+    "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the move"),
     "true_recovery": ("s", "the same by the emulated wrist's true angle, from the true end of the push"),
     "push_torque": ("N m", "largest load torque of the push, as estimated"),
 }
@@ -99,7 +99,7 @@ def _judged(session: Session, experiment: Experiment, trials: list[Trial]) -> pd
                 "repetition": trial.repetition,
                 "push": trial.push,
                 "controller": row.controller,
-                "gains": row.gains if isinstance(row.gains, str) else "own",
+                "gains": row.gains_name,
                 "outcome": experiment.outcomes[trial.number],
                 **evaluated(trial, course, followed, settings.push, settings.control_period, truth),
             }

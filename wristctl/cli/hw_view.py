@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,10 +13,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table as Grid
 
 from wristctl.cli.command import Session
+from wristctl.hardware.trial.loop import Shown
 from wristctl.hardware.trial.spools import TENDONS
 from wristctl.hardware.trial.trials import Trial
-
-Shown = Callable[[dict[str, Any]], None]
 
 _PICTURES = 8.0
 """Panels a second."""

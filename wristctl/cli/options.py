@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -48,24 +48,35 @@ class Options:
 _COMPLETED: dict[str, Callable[..., list[str]]] = {
     "controller": controllers,
     "data": run_ids,
+    "calibration": run_ids,
     "network": run_ids,
     "tuned": run_ids,
 }
 
 
-def signature(own: Iterable[tuple[str, str, bool]]) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch)."""
-    shared = inspect.signature(Options, eval_str=True).parameters.values()
+def signature(own: Iterable[tuple[str, str, bool]], argument: str | None = None) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch).
+
+    One of its own may be the `argument` that stands first, in place of study files.
+    """
+    shared = [
+        each
+        for name, each in inspect.signature(Options, eval_str=True).parameters.items()
+        if argument is None or name != "files"
+    ]
     named = [
         inspect.Parameter(
             leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[
-                (bool if switch else str) | None,
-                typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf)),
-            ],
+            annotation=Annotated[(bool if switch else str) | None, _parameter(leaf, text, leaf == argument)],
         )
         for leaf, text, switch in own
     ]
     return inspect.Signature([*shared, *named])
+
+
+def _parameter(leaf: str, text: str, first: bool) -> Any:
+    if first:
+        return typer.Argument(metavar=leaf.upper(), help=text)
+    return typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf))

@@ -29,11 +29,11 @@ class Homing(Section):
 class Safety(Section):
     """Limits whose violation stops the motors, and how they stop."""
 
-    angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "assumed: the range and a tenth", gt=0)
+    angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "range and a tenth", gt=0)
     rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
     tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
-    stale: float = quantity(0.15, "s", "longest time since the capture of the last usable marker angle", "assumed", gt=0)
+    stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
     late: float = quantity(0.05, "s", "longest delay of one tick; below the watchdog time", "assumed", gt=0)
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")

@@ -9,6 +9,7 @@ from wristctl.config.control import CompareSettings, SimulateSettings, TuneSetti
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
+from wristctl.config.vision import CalibrateCameraSettings, TrackSettings
 from wristctl.config.wrist import WristParameters
 
 
@@ -23,5 +24,7 @@ class Study(Section):
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
+    calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
+    track: TrackSettings = TrackSettings()
     hw_run: HwRunSettings = Field(HwRunSettings(), alias="hw-run")

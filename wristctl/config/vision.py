@@ -87,7 +87,7 @@ class Device(Section):
 class CalibrateCameraSettings(Section):
     """Intrinsics and distortion from views of the board; the last view has the board lie in the bending plane."""
 
-    camera: str | None = choice(None, "device (0, /dev/video0), video file or folder of pictures; null renders views")
+    camera: str | int | None = choice(None, "device (0, /dev/video0), video or folder of pictures; null renders views")
     views: int = choice(20, "views to take (device, video, rendered)", ge=8, le=200)
     in_plane: bool = choice(True, "the last view shows the board lying in the bending plane")
     coverage: float = quantity(0.6, "", "least share of the picture in which corners were seen", "assumed", gt=0, le=1)

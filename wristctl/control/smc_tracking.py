@@ -49,7 +49,7 @@ SMC_TRACKING = Controller(
     notes={
         "default": "chosen by trial on the four-segment plant at 1 kHz with ideal sensing",
         "camera": "slower: chosen by search behind a 60 Hz camera with two frames of delay",
-        "stepper": "behind that camera and stepper motors at a period of 5 ms, where `camera` keeps swinging: chosen by "
-        "trial on the emulated bench, springs of 70 and 100 %, tendons of 10 to 40 kN/m, a third frame of delay",
+        "stepper": "behind that camera and stepper motors at a period of 5 ms, where `camera` keeps swinging: by trial "
+        "on the emulated bench, springs of 70 and 100 %, tendons of 10 to 40 kN/m, up to three frames of delay",
     },
 )

@@ -78,7 +78,7 @@ def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
 
 
 def _trials(run: Run) -> tuple[Iterable[Named], np.ndarray]:
-    """Each whole trial on the control grid: the true segments where they are known, else the estimate as one segment."""
+    """Each whole trial on the control grid: the true segments where known, else the estimate as one segment."""
     import numpy as np
 
     trials, log = run.data("trials"), run.data("log")

@@ -14,7 +14,7 @@ from wristctl.report.animation import animation
 from wristctl.report.inline_svg import inline_figure
 from wristctl.report.lineage_picture import lineage_picture
 from wristctl.runs.lineage import ancestry
-from wristctl.runs.manifest import CONFIG, TABLES, Manifest
+from wristctl.runs.manifest import CONFIG, TABLES, Manifest, command_of
 from wristctl.runs.run import Run
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def page(run: Run, manifest: Manifest) -> str:
         "run.html",
         heading=run.id,
         manifest=manifest,
+        command=command_of(manifest.kind),
         headline=_headline(run.metrics),
         metrics=_metrics(run),
         tables=_tables(run),

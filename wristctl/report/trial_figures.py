@@ -1,4 +1,4 @@
-"""Figures of trials as in the paper: desired and obtained angle and error in four directions, with and without a push."""
+"""Figures of trials as in the paper: desired and obtained angle, error, in four directions, with and without a push."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from wristctl.report.style import (
     BLACK,
     BLUE,
-    GREEN,
     GREY,
     LIGHT,
     ORANGE,
-    VERMILLION,
+    PURPLE,
     figure,
     legend_below,
     line,
@@ -31,8 +30,8 @@ DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 """In the paper's order."""
 
 _BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
-_TENDONS = {1: BLUE, 2: GREEN, 4: ORANGE, 5: VERMILLION}
-_SIMULATED: Any = {"color": BLACK, "linewidth": 0.9, "linestyle": ":"}
+_SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
+_SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class Course:
     theta_ref: Array
     theta_desired: Array
     tension: Array
-    """(T, 4), of tendons 1, 2, 4, 5"""
+    """(T, 2), per tendon of the side that the direction lies on and of the other"""
     simulated: tuple[Array, Array, Array] | None = None
     """Time, angle and error of the same trial in simulation."""
     push: tuple[float, float] | None = None
@@ -61,7 +60,7 @@ def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure
     for course in courses:
         panel = panels[course.direction]
         if course.simulated is not None and course.repetition == 0:
-            panel.plot(course.simulated[0], np.degrees(course.simulated[1]), label="simulated", **_SIMULATED)
+            _simulated(panel, course, course.simulated[1])
         panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
         panel.plot(course.time, np.degrees(course.theta_desired), label="desired", **_BAND)
     return _finished(made, panels, courses, heading, "bending angle [deg]")
@@ -73,21 +72,19 @@ def errors(courses: Sequence[Course], heading: str = "") -> Figure:
     for course in courses:
         panel = panels[course.direction]
         if course.simulated is not None and course.repetition == 0:
-            panel.plot(course.simulated[0], np.degrees(course.simulated[2]), label="simulated", **_SIMULATED)
+            _simulated(panel, course, course.simulated[2])
         panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
         panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     return _finished(made, panels, courses, heading, "error [deg]")
 
 
 def tensions(courses: Sequence[Course], heading: str = "") -> Figure:
-    """Commanded tension [N] of the four tendons over time [s], one panel for each direction."""
+    """Commanded tension [N] of each tendon of both sides over time [s], one panel for each direction."""
     made, panels = _panels(courses, sharey=True)
     for course in courses:
-        for tendon, tension in zip(_TENDONS, course.tension.T, strict=True):
-            panels[course.direction].plot(
-                course.time, tension, color=_TENDONS[tendon], linewidth=1.0, label=f"tendon {tendon}"
-            )
-    return _finished(made, panels, courses, heading, "tension [N]", columns=4)
+        for (side, colour), tension in zip(_SIDES.items(), course.tension.T, strict=True):
+            panels[course.direction].plot(course.time, tension, color=colour, linewidth=1.0, label=side)
+    return _finished(made, panels, courses, heading, "tension [N]")
 
 
 def lateness(late: Array, period: float) -> Figure:
@@ -97,6 +94,13 @@ def lateness(late: Array, period: float) -> Figure:
     axes.set_yscale("log")
     axes.set(xlabel="from due to begun [ms]", ylabel="ticks")
     return made
+
+
+def _simulated(panel: Axes, course: Course, angle: Array) -> None:
+    assert course.simulated is not None
+    colour = line(course.label)["color"]
+    label = f"{course.label}, simulated"
+    panel.plot(course.simulated[0], np.degrees(angle), color=colour, label=label, **_SIMULATED)
 
 
 def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
@@ -110,15 +114,16 @@ def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str,
 
 
 def _finished(
-    made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str, columns: int = 3
+    made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str
 ) -> Figure:
     for name, panel in panels.items():
         title(panel, name)
         pushes = {course.push for course in courses if course.direction == name and course.push is not None}
         for start, end in pushes:
             panel.axvspan(start, end, color=LIGHT, zorder=0.5, label="push")
+    for panel in list(panels.values())[-2:]:
+        panel.set_xlabel("time [s]")
     made.suptitle(heading, fontsize=10.0)
-    made.supxlabel("time [s]", fontsize=10.0)
     made.supylabel(ylabel, fontsize=10.0)
-    legend_below(made, columns)
+    legend_below(made)
     return made

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
-from wristctl.runs.manifest import MANIFEST
+from wristctl.runs.manifest import MANIFEST, command_of
 from wristctl.runs.run import Run
 
 RESULTS = Path("results")
@@ -68,7 +68,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
             f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
         )
     if run.state != "ok":
-        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {run.kind}` again")
+        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {command_of(run.kind)}` again")
     run.check()
     return run
 
@@ -85,6 +85,6 @@ def _latest(ref: str, results: Path) -> Run:
     found = [run for run in ended if run.kind == kind]
     if not found:
         kinds = {run.kind for run in ended}
-        fix = meant(kind, kinds) if kinds else f"run `wristctl {kind}` first"
+        fix = meant(kind, kinds) if kinds else f"run `wristctl {command_of(kind)}` first"
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     return max(found, key=lambda run: run.manifest.timing.started)

@@ -13,6 +13,11 @@ TABLES = "tables.json"
 Outcome = Literal["running", "ok", "failed", "interrupted"]
 
 
+def command_of(kind: str) -> str:
+    """The words that make a run of this kind: `hw calibrate camera` of calibrate-camera, else the kind itself."""
+    return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
+
+
 class Record(BaseModel):
     """A part of the manifest."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from wristctl.runs.manifest import Manifest
+from wristctl.runs.manifest import Manifest, command_of
 
 
 def readme(manifest: Manifest, summary: str) -> str:
@@ -32,7 +32,8 @@ def readme(manifest: Manifest, summary: str) -> str:
         "## Repeat and check",
         "",
         f"- again, with a verdict on each file: `wristctl runs replay {manifest.id}`",
-        f"- again as a new run, from the folder above: `wristctl {manifest.kind} {manifest.id}/config.yaml`",
+        "- again as a new run, from the folder above: "
+        f"`wristctl {command_of(manifest.kind)} --config {manifest.id}/config.yaml`",
         f"- result hash: `{manifest.result_sha256}`",
         "- unchanged since: `sha256sum -c SHA256SUMS`",
         "- code, machine, hashes: `run.json`; packages: `environment.txt`"

@@ -15,7 +15,7 @@ from wristctl.config.study import Study
 from wristctl.runs.files import files_below, sha256_of
 from wristctl.runs.formats import read_arrays, read_table
 from wristctl.runs.lock import is_locked
-from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest
+from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,7 +79,7 @@ class Run:
         try:
             found: dict[str, dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else {}
         except ValueError as error:
-            raise UserError("not valid JSON", str(file), "run `wristctl " + self.kind + "` again") from error
+            raise UserError("not valid JSON", str(file), f"run `wristctl {command_of(self.kind)}` again") from error
         return found
 
     @property
@@ -108,7 +108,8 @@ class Run:
         """Hash every file again; UserError naming the first that is missing or not as it was sealed."""
         for path, what in self.problems():
             if what != ADDED:
-                raise UserError(what, str(self.path / path), f"restore it or run `wristctl {self.kind}` again")
+                fix = f"restore it or run `wristctl {command_of(self.kind)}` again"
+                raise UserError(what, str(self.path / path), fix)
 
     def problems(self) -> list[tuple[str, str]]:
         """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed."""

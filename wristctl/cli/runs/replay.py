@@ -17,7 +17,7 @@ from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
 from wristctl.runs import Run, list_runs, open_run
 from wristctl.runs.lineage import input_run
-from wristctl.runs.manifest import CONFIG
+from wristctl.runs.manifest import CONFIG, command_of
 from wristctl.runs.replay import Verdict, causes, changed_inputs, verdicts
 
 _SAME = ("identical", "within tolerance", "volatile")
@@ -59,7 +59,8 @@ def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
     inputs = {each.role: input_run(run, each).path for each in run.manifest.inputs}
     named = [f"{run.kind}.{role}={json.dumps(str(path))}" for role, path in inputs.items()]
     options = [part for text in [*named, *overrides] for part in ("--set", text)]
-    command = [sys.executable, "-P", "-m", "wristctl", run.kind, str(run.path / CONFIG), "--out", str(scratch)]
+    again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
+    command = [sys.executable, "-P", "-m", "wristctl", *again]
     return subprocess.run([*command, *options, "--label", "replay"], stdout=subprocess.DEVNULL).returncode
 
 

@@ -7,10 +7,17 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from wristctl.config.errors import UserError
+from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.hardware.board import Board
 from wristctl.hardware.errors import BoardError
-from wristctl.hardware.trial.homing import Zero
+from wristctl.hardware.messages import AXES, JOG_RATE, Flag, Target
+from wristctl.hardware.trial.halt import halt
+from wristctl.hardware.trial.homing import Patience, Zero, find_zero
+from wristctl.hardware.trial.prepare import prepare
+from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.stands import Stand
 from wristctl.runs import Run
+from wristctl.runs.interrupt import undisturbed
 
 FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
 
@@ -57,3 +64,30 @@ class Calibration:
             return
         fix = "leave out positions: stored, and zero is found anew; senses of turning are kept"
         raise BoardError("host", what, board.transport.name, fix)
+
+
+def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
+    """Home a rig, slacken its tendons again, and say what was found. Closes the stand.
+
+    Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
+    """
+    board, spools = Board(stand.transport), spools_of(settings.actuator)
+    try:
+        hello = board.connect()
+        try:
+            stand.confirm()
+            prepare(board, settings)
+            stand.face(settings.plane, Patience(board))
+            zero = find_zero(board, stand.eye(), spools, settings.homing, settings.plane)
+            slack = round(settings.homing.pull / spools.step)
+            first, second, third, fourth = (-slack * sign for sign in zero.signs)
+            board.send(Target((first, second, third, fourth), (JOG_RATE,) * AXES))
+            position = board.wait_while(Flag.MOVING, timeout=5.0).position
+        except BaseException:
+            with undisturbed():
+                board.close(emergency=not halt(board, settings.safety.watchdog).verified)
+            raise
+        board.close()
+    finally:
+        stand.close()
+    return Calibration(zero, settings.plane, hello.boot_nonce, position)

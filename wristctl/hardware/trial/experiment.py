@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from wristctl.config.errors import UserError
-from wristctl.config.hw_run import HwRunSettings, RigSettings
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.hardware.board import Board
-from wristctl.hardware.messages import Configure, Limits, State
 from wristctl.hardware.trial.calibration import Calibration
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.faults import HostFaults
 from wristctl.hardware.trial.halt import Halt, halt
 from wristctl.hardware.trial.homing import Patience, Zero, find_zero
 from wristctl.hardware.trial.log import TrialLog
-from wristctl.hardware.trial.loop import ControlLoop, Timing
+from wristctl.hardware.trial.loop import ControlLoop, Shown, Timing
 from wristctl.hardware.trial.moves import at_rest, back, motion_of
+from wristctl.hardware.trial.prepare import prepare
 from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.spools import spools_of
 from wristctl.hardware.trial.stands import Stand
@@ -27,9 +27,6 @@ from wristctl.hardware.trial.trials import Trial
 from wristctl.runs.interrupt import undisturbed
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
-
-Shown = Callable[[dict[str, Any]], None]
-"""Takes each tick's row of the log, to show it."""
 
 
 class Stop:
@@ -127,8 +124,7 @@ class Experiment:
             eye.zero = Patience(board).angle(eye, 4 * settings.homing.frames)
         toward = "ulnar" if plane == "ulnar" else "flexion"
         loop = ControlLoop(
-            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, settings.control_period,
-            self._log, self.timing, shown,
+            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, self.timing, self._log, shown,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
@@ -172,14 +168,3 @@ class Experiment:
             self._trial_ended(stand, self.stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
-
-
-def prepare(board: Board, settings: RigSettings) -> None:
-    """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on."""
-    limits, spools = settings.safety, spools_of(settings.actuator)
-    if board.read().state == State.FAULT:
-        board.clear()
-    board.configure(Configure(limits.watchdog, int(limits.hold), round(spools.acceleration)))
-    furthest = round(limits.travel / spools.step)
-    board.send(Limits((-furthest,) * 4, (furthest,) * 4))
-    board.enable()

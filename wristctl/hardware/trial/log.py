@@ -10,6 +10,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wristctl.hardware.trial.spools import TENDONS
 
 Columns = Mapping[str, tuple[str, str]]
@@ -158,6 +161,15 @@ class TrialLog:
         self.disk.give_up_reserve()
         for each in self.streams.values():
             each.close()
+
+
+def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
+    """Columns of values (4,) of the board's axes."""
+    return {
+        f"{name}_{tendon}": value
+        for name, four in values.items()
+        for tendon, value in zip(TENDONS, four.tolist(), strict=True)
+    }
 
 
 def _cell(value: Any) -> str:

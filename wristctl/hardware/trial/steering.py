@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ class Steering:
         theta, rate, load = self._observer.now[:, 0]
         return Estimate(float(theta), float(rate), float(load))
 
-    def use(self, controller: Controller, gains: tuple[float, ...]) -> None:
+    def use(self, controller: Controller, gains: Sequence[float]) -> None:
         """Take up a law, its memory empty."""
         self._law = controller.compiled
         self._gains = np.repeat(np.array([*gains, 0.0])[:, None], LANES, axis=1)
@@ -117,7 +118,9 @@ def _respond(
 
 
 @compiled
-def _fuse(observer: Any, drive: Any, model: Any, captured: int, since: float, tick: int, theta: float, h: float) -> None:
+def _fuse(
+    observer: Any, drive: Any, model: Any, captured: int, since: float, tick: int, theta: float, h: float
+) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
     fuse(observer, drive, known, captured, since, tick, theta + zero, 1.0 + zero, h)

@@ -20,6 +20,8 @@ from wristctl.config.vision import Device
 Image = NDArray[np.uint8]
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm")
+_RATE = 30.0
+"""Frames per second where nothing says it."""
 _FIRST_FRAME = 3.0
 """Seconds that a device may take to its first frame."""
 
@@ -52,21 +54,6 @@ class CameraError(UserError):
 
     def __init__(self, what: str, where: str, fix: str) -> None:
         super().__init__(what, where, fix, exit_code=4)
-
-
-class Recording(Protocol):
-    """A camera whose frames wait: iterated they come one by one, from the first to the last."""
-
-    name: str
-
-    def newest(self) -> Frame | None:
-        """The next frame, None after the last."""
-
-    def close(self) -> None:
-        """Close the files."""
-
-    def __iter__(self) -> Iterator[Frame]:
-        """The frames not yet seen."""
 
 
 class DeviceCamera:
@@ -140,7 +127,7 @@ class DeviceCamera:
 
 
 class VideoCamera:
-    """The frames of a video file; `frame_rate` overrides the file's own. Raises CameraError."""
+    """The frames of a video file, one by one; `frame_rate` overrides the file's own. Raises CameraError."""
 
     def __init__(self, file: Path, frame_rate: float | None = None) -> None:
         self.name = str(file)
@@ -154,7 +141,7 @@ class VideoCamera:
             fix = "name a video that plays (mp4, avi, mkv), or convert it: ffmpeg -i FILE out.mp4"
             raise CameraError("this is no video that can be decoded", str(file), fix)
         rate = frame_rate or self._capture.get(cv2.CAP_PROP_FPS)
-        self._stamped, self._rate = frame_rate is None, rate if rate > 0.0 else 30.0
+        self._stamped, self.frame_rate = frame_rate is None, rate if rate > 0.0 else _RATE
         self._next: Frame | None = Frame(_grey(picture), 0.0, 0)
 
     def newest(self) -> Frame | None:
@@ -176,14 +163,14 @@ class VideoCamera:
     def _time(self, before: float, number: int) -> float:
         """By the file's stamps, which know of uneven frames; by the frame rate where they stand still."""
         stamp = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
-        return stamp if self._stamped and stamp > before else number / self._rate
+        return stamp if self._stamped and stamp > before else number / self.frame_rate
 
 
 class FolderCamera:
     """The pictures of a folder in the order of their names (numbers by value). Raises CameraError."""
 
     def __init__(self, folder: Path, frame_rate: float | None = None) -> None:
-        self.name, self._rate = str(folder), frame_rate or 30.0
+        self.name, self.frame_rate = str(folder), frame_rate or _RATE
         if not folder.is_dir():
             raise CameraError("no such folder", str(folder), "check the path")
         self.files = sorted((f for f in folder.iterdir() if f.suffix.lower() in PICTURES), key=_by_number)
@@ -200,7 +187,7 @@ class FolderCamera:
         picture = cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_GRAYSCALE) if file.stat().st_size else None
         if picture is None:
             raise CameraError("this picture cannot be decoded", str(file), "remove it from the folder, or replace it")
-        return Frame(_grey(picture), number / self._rate, number)
+        return Frame(_grey(picture), number / self.frame_rate, number)
 
     def close(self) -> None:
         """Nothing is open."""

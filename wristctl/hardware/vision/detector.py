@@ -35,6 +35,14 @@ def square_angle(corners: Array) -> float:
     return float(np.angle(np.vdot(upright, z - z.mean())))
 
 
+def askew(corners: Array) -> float:
+    """Largest error [rad] of an angle in a plane where a square looks like this: corners (4, 2), by its affine part."""
+    z = corners[:, 0] + 1j * corners[:, 1]
+    upright = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
+    turned, mirrored = (abs(complex(np.vdot(each, z - z.mean()))) for each in (upright, upright.conj()))
+    return float(np.arcsin(min(1.0, mirrored / turned)))
+
+
 class Detector:
     """Finds markers in the whole picture, or around where one was.
 

@@ -50,13 +50,12 @@ class Pinhole:
         onto = np.stack([self.side * self.rotation[:, 1], -self.rotation[:, 0], self.translation], axis=1)
         return View(self.matrix, self.distortion, np.linalg.inv(self.matrix @ onto), self.size)
 
-    def rays(self, left: int, top: int, width: int, height: int, fine: int) -> Array:
-        """Directions (height * fine, width * fine, 2) in the camera (z = 1) of the points of a part of the picture."""
-        x = left - 0.5 + (np.arange(width * fine) + 0.5) / fine
-        y = top - 0.5 + (np.arange(height * fine) + 0.5) / fine
-        pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 1, 2)
-        found = cv2.undistortPoints(pixels, self.matrix, self.distortion)
-        return found.reshape(height * fine, width * fine, 2).astype(np.float64)
+    def rays(self, fine: int) -> Array:
+        """Directions (height * fine, width * fine, 2), where depth is 1, of `fine` x `fine` points of each pixel."""
+        x, y = ((np.arange(count * fine) + 0.5) / fine - 0.5 for count in self.size)
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        found = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
+        return found.reshape(pixels.shape).astype(np.float64)
 
 
 def _turn(axis: int, angle: float) -> Array:

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 RIM, THICK = 1.25, 0.0035
 """Radius of the discs over that of the circle of tendons; their thickness [m]."""
+FACE = 196
+"""Grey of a disc's upper face, to which the light comes."""
 BASE_AT = -0.022
 """Middle of the base's marker, which is on the clamp, along x [m]."""
 _CLAMP_FOOT, _CLAMP_HALF, _CLAMP_DEPTH = -0.050, 0.036, 0.024
@@ -65,7 +67,7 @@ def moving(theta: Array, wrist: WristParameters) -> list[Stroke]:
     for centre, normal in zip(*frames, strict=True):
         rims = [_rim(centre + normal * end * THICK, normal, radius) for end in (-0.5, 0.5)]
         parts.append(Stroke(np.concatenate(rims), 150, "hull"))
-        parts += [Stroke(rims[0], 196, "face"), Stroke(rims[1][::-1], 196, "face")]
+        parts += [Stroke(rims[0], 118, "face"), Stroke(rims[1][::-1], FACE, "face")]
     return parts + _pairs(frames, c, behind=False)
 
 

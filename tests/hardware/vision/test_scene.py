@@ -1,0 +1,85 @@
+"""Rendered pictures depend on seed and settings alone, and show what a camera there would see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.hardware.vision.conftest import bent
+from wristctl.config.vision import Markers, SceneSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.vision.scene import Scene
+from wristctl.hardware.vision.scene_parts import FACE, THICK
+from wristctl.wrist.shape import discs
+
+WRIST = WristParameters()
+QUIET = SceneSettings(noise=0.0)
+
+
+def seeded() -> np.random.Generator:
+    return np.random.default_rng(3)
+
+
+def test_same_seed_gives_the_same_bytes_and_another_seed_does_not(scene: Scene) -> None:
+    first, again = (Scene(SceneSettings(), WRIST).render(bent(20.0), seeded()) for _ in range(2))
+    assert first.tobytes() == again.tobytes()
+    assert first.shape == (480, 640) and first.dtype == np.uint8
+    assert first.tobytes() != scene.render(bent(20.0), np.random.default_rng(4)).tobytes()
+
+
+def test_noise_has_the_wanted_deviation(scene: Scene) -> None:
+    clean = Scene(QUIET, WRIST).render(bent(0.0), seeded()).astype(float)
+    noise = (scene.render(bent(0.0), seeded()) - clean)[(clean > 30) & (clean < 225)]
+    assert noise.std() == pytest.approx(4.0, rel=0.02)
+    assert abs(noise.mean()) < 0.05
+
+
+def test_an_exposure_is_the_mean_of_its_instants() -> None:
+    unblurred = Scene(QUIET.model_copy(update={"blur": 0.0}), WRIST)
+    instants = [bent(each) for each in (0.0, 4.0, 8.0)]
+    apart = [unblurred.render(each, seeded()).astype(float) for each in instants]
+    together = unblurred.render(np.concatenate(instants), seeded())
+    assert np.abs(together - np.mean(apart, axis=0)).max() <= 1.0  # rounding
+
+
+def test_light_falls_off_across_the_picture_by_the_gradient() -> None:
+    bright, flat = (
+        Scene(QUIET.model_copy(update={"gradient": each}), WRIST).render(bent(0.0), seeded()).astype(float)
+        for each in (0.5, 0.0)
+    )
+    ratio = bright / np.maximum(flat, 1.0)
+    assert ratio[5, 5] - ratio[-5, -5] == pytest.approx(0.5 * 1.4, abs=0.03)
+
+
+@pytest.mark.parametrize("positive", ["right", "left"])
+def test_positive_angles_bend_toward_the_side_that_the_markers_settings_say(positive: str) -> None:
+    scene = Scene(QUIET, WRIST, Markers(positive=positive))  # type: ignore[arg-type]
+    tips = [discs(bent(each)[0], WRIST.length, 5)[0][-1] for each in (0.0, 30.0)]
+    straight, bent_over = scene.camera.project(np.array([[tip.real, tip.imag, 0.0] for tip in tips]))
+    assert (bent_over[0] > straight[0] + 20.0) == (positive == "right")
+    assert bent_over[1] > straight[1]  # and lower
+
+
+@pytest.mark.parametrize("pose", [{}, {"tilt_deg": 20.0, "pan_deg": -10.0, "roll_deg": 30.0}], ids=["square", "askew"])
+def test_its_view_sets_the_bending_plane_square(pose: dict[str, float]) -> None:
+    settings = SceneSettings(**pose)
+    scene = Scene(settings, WRIST)
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform((0.0, -0.05), (0.12, 0.05), (50, 2)).T
+    for depth in (0.0, -settings.marker_offset):
+        rectified = scene.view.rectify(scene.camera.project(np.column_stack([x, y, np.full(50, depth)])))
+        shape = np.column_stack([y, -x])
+        scale = np.linalg.norm(rectified[1:] - rectified[0], axis=1) / np.linalg.norm(shape[1:] - shape[0], axis=1)
+        assert scale == pytest.approx(scale[0], rel=1e-6)  # a similarity, of the plane itself and of parallel ones
+        if depth == 0.0:
+            assert rectified == pytest.approx(shape, abs=1e-7)
+
+
+@pytest.mark.parametrize("above", [True, False])
+def test_only_a_camera_above_sees_the_upper_face_of_a_disc(above: bool) -> None:
+    tilt = 25.0 if above else -25.0
+    scene = Scene(QUIET.model_copy(update={"tilt_deg": tilt, "gradient": 0.0, "blur": 0.0}), WRIST)
+    picture = scene.render(bent(0.0), seeded())
+    upper = np.array([[0.5 * WRIST.length + 0.5 * THICK, 0.008, 0.005]])  # of the middle disc, beside the backbone
+    x, y = np.rint(scene.camera.project(upper)[0]).astype(int)
+    assert (picture[y, x] == FACE) == above

@@ -1,0 +1,193 @@
+"""`wristctl track`: the wrist's angle in a recorded video, without any board."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.runs import Run
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from wristctl.hardware.vision.marker import Sighting
+    from wristctl.hardware.vision.view import View
+
+log = logging.getLogger(__name__)
+
+_ASKEW = 0.3
+"""Warn from here on [deg]; noise of the corners alone is below 0.1."""
+_CORNERS = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
+_UNITS = {"time": "s", "theta": "rad"} | dict.fromkeys(_CORNERS, "px")
+_MEANING = {
+    "time": "of the frame in the recording",
+    "number": "of the frame",
+    "theta": "bending angle, empty where the frame cannot be used",
+    "verdict": "ok, or why it cannot be used",
+} | dict.fromkeys(_CORNERS, "marker's corner, from its top left clockwise")
+
+
+def plan(study: Study, inputs: dict[str, Run]) -> str:
+    """See that the recording can be read, and what it is."""
+    from wristctl.hardware.vision.camera import open_recording
+
+    if study.track.video is None:
+        raise UserError("track needs a video", "track.video", "wristctl track trial.mp4, or a folder of pictures")
+    recording = open_recording(study.track.video, study.track.frame_rate)
+    first = recording.newest()
+    recording.close()
+    assert first is not None
+    height, width = first.image.shape
+    square = "" if "calibration" in inputs else "; no calibration: the camera is taken to stand square to the plane"
+    return f"{recording.name}: {width} x {height}{square}"
+
+
+def track(session: Session) -> list[Table]:
+    """Find the wrist's angle in each frame of a recorded video, or of a folder of pictures.
+
+    The two printed markers (hw calibrate board-pdf) must be in the picture; no motor board is needed.
+    """
+    import cv2
+
+    from wristctl.hardware.vision.marker import MEANING, Verdict
+    from wristctl.report.track_figures import angle, frames
+
+    cv2.setNumThreads(1)
+    run, settings = session.run, session.settings
+    sightings, pictures = _see(session)
+    run.table("data/track.csv", _frame(sightings), _UNITS, _MEANING)
+    digest = {"name": settings.video, "sha256": _digest(Path(settings.video)), "frames": len(sightings)}
+    run.file("data/recording.json").write_text(json.dumps(digest, indent=2) + "\n", encoding="utf-8")
+    with session.progress("drawing"):
+        run.figure("angle", angle(sightings))
+        run.figure("frames", frames(pictures))
+    counts = Counter(each.verdict for each in sightings)
+    usable, total = counts[Verdict.OK], len(sightings)
+    run.metric("usable", usable / total, "", "higher", total, meaning="share of frames with an angle")
+    thetas = [math.degrees(each.theta) for each in sightings if each.verdict is Verdict.OK]
+    if not thetas:
+        verdict = counts.most_common(1)[0][0]
+        what = f"no frame can be used: {verdict} in {counts[verdict]} of {total}: {MEANING[verdict]}"
+        fix = "see figures/frames.png; are both markers (4x4_50, ids track.markers) uncovered and 40 px or larger?"
+        raise UserError(what, settings.video, fix, exit_code=3)
+    noise = _noise(sightings)
+    run.metric("theta_min", min(thetas), "deg", n=usable, meaning="least angle")
+    run.metric("theta_max", max(thetas), "deg", n=usable, meaning="greatest angle")
+    run.metric("noise", noise, "deg", "lower", usable, meaning="deviation from steady motion")
+    skew = _askew(session, sightings)
+    run.metric("askew", skew, "deg", "lower", usable, meaning="largest error, by the base's marker that is no square")
+    if skew > _ASKEW:
+        fix = "calibrate the camera where it stands now, and name that run with --calibration"
+        log.warning("angles may be up to %.1f deg off, for the base's marker looks askew - fix: %s", skew, fix)
+    lasts = sightings[-1].time - sightings[0].time
+    rows = [
+        ("frames", total),
+        ("frames per second", (total - 1) / lasts if lasts else None),
+        ("usable", usable / total),
+        ("least angle [deg]", min(thetas)),
+        ("greatest angle [deg]", max(thetas)),
+        ("noise [deg]", noise),
+        ("askew [deg]", skew),
+    ]
+    why = [(str(verdict), count, count / total, MEANING[verdict]) for verdict, count in counts.most_common()]
+    columns = ("verdict", "frames", "share", "meaning")
+    return [Table(Path(settings.video).name, ("what", "value"), rows), Table("Frames by verdict", columns, why)]
+
+
+def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
+    """What each frame tells, and annotated pictures of some."""
+    from wristctl.hardware.vision.annotate import Film, Picked
+    from wristctl.hardware.vision.camera import open_recording
+    from wristctl.hardware.vision.marker import Tracker, Verdict
+
+    settings = session.settings
+    tracker = Tracker(settings.markers, _view(session), settings.gates)
+    recording = open_recording(settings.video, settings.frame_rate)
+    film = Film(session.run.file("data/annotated.avi"), recording.frame_rate) if settings.annotate else None
+    sightings, picked, zero = [], Picked(), settings.zero == "first"
+    try:
+        with session.progress("frames") as done:
+            for frame in recording:
+                seen = tracker.see(frame)
+                if zero and seen.verdict is Verdict.OK:
+                    tracker.zero, zero, seen = seen.theta, False, seen._replace(theta=0.0)
+                sightings.append(seen)
+                picked.offer(frame, seen)
+                if film is not None:
+                    film.add(frame, seen)
+                done(len(sightings))
+    finally:
+        recording.close()
+        if film is not None:
+            film.close()
+    return sightings, picked.pictures()
+
+
+def _view(session: Session) -> View:
+    from wristctl.hardware.vision.view import FILE, View
+
+    earlier = session.inputs.get("calibration")
+    return View() if earlier is None else View.load(earlier.file(FILE))
+
+
+def _askew(session: Session, sightings: Sequence[Sighting]) -> float:
+    """How far off [deg] an angle may be, by how square the base's marker looks in the calibrated view on average."""
+    import numpy as np
+
+    from wristctl.hardware.vision.detector import askew
+
+    seen = np.array([each.corners[0] for each in sightings if math.isfinite(each.theta)])
+    return math.degrees(askew(_view(session).rectify(np.nanmean(seen, axis=0))))
+
+
+def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:
+    import numpy as np
+    import pandas as pd
+
+    known = {name: [getattr(each, name) for each in sightings] for name in ("time", "number", "theta")}
+    verdicts = {"verdict": [str(each.verdict) for each in sightings]}
+    corners = np.array([each.corners.ravel() for each in sightings]).T
+    return pd.DataFrame(known | verdicts | dict(zip(_CORNERS, corners, strict=True)))
+
+
+def _digest(source: Path) -> str:
+    """SHA-256 of a file, or of the list of a folder's files."""
+    from wristctl.runs.files import files_below, sha256_of, sha256_of_list
+
+    if source.is_file():
+        return sha256_of(source)
+    return sha256_of_list([(name, sha256_of(source / name)) for name in files_below(source)])
+
+
+def _noise(sightings: Sequence[Sighting]) -> float:
+    """Standard deviation [deg] of one angle, from second differences, in which a steady motion is nothing."""
+    import numpy as np
+
+    jerks = np.diff(np.degrees([each.theta for each in sightings]), 2)
+    found = jerks[np.isfinite(jerks)]
+    return float(np.sqrt(np.mean(found**2) / 6.0)) if len(found) else math.nan
+
+
+app = study_command(
+    "track",
+    work=track,
+    plan=plan,
+    inputs=(Input("calibration", kind="calibrate-camera", optional=True),),
+    shortcuts=("zero", "annotate"),
+    argument="video",
+    examples=(
+        "wristctl track trial.mp4",
+        "wristctl track trial.mp4 --calibration latest:calibrate-camera --annotate",
+        "wristctl track pictures/ --set frame_rate=60 --set markers.positive=left",
+    ),
+)
