@@ -45,24 +45,27 @@ def reported(session: Session, trials: pd.DataFrame) -> list[Table]:
 
 def _twins(session: Session, trials: pd.DataFrame) -> Twins:
     """Each trial in simulation; repetitions share one."""
-    network, tuned, rows = network_of(session), tuned_of(session), session.settings.rows
-    names = [row.label for row in rows]
+    network, tuned = network_of(session), tuned_of(session)
+    names = [row.label for row in session.settings.rows]
     done: dict[tuple[Any, ...], Simulation] = {}
     found = {}
     with session.progress("simulating the same trials"):
-        for each in trials.itertuples():
-            key = each.direction, each.push, each.label
+        for each in trials.to_dict("records"):
+            key = each["direction"], each["push"], each["label"]
             if key not in done:
-                trial = Trial(each.trial, each.direction, each.repetition, each.push, names.index(each.label))
+                trial = Trial(each["trial"], each["direction"], 0, each["push"], names.index(each["label"]))
                 done[key] = twin(session.study, trial, network, tuned)
-            found[each.trial] = done[key]
+            found[each["trial"]] = done[key]
     return found
 
 
 def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tuple[Any, ...]]:
     """A row for each controller with and without a push; a metric for each number."""
-    several = trials["label"].nunique() > 1
-    for (label, pushed), group in trials.groupby(["label", trials["push"] != 0.0], sort=False):
+    labels = [row.label for row in session.settings.rows]
+    for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
+        group = trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)]
+        if group.empty:
+            continue
         means = {name: float(group[name].mean(skipna=False)) for name in _MEANS}
         simulated = [
             float(np.mean([twins[number].metrics[name] for number in group["trial"]]))
@@ -71,7 +74,7 @@ def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tup
         for name, unit in zip(_MEANS, ("rad", "rad", "s", "s", "rad", "rad"), strict=True):
             if name == "recovery" and not pushed:
                 continue
-            full = "_".join([*["pushed"] * pushed, name, *[label.replace("/", "-").replace(" ", "-")] * several])
+            full = "_".join([*["pushed"] * pushed, name, *[label.replace("/", "-").replace(" ", "-")] * (len(labels) > 1)])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
             session.run.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
         yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)
@@ -87,17 +90,17 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
     run, push = session.run, session.settings.push
     log = pd.read_csv(run.file("data/log.csv"))
     courses = []
-    for each in trials.itertuples():
-        course, simulated = log[log["trial"] == each.trial], twins[each.trial].trajectory
+    for each in trials.to_dict("records"):
+        course, simulated = log[log["trial"] == each["trial"]], twins[each["trial"]].trajectory
         courses.append(
             trial_figures.Course(
-                direction=each.direction,
-                label=each.label,
-                repetition=each.repetition,
+                direction=each["direction"],
+                label=each["label"],
+                repetition=each["repetition"],
                 **{name: course[name].to_numpy(float) for name in ("time", "theta", "theta_ref", "theta_desired")},
-                tension=_sides(course, each.direction),
+                tension=_sides(course, each["direction"]),
                 simulated=(simulated.time, simulated.theta, simulated.error),
-                push=(push.start, push.start + push.duration) if each.push else None,
+                push=(push.start, push.start + push.duration) if each["push"] else None,
             )
         )
     for prefix, some in (

@@ -6,6 +6,7 @@ import json
 import logging
 from typing import Any
 
+import cv2
 import numpy as np
 import pandas as pd
 
@@ -20,6 +21,7 @@ from wristctl.hardware.trial.log import TrialLog
 from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.stands import open_stand
 from wristctl.hardware.trial.trials import Trial, trials_of
+from wristctl.hardware.vision.annotate import Film
 from wristctl.hardware.vision.view import FILE, View
 from wristctl.simulation.metrics import METRICS
 
@@ -44,6 +46,7 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
 def performed(session: Session) -> pd.DataFrame:
     """Do all trials, logged as they go; a row for each. What stops them is raised once everything is kept."""
     settings, run, study = session.settings, session.run, session.study
+    cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(run.stream("order")))
     calibration = Calibration.load(session.inputs["calibration"]) if "calibration" in session.inputs else None
     segments = settings.bench.segments if settings.port is None else None
@@ -51,10 +54,12 @@ def performed(session: Session) -> pd.DataFrame:
     experiment = Experiment(
         settings, study.wrist, trials, trial_log, network_of(session), tuned_of(session), calibration
     )
+    film = Film(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            stand = open_stand(settings, study.wrist, study.seed, view_of(session), operator(session))
+            ask, keep = operator(session), film.add if film else None
+            stand = open_stand(settings, study.wrist, study.seed, view_of(session), ask, keep)
         with trials_shown(session, trials) as shown:
             experiment.run(stand, shown)
     except BaseException as error:
@@ -63,6 +68,8 @@ def performed(session: Session) -> pd.DataFrame:
         trial_log.close()
     except OSError as error:
         stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", "free space")
+    if film is not None:
+        film.close()
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
     table = _judged(session, experiment, trials)

@@ -85,15 +85,16 @@ def _trials(run: Run) -> tuple[Iterable[Named], np.ndarray]:
     truth = run.data("truth") if (run.path / "data/truth.csv").is_file() else None
     time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
     courses = []
-    for row in trials[trials["outcome"] == "ok"].itertuples():
-        course = log[log["trial"] == row.trial]
-        known = course if truth is None else truth[truth["trial"] == row.trial]
+    for row in trials[trials["outcome"] == "ok"].to_dict("records"):
+        course = log[log["trial"] == row["trial"]]
+        known = course if truth is None else truth[truth["trial"] == row["trial"]]
         own = [name for name in known.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
         bent = np.stack([np.interp(time, known["time"], known[name]) for name in own], axis=-1)
         wanted = np.interp(time, course["time"], course["theta_desired"])
-        group = row.direction + (f", pushed with {row.push:g} N" if row.push else "")
-        name = f"{row.controller}/{row.gains}" + (f", repetition {row.repetition}" if row.repetition else "")
-        courses.append((group, name, row.controller, bent, wanted))
+        group = row["direction"] + (f", pushed with {row['push']:g} N" if row["push"] else "")
+        name = f"{row['controller']}/{row['gains']}"
+        again = f", repetition {row['repetition']}" if row["repetition"] else ""
+        courses.append((group, name + again, row["controller"], bent, wanted))
     return courses, time
 
 

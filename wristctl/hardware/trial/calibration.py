@@ -10,7 +10,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.hardware.board import Board
 from wristctl.hardware.errors import BoardError
-from wristctl.hardware.messages import AXES, JOG_RATE, Flag, Target
+from wristctl.hardware.messages import JOG_RATE, Flag, Target
 from wristctl.hardware.trial.halt import halt
 from wristctl.hardware.trial.homing import Patience, Zero, find_zero
 from wristctl.hardware.trial.prepare import prepare
@@ -80,8 +80,8 @@ def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
             stand.face(settings.plane, Patience(board))
             zero = find_zero(board, stand.eye(), spools, settings.homing, settings.plane)
             slack = round(settings.homing.pull / spools.step)
-            first, second, third, fourth = (-slack * sign for sign in zero.signs)
-            board.send(Target((first, second, third, fourth), (JOG_RATE,) * AXES))
+            one, two, four, five = (-slack * sign for sign in zero.signs)
+            board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))
             position = board.wait_while(Flag.MOVING, timeout=5.0).position
         except BaseException:
             with undisturbed():

@@ -164,6 +164,7 @@ class Experiment:
         else:
             board.close(emergency=not halted.verified)
         self.stop = Stop(error, self._under_way[0] if self._under_way else None, halted)
+        self._log.disk.give_up_reserve()
         try:
             self._trial_ended(stand, self.stop.reason)
         except (OSError, UserError) as lost:

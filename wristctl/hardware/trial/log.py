@@ -58,7 +58,7 @@ FRAMES: Columns = {
 }
 
 _PIECE = 50
-_RESERVED = 1 << 20
+_RESERVED = 4 << 20
 
 
 def truth_columns(segments: int) -> Columns:
@@ -74,7 +74,7 @@ def truth_columns(segments: int) -> Columns:
 
 
 class Disk:
-    """Space kept in a folder, so that what the log still holds can be written when the disk is full."""
+    """Space kept in a folder for what is still to be written when the disk is full: a trial's truth, some rows."""
 
     def __init__(self, folder: Path) -> None:
         self._reserve = folder / ".reserve"
