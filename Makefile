@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware test-trust clean venv
+.PHONY: run test lint bench bench-peers firmware test-firmware test-trust test-vision clean venv
 
 run: .venv/run
 	@set -e; \
@@ -17,7 +17,7 @@ run: .venv/run
 	printf '\nRuns:\n%s\n%s\n%s\n%s\n' "$$data" "$$network" "$$tuned" "$$made"
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --maxprocesses 4
 
 lint: .venv/dev
 	$(BIN)/ruff check .
@@ -26,6 +26,7 @@ lint: .venv/dev
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
 	$(BIN)/python benchmarks/board.py
+	$(BIN)/python benchmarks/vision.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:
@@ -37,12 +38,16 @@ test-firmware: .venv/dev firmware
 	$(MAKE) -C tests/firmware
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
 
+# Cameras, markers and calibration with many more frames, and their runs repeated.
+test-vision: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/hardware/vision tests/cli/test_vision_commands.py
+
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
 
-# Runs killed at 50 random moments, 10,000 runs listed.
+# Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/runs/test_query.py
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/cli/test_replay.py tests/runs/test_query.py
 
 venv: .venv/dev
 
