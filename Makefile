@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware test-trust test-vision clean venv
+.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-trust test-vision clean venv
 
 run: .venv/run
 	@set -e; \
@@ -26,6 +26,7 @@ lint: .venv/dev
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
 	$(BIN)/python benchmarks/board.py
+	$(BIN)/python benchmarks/emulated_bench.py
 	$(BIN)/python benchmarks/vision.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
@@ -43,7 +44,11 @@ test-vision: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/hardware/vision tests/cli/test_vision_commands.py
 
 bench-peers: .venv/run
-	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
+	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers
+
+# Everything that docs/benchmarks.md says, measured anew, and the page.
+bench-all: .venv/run
+	$(BIN)/python benchmarks/all.py
 
 # Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev
