@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.benchmark.paper import T2, verdict
-from wristctl.config.control import CompareSettings, Row, TuneSettings
+from wristctl.config.control import CompareSettings, TuneSettings
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Direction, Reference
 from wristctl.config.study import Study
@@ -81,11 +81,6 @@ def _same_course(a: Reference, b: Reference) -> bool:
     return reference_name(a) == reference_name(b)
 
 
-def row_name(row: Row) -> str:
-    """Name of a row's gains: the preset, `tuned`, or the values themselves."""
-    return row.gains if isinstance(row.gains, str) else " ".join(f"{k}={v:g}" for k, v in row.gains.items())
-
-
 def compare(
     study: Study,
     network: Inverse | None = None,
@@ -122,8 +117,8 @@ def compare(
             for index in range(len(batch)):
                 row = chosen.rows[rows[index // len(followed)]]
                 (reference, inverse), course = labels[which[index]], followed[which[index]]
-                done = simulation(outcome, index, course, wrist, f"{name}/{row_name(row)}")
-                results.append(Result(loop_name, reference, inverse, name, row_name(row), done))
+                done = simulation(outcome, index, course, wrist, f"{name}/{row.gains_name}")
+                results.append(Result(loop_name, reference, inverse, name, row.gains_name, done))
     return _in_order(results, chosen)
 
 
@@ -149,7 +144,7 @@ def _in_order(results: Sequence[Result], chosen: CompareSettings) -> list[Result
     """By loop, reference, direction, row of the study, inverse."""
     loops = list(chosen.loops)
     references = [_course_name(r, direction, chosen) for r in chosen.references for direction in chosen.directions]
-    rows = [(row.controller, row_name(row)) for row in chosen.rows]
+    rows = [(row.controller, row.gains_name) for row in chosen.rows]
     return sorted(
         results,
         key=lambda r: (

@@ -22,6 +22,14 @@ T2: dict[str, Printed] = {
     "nc": Printed(5.0e-2, 1.02, 1.9e-2),
 }
 
+EXPERIMENT: dict[str, Printed] = {
+    "four directions": Printed(0.157, 3.0, 0.032),
+    "pushed, radial": Printed(0.207, 3.0, 0.029),
+    "pushed, flexion": Printed(0.291, 3.0, 0.031),
+}
+"""The experiment: the mean of the directions, and two with a person's push (whose units are printed as m and s)."""
+
+
 class Trained(NamedTuple):
     """One column of T1; the paper says of neither loss nor gradient on what scale it is."""
 

@@ -8,10 +8,11 @@ import re
 import shutil
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, get_origin
 
 import typer
@@ -57,6 +58,8 @@ class Session:
     run: LiveRun
     console: Console
     quiet: bool
+    flags: frozenset[str] = frozenset()
+    """Of the command's flags those that were given."""
 
     def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
         """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""
@@ -84,6 +87,7 @@ def study_command(
     plan: Plan | None = None,
     inputs: Sequence[Input] = (),
     shortcuts: Sequence[str] = (),
+    flags: Mapping[str, str] = MappingProxyType({}),
     examples: Sequence[str] = (),
     argument: str | None = None,
 ) -> typer.Typer:
@@ -92,7 +96,7 @@ def study_command(
     `plan` says what will be done and raises UserError for what can be known before anything is written.
     Each of the `inputs` becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
     section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
-    files. The docstring of `work` is the help.
+    files. `flags` (name and help) are switches of this call that are no settings. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
     named = [each.leaf for each in inputs if each.leaf != argument]
@@ -100,17 +104,19 @@ def study_command(
 
     def call(**given: Any) -> None:
         own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
+        raised = frozenset(name for name in flags if given.pop(name))
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
-        _execute(
-            command, Options(**given), [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
-        )
+        set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
+        _execute(command, Options(**given), set_, raised)
 
     keys = section_keys(kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
-    quoted = {*first, *named, *switches}
+    texts = {leaf for leaf in shortcuts if keys[leaf].annotation in (str, str | None)}
+    quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
     own = [(leaf, keys[leaf].description or "", kinds.get(leaf, str)) for leaf in (*first, *named, *shortcuts)]
+    own += [(name, text, bool) for name, text in flags.items()]
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
@@ -118,7 +124,7 @@ def study_command(
     return app
 
 
-def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> None:
+def _execute(command: _Command, options: Options, shortcuts: Sequence[str], flags: frozenset[str]) -> None:
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
@@ -137,7 +143,7 @@ def _execute(command: _Command, options: Options, shortcuts: Sequence[str]) -> N
         try:
             argv = ["wristctl", *sys.argv[1:]]
             with start_run(command.kind, study, label, options.out, argv, read, _page) as run:
-                session = Session(study, command.section(study), inputs, run, console, options.quiet)
+                session = Session(study, command.section(study), inputs, run, console, options.quiet, flags)
                 tables = _worked(command, session)
         except KeyboardInterrupt:
             console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)

@@ -41,7 +41,7 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 def compare(session: Session) -> list[Table]:
     """Compare controllers on loops and references, beside the paper's numbers."""
     from wristctl.benchmark.compare import compare as run_comparison
-    from wristctl.benchmark.compare import frame, refuse_tuned_scenarios, row_name, series
+    from wristctl.benchmark.compare import frame, refuse_tuned_scenarios, series
     from wristctl.benchmark.cost import step_time
     from wristctl.cli.loops import network_of, tuned_of, tuned_study, warn_if_it_buckles
     from wristctl.cli.tune import search_all
@@ -67,7 +67,7 @@ def compare(session: Session) -> list[Table]:
         for row in settings.rows:
             law = controller(row.controller)
             gains = gains_of(law, row.gains, tuned)
-            cost[f"{row.controller}/{row_name(row)}"] = step_time(law, gains, session.study.wrist)
+            cost[f"{row.controller}/{row.gains_name}"] = step_time(law, gains, session.study.wrist)
     run.file("timing.json").write_text(json.dumps({k: t._asdict() for k, t in cost.items()}, indent=2) + "\n")
     with session.progress("drawing"):
         _draw(session, results)

@@ -9,11 +9,12 @@ from wristctl.cli.on_call import on_call
 COMMANDS = {
     "board-pdf": ("wristctl.cli.board_pdf", None, "Write the board and the markers as a PDF, to print at true scale."),
     "camera": ("wristctl.cli.calibrate_camera", None, "Find lens and bending plane from views of the board."),
+    "wrist": ("wristctl.cli.calibrate_wrist", None, "Find zero, senses of turning and steps per radian."),
 }
 
-app = typer.Typer(cls=on_call(COMMANDS), help="Calibrate the camera.", no_args_is_help=True, add_completion=False)
+app = typer.Typer(cls=on_call(COMMANDS), help="Calibrate camera and wrist.", no_args_is_help=True, add_completion=False)
 
 
 @app.callback()
 def _calibrate() -> None:
-    """Calibrate the camera."""
+    """Calibrate camera and wrist."""

@@ -16,6 +16,16 @@ class Row(Section):
     controller: str = choice("smc", "name in the table of controllers")
     gains: Gains = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
 
+    @property
+    def gains_name(self) -> str:
+        """The preset, `tuned`, or the values themselves."""
+        return self.gains if isinstance(self.gains, str) else " ".join(f"{k}={v:g}" for k, v in self.gains.items())
+
+    @property
+    def label(self) -> str:
+        """controller/gains"""
+        return f"{self.controller}/{self.gains_name}"
+
 
 class Objective(Section):
     """Weights of the tuning objective; each term is averaged over the tuning scenarios."""

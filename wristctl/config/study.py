@@ -6,6 +6,7 @@ from pydantic import Field
 
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
@@ -26,4 +27,6 @@ class Study(Section):
     audit: AuditSettings = AuditSettings()
     identify: IdentifySettings = IdentifySettings()
     calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
+    calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
     track: TrackSettings = TrackSettings()
+    hw_run: HwRunSettings = Field(HwRunSettings(), alias="hw-run")

@@ -34,10 +34,12 @@ SMC = Controller(
         "printed": (0.001, 1000.0, 1000.0),
         "exchanged": (1000.0, 0.001, 1000.0),
         "initial": (1.0, 1.0, 1.0),
+        "stepper": (20.0, 1.0, 60.0),
     },
     notes={
         "printed": "on sigma = 0 the angle has a time constant of P2/P1 = 1e6 s (C5)",
         "exchanged": "hypothesis: P1 and P2 of the printed gains exchanged (C5)",
         "initial": "the paper's start values",
+        "stepper": "behind a camera and stepper motors at a period of 5 ms: chosen by trial on the emulated bench",
     },
 )

@@ -27,6 +27,8 @@ def animation(run: Run) -> dict[str, Any] | None:
         courses, time = _compared(run)
     elif (run.path / "data/trajectory.csv").is_file():
         courses, time = _single(run)
+    elif run.kind == "hw-run" and (run.path / "data/trials.csv").is_file():
+        courses, time = _trials(run)
     else:
         return None
     step = max(1, round(1.0 / FRAMES / float(time[1] - time[0])))
@@ -73,6 +75,27 @@ def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
     name = ("", f"{settings.controller}/{gains}", settings.controller)
     return [(*name, table[own].to_numpy(), table["theta_desired"].to_numpy())], table["time"].to_numpy()
+
+
+def _trials(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+    """Each whole trial on the control grid: the true segments where known, else the estimate as one segment."""
+    import numpy as np
+
+    trials, log = run.data("trials"), run.data("log")
+    truth = run.data("truth") if (run.path / "data/truth.csv").is_file() else None
+    time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
+    courses = []
+    for row in trials[trials["outcome"] == "ok"].to_dict("records"):
+        course = log[log["trial"] == row["trial"]]
+        known = course if truth is None else truth[truth["trial"] == row["trial"]]
+        own = [name for name in known.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
+        bent = np.stack([np.interp(time, known["time"], known[name]) for name in own], axis=-1)
+        wanted = np.interp(time, course["time"], course["theta_desired"])
+        group = row["direction"] + (f", pushed with {row['push']:g} N" if row["push"] else "")
+        name = f"{row['controller']}/{row['gains']}"
+        again = f", repetition {row['repetition']}" if row["repetition"] else ""
+        courses.append((group, name + again, row["controller"], bent, wanted))
+    return courses, time
 
 
 def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np.ndarray, step: int) -> dict[str, Any]:

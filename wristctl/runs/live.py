@@ -91,10 +91,13 @@ class LiveRun:
         """Write a DataFrame as CSV (exact round trip); the columns' units and meaning are noted."""
         formats.write_table(self.file(name), frame)
         units, meaning = units or {}, meaning or {}
-        self._columns[name] = [
-            Column(name=str(each), unit=units.get(str(each), ""), meaning=meaning.get(str(each), ""))
-            for each in frame.columns
-        ]
+        names = map(str, frame.columns)
+        self.columns(name, {each: (units.get(each, ""), meaning.get(each, "")) for each in names})
+
+    def columns(self, name: str, columns: Mapping[str, tuple[str, str]]) -> None:
+        """Note unit and meaning of each column of a table, which may be written otherwise than by `table`."""
+        named = columns.items()
+        self._columns[name] = [Column(name=each, unit=unit, meaning=meaning) for each, (unit, meaning) in named]
 
     def arrays(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Write arrays as npz."""

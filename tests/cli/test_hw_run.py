@@ -1,0 +1,123 @@
+"""`hw-run` and `hw calibrate wrist` as they are typed."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import tty
+from pathlib import Path
+
+import pytest
+
+from wristctl.runs import list_runs, open_run
+
+HOMING = "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}"
+QUICK = (
+    "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.5", "--set", "back=0.3",
+    "--set", "reference={duration: 0.4, angle_deg: 10.0}", "--set", HOMING,
+    "--set", "rows=[{controller: smc-tracking, gains: stepper}]",
+)  # fmt: skip
+
+
+def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call) -> None:
+    code, out, err = call(*QUICK)
+    run = open_run("latest:hw-run")
+    assert code == 0 and err.splitlines()[0].startswith("all emulated, in virtual time")
+    assert "paper: pushed, flexion" in out and "0.157" in out and run.problems() == []
+    (trial,) = run.data("trials").to_dict("records")
+    assert trial["outcome"] == "ok" and trial["rmse"] == run.metrics["rmse"]["value"] < 0.01
+    assert trial["true_rmse"] < 0.01
+    names = {file.stem for file in (run.path / "figures").iterdir()}
+    assert names == {"directions", "errors", "tensions"}
+    assert '"group": "ulnar"' in (run.path / "report.html").read_text()
+    zero = json.loads(run.file("data/zero.json").read_text())
+    assert zero["slack"] == pytest.approx([3e-4, 2e-4, 4e-4, 2.5e-4], abs=6e-5)
+    assert {column["unit"] for column in _columns(run.path, "data/log.csv")} > {"rad", "N", "steps", "s"}
+
+
+def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_second(call) -> None:
+    code, _, err = call(*QUICK, "--set", "bench.faults=[{kind: marker-covered, at: 0.1}]")
+    (run,) = list_runs(Path("results"))
+    assert code == 5 and run.state == "failed" and run.problems() == [] and run.manifest.exit_code == 5
+    assert "no usable marker angle" in err and "the motors stand" in err and "The last second" in err
+    stop = json.loads(run.file("data/stop.json").read_text())
+    assert stop["motors_stand"] and stop["trial"] == 0 and stop["rate"] == [0, 0, 0, 0]
+    assert len(run.data("log")) > 40 and "no tip" in set(run.data("frames")["verdict"])
+
+
+def test_a_dry_run_opens_no_port(call, tmp_path: Path) -> None:
+    code, out, _ = call("hw-run", "--dry-run", "--port", "/nowhere/ttyACM0")
+    assert code == 0 and "on hardware: board at /nowhere/ttyACM0" in out and not list(tmp_path.iterdir())
+
+
+def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
+    code, _, err = call("hw-run", "--port", "/nowhere/ttyACM0", "--yes")
+    assert code == 4 and "there is no such port" in err and "wristctl hw ports" in err
+
+
+def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(call, monkeypatch: pytest.MonkeyPatch) -> None:
+    from wristctl.hardware.trial import stands
+
+    class Dark:
+        name = "dark"
+
+        def __init__(self, *_: object) -> None:
+            """A camera that is there."""
+
+        def newest(self) -> None:
+            return None
+
+        def close(self) -> None:
+            """Nothing is open."""
+
+    monkeypatch.setattr(stands, "DeviceCamera", Dark)
+    master, client = pty.openpty()
+    tty.setraw(client)
+    try:
+        code, _, err = call("hw-run", "--port", os.ttyname(client), "--yes")
+    finally:
+        os.close(master)
+        os.close(client)
+    assert code == 4 and "no answer to HELLO" in err and "check USB cable and power" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--set", "rows=[{controller: smc-trackin, gains: stepper}]"), "did you mean 'smc-tracking'?"),
+        (("--set", "safety.late=0.2"), "must be below watchdog"),
+        (("--set", "positions=stored"), "needs a calibration run"),
+        (("--set", "push.force=0", "--set", "without_push=false"), "leave no trial"),
+        (("--set", "reference.angle_deg=80"), "beyond the wrist's range"),
+        (("--set", "bench.faults=[{kind: port-los}]"), "port-lost"),
+    ],
+)
+def test_what_the_user_got_wrong_is_one_line_before_anything_moves(call, arguments: tuple[str, ...], said: str) -> None:
+    code, _, err = call("hw-run", *arguments)
+    assert code == 2 and said in err and "Traceback" not in err
+
+
+def _columns(run: Path, name: str) -> list[dict[str, str]]:
+    outputs = json.loads((run / "run.json").read_text())["outputs"]
+    columns: list[dict[str, str]] = next(each["columns"] for each in outputs if each["path"] == name)
+    return columns
+
+
+def test_a_replay_is_identical(call) -> None:
+    if not os.environ.get("WRISTCTL_THOROUGH"):
+        pytest.skip("WRISTCTL_THOROUGH=1")
+    assert call(*QUICK)[0] == 0
+    code, out, _ = call("runs", "replay", "latest:hw-run")
+    assert code == 0 and out.splitlines()[-1].endswith("identical")
+
+
+def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call) -> None:
+    if not os.environ.get("WRISTCTL_THOROUGH"):
+        pytest.skip("WRISTCTL_THOROUGH=1")
+    motors = "bench.motors.reversed=[false, true, false, false]"
+    code, out, _ = call("hw", "calibrate", "wrist", "--set", HOMING, "--set", motors)
+    assert code == 0 and "-1" in out
+    assert call(*QUICK, "--set", motors, "--calibration", "latest:calibrate-wrist")[0] == 0
+    code, _, err = call(*QUICK, "--calibration", "latest:calibrate-wrist", "--set", "positions=stored")
+    assert code == 4 and "the calibration left the motors at" in err

@@ -1,0 +1,89 @@
+"""A short experiment on the emulated bench in virtual time, at zero from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.bench import Bench
+from wristctl.hardware.board import Board
+from wristctl.hardware.trial.calibration import Calibration
+from wristctl.hardware.trial.experiment import Experiment
+from wristctl.hardware.trial.homing import Zero
+from wristctl.hardware.trial.log import TrialLog
+from wristctl.hardware.trial.stands import EmulatedStand
+from wristctl.hardware.trial.trials import trials_of
+from wristctl.hardware.vision.view import View
+
+WRIST = WristParameters()
+SHORT: dict[str, Any] = {
+    "directions": ("ulnar",),
+    "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
+    "reference": {"duration": 0.3, "angle_deg": 8.0},
+    "horizon": 0.4,
+    "back": 0.2,
+    "rest": 0.1,
+    "push": {"force": 0.0},
+    "calibration": "given",
+    "positions": "stored",
+    "bench": {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}},
+}
+
+
+@dataclass
+class Done:
+    """An experiment and what it left."""
+
+    experiment: Experiment
+    bench: Bench
+    folder: Path
+    error: BaseException | None
+
+    def table(self, name: str) -> pd.DataFrame:
+        return pd.read_csv(self.folder / f"{name}.csv")
+
+
+Run = Callable[..., Done]
+
+
+def settings_of(**changes: Any) -> HwRunSettings:
+    """The short experiment, changed."""
+    return HwRunSettings.model_validate({**SHORT, **changes})
+
+
+@pytest.fixture(scope="session")
+def at_zero() -> Calibration:
+    """A calibration that holds for the bench at power-on without slack."""
+    bench = Bench(settings_of().bench, WRIST, 0)
+    nonce = Board(bench.transport).connect().boot_nonce
+    zero = Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4)
+    return Calibration(zero, "ulnar", nonce, (0, 0, 0, 0))
+
+
+@pytest.fixture
+def experiment(tmp_path: Path, at_zero: Calibration) -> Run:
+    """Performs the short experiment, changed, and keeps what stopped it."""
+
+    def run(shown: Callable[[dict[str, Any]], None] | None = None, **changes: Any) -> Done:
+        settings = settings_of(**changes)
+        bench = Bench(settings.bench, WRIST, 0, settings.markers)
+        log = TrialLog(tmp_path, settings.bench.segments, settings.control_period)
+        trials = trials_of(settings, np.random.default_rng(0))
+        performed = Experiment(settings, WRIST, trials, log, calibration=at_zero)
+        error = None
+        try:
+            performed.run(EmulatedStand(bench, settings, View(), None), shown)
+        except BaseException as raised:
+            error = raised
+        log.close()
+        return Done(performed, bench, tmp_path, error)
+
+    return run

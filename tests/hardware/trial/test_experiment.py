@@ -1,0 +1,135 @@
+"""The experiment on the emulated bench: what it reaches, and how each fault ends it."""
+
+from __future__ import annotations
+
+import errno
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.hardware.trial.conftest import Run, settings_of
+from wristctl.config.errors import UserError
+from wristctl.hardware.messages import Flag, State
+from wristctl.hardware.trial.log import LOG
+
+AT = 0.1
+
+
+def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
+    done = experiment()
+    log, truth = done.table("log"), done.table("truth")
+    assert done.error is None and done.experiment.outcomes == {0: "ok"}
+    assert list(log.columns) == list(LOG) and len(log) == 80 and (log["state"] == "ENABLED").all()
+    error = np.interp(log["time"], truth["time"], truth["theta"]) - log["theta_ref"]
+    assert math.degrees(np.abs(error).max()) < 0.6
+    between = done.table("between")
+    assert between["theta_ref"].iloc[-1] == 0.0 and abs(between["theta"].iloc[-1]) < 0.02
+    assert (log["late"].abs() < 1e-5).all() and done.experiment.timing.overruns == 0
+
+
+def test_tensions_and_spools_in_the_log_are_what_the_emulated_tendons_do(experiment: Run) -> None:
+    """Once the reference rests, each tendon pulls as commanded, within friction and what the springs lack."""
+    done = experiment()
+    log, truth = done.table("log"), done.table("truth")
+    late = log[log["time"] > 0.35]
+    for tendon in (1, 2, 4, 5):
+        pull = np.interp(late["time"], truth["time"], truth[f"pull_{tendon}"])
+        assert pull == pytest.approx(late[f"tension_{tendon}"].to_numpy(), abs=2.5)
+
+
+def test_frames_are_fused_at_their_capture_time(experiment: Run) -> None:
+    """A frame's marker angle is the true angle when it was taken, not when it was used two frames later."""
+    done = experiment()
+    log, truth = done.table("log"), done.table("truth")
+    used = log[log["theta_measured"].notna() & (log["captured"] > 0.02)]
+    assert ((used["time"] - used["captured"]) > 1.9 / 60.0).all() and len(used) > 15
+    taken, now = (np.interp(used[name], truth["time"], truth["theta"]) for name in ("captured", "time"))
+    off = [float(np.abs(used["theta_measured"] - true).max()) for true in (taken, now)]
+    assert math.degrees(off[0]) < 0.6 < math.degrees(off[1])
+
+
+FAULTS = {
+    "port-lost": ("the port is gone", 4),
+    "board-reset": ("restarted", 5),
+    "frames-dropped": ("no usable marker angle", 5),
+    "marker-covered": ("no usable marker angle", 5),
+    "markers-swapped": ("no usable marker angle", 5),
+    "host-silent": ("no answer", 4),
+    "controller-exception": ("the controller failed: ArithmeticError", 5),
+    "model-nan": ("the law's torque is not a number", 5),
+    "disk-full": ("the log cannot be written: No space left", 5),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_each_fault_ends_with_motors_stopped_and_its_reason(experiment: Run, kind: str) -> None:
+    said, code = FAULTS[kind]
+    bench = {**settings_of().bench.model_dump(), "faults": ({"kind": kind, "at": AT},)}
+    done = experiment(horizon=0.6, bench=bench)
+    assert isinstance(done.error, UserError) and said in str(done.error) and done.error.exit_code == code
+    stop = done.experiment.stop
+    assert stop is not None and stop.trial == 0 and done.experiment.outcomes[0] == stop.reason != "ok"
+    done.bench.transport.wait(0.3)  # what the board does with nobody there
+    motion = done.bench.motion()
+    assert max(time for time in motion.last_step if time is not None) < done.bench.transport.now() - 0.05
+    reachable = kind not in ("port-lost", "host-silent")
+    assert stop.halt.verified == reachable
+    if reachable:
+        assert stop.halt.status is not None and Flag.MOVING not in stop.halt.status.flags
+        assert stop.halt.seconds < 0.1
+    log, truth = done.table("log"), done.table("truth")
+    assert log["time"].iloc[-1] >= AT - 0.006 and truth["time"].iloc[-1] >= log["time"].iloc[-1] - 0.002
+    assert np.diff(log["time"]) == pytest.approx(5e-3, abs=1e-4)
+
+
+def test_a_frozen_camera_is_noticed_by_what_it_does_to_the_estimate(experiment: Run) -> None:
+    """Frames with new times and an old picture: the wrist cannot be trusted, and moves no further than its limits."""
+    bench = {**settings_of().bench.model_dump(), "faults": ({"kind": "camera-frozen", "at": AT},)}
+    done = experiment(horizon=1.0, bench=bench, reference={"duration": 0.5, "angle_deg": 30.0})
+    truth = done.table("truth")
+    assert np.abs(truth["theta"]).max() < math.radians(55.0)
+    assert isinstance(done.error, UserError) and done.error.exit_code == 5
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.11, 0.31])
+def test_ctrl_c_stops_the_motors_before_it_goes_on_up(experiment: Run, moment: float) -> None:
+    def interrupt(row: dict[str, Any]) -> None:
+        if row["trial"] == 0 and row["time"] >= moment:
+            raise KeyboardInterrupt
+
+    done = experiment(interrupt)
+    stop = done.experiment.stop
+    assert isinstance(done.error, KeyboardInterrupt) and stop is not None and stop.halt.verified
+    assert stop.reason == "interrupted by the operator"
+    assert stop.halt.status is not None and stop.halt.status.state is State.ENABLED
+    assert not any(done.bench.motion().energised)
+
+
+def test_an_error_of_the_disk_is_told_as_such(experiment: Run) -> None:
+    def fail(row: dict[str, Any]) -> None:
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    done = experiment(fail)
+    assert isinstance(done.error, UserError) and "Disk quota exceeded" in done.error.what
+    assert done.experiment.stop is not None and done.experiment.stop.halt.verified
+
+
+def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
+    files = []
+    for _ in range(2):
+        done = experiment()
+        files.append({file.name: file.read_bytes() for file in done.folder.iterdir()})
+    assert set(files[0]) == {"log.csv", "between.csv", "frames.csv", "truth.csv"} and files[0] == files[1]
+
+
+def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: Run, at_zero: Any) -> None:
+    object.__setattr__(at_zero, "boot_nonce", at_zero.boot_nonce ^ 1)
+    try:
+        done = experiment()
+    finally:
+        object.__setattr__(at_zero, "boot_nonce", at_zero.boot_nonce ^ 1)
+    assert isinstance(done.error, UserError) and done.error.exit_code == 4
+    assert "the board has restarted since" in done.error.what and "positions: stored" in done.error.fix
+    assert not (done.folder / "log.csv").read_text().splitlines()[1:]

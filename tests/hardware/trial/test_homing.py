@@ -1,0 +1,45 @@
+"""Homing finds what the bench hides: slack, senses of turning, and where the wrist is straight."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.hardware.trial.conftest import WRIST, settings_of
+from wristctl.hardware.bench.bench import Bench
+from wristctl.hardware.board import Board
+from wristctl.hardware.trial.homing import Zero, find_zero
+from wristctl.hardware.trial.prepare import prepare
+from wristctl.hardware.trial.safety import SafetyStop
+from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.stands import EmulatedStand
+from wristctl.hardware.vision.view import View
+
+QUICK = {"move": 1e-4, "rest": 0.08, "frames": 2, "slack": 5e-4, "let_go": 1.0}
+SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
+
+
+def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, Bench]:
+    settings = settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
+    bench = Bench(settings.bench, WRIST, 0)
+    eye = EmulatedStand(bench, settings, View(), None).eye()
+    board = Board(bench.transport)
+    board.connect()
+    prepare(board, settings)
+    return find_zero(board, eye, spools_of(settings.actuator), settings.homing, "ulnar", signs), bench
+
+
+def test_slack_senses_and_steps_per_radian_are_found() -> None:
+    zero, bench = homed(reversed=(False, True, False, False))
+    assert zero.signs == (1, -1, 1, 1)
+    assert zero.slack == pytest.approx(SLACK, abs=5e-5)
+    step = settings_of().actuator.step_length
+    assert zero.steps_per_radian == pytest.approx([WRIST.tendon_offset / step] * 4, rel=0.12)
+    assert bench.truth(bench.transport.now() - 0.01).reeled[-1] == pytest.approx(np.zeros(4), abs=5e-5)
+
+
+def test_a_tendon_that_is_off_its_pulley_stops_homing() -> None:
+    with pytest.raises(SafetyStop, match=r"axis 0 \(tendon 1\) does not bend the wrist within 0.5 mm"):
+        homed((1, 1, 1, 1), slack=(5e-3, 2e-4, 4e-4, 2.5e-4))

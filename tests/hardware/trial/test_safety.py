@@ -1,0 +1,50 @@
+"""Every limit stops, alone, and nothing stops within them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.hw_run import Safety
+from wristctl.config.plant import Actuator
+from wristctl.hardware.messages import State
+from wristctl.hardware.trial.safety import Monitor, SafetyStop, Seen
+from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.steering import Answer, Estimate
+
+SPOOLS = spools_of(Actuator(level="tendon"))
+WELL = Seen(Estimate(0.5, 1.0, 0.1), 0.04, "ok", np.full(4, 7.0), np.zeros(4), State.ENABLED, 0.001)
+MONITOR = Monitor(Safety(), SPOOLS)
+
+
+def test_a_wrist_within_its_limits_goes_on() -> None:
+    MONITOR.see(WELL)
+    MONITOR.answer(Answer(0.5, 0.5, 10.0, 2.0, False))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"estimate": Estimate(math.radians(55.1), 0.0, 0.0)}, "angle 55.1 deg beyond"),
+        ({"estimate": Estimate(-math.radians(55.1), 0.0, 0.0)}, "angle -55.1 deg beyond"),
+        ({"estimate": Estimate(0.0, -10.1, 0.0)}, "rate -10.1 rad/s"),
+        ({"estimate": Estimate(math.nan, 0.0, 0.0)}, "not a number"),
+        ({"age": 0.151, "verdict": "no tip"}, "no usable marker angle for 151 ms (newest frame: no tip)"),
+        ({"position": np.array([0.0, 0.0, 81.0 / 20e3 / SPOOLS.step, 0.0])}, "tension of about 81 N"),
+        ({"position": np.array([0.0, -0.0201 / SPOOLS.step, 0.0, 0.0])}, "a spool 20.1 mm from zero"),
+        ({"state": State.DISABLED}, "the board is DISABLED"),
+        ({"late": 0.051}, "51 ms late"),
+    ],
+)
+def test_each_limit_stops_by_itself(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SafetyStop) as stopped:
+        MONITOR.see(WELL._replace(**change))
+    assert said in stopped.value.what and stopped.value.exit_code == 5
+
+
+def test_a_torque_that_is_no_number_is_never_sent() -> None:
+    with pytest.raises(SafetyStop, match="torque is not a number"):
+        MONITOR.answer(Answer(math.nan, 0.5, 10.0, 2.0, False))

@@ -1,0 +1,68 @@
+"""From force to motion and back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wristctl.config.plant import Actuator
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.trial.spools import TENDONS, Paths, on_plus_side, spools_of
+
+WRIST, ACTUATOR = WristParameters(), Actuator(level="tendon")
+SPOOLS = spools_of(ACTUATOR)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0.0, 60.0), min_size=4, max_size=4), st.floats(-0.9, 0.9))
+def test_tension_to_position_and_back_gives_the_tension(tension: list[float], theta: float) -> None:
+    taut, _ = Paths(WRIST, "ulnar").taut(theta)
+    position = SPOOLS.target(np.array(tension), taut)
+    assert SPOOLS.tension(position, taut) == pytest.approx(tension, abs=1e-9)
+
+
+@settings(deadline=None)
+@given(st.floats(1e-3, 0.9) | st.floats(-0.9, -1e-3))
+def test_taut_length_is_the_shortening_of_four_straight_spans(theta: float) -> None:
+    """Written out: each span of the +-c tendon is 2 (l/theta -+ c) sin(theta/2) of its share of bend and length."""
+    bend, length = theta / 4.0, WRIST.length / 4.0
+    chord = 2.0 * length / bend * math.sin(bend / 2.0)
+    across = 2.0 * WRIST.tendon_offset * math.sin(bend / 2.0)
+    expected = {True: WRIST.length - 4.0 * (chord - across), False: WRIST.length - 4.0 * (chord + across)}
+    taut, _ = Paths(WRIST, "flexion").taut(theta)
+    assert taut == pytest.approx([expected[bool(plus)] for plus in on_plus_side("flexion")], abs=1e-12)
+
+
+def test_the_change_of_the_taut_length_is_its_derivative() -> None:
+    paths, h = Paths(WRIST, "ulnar"), 1e-5
+    _, arm = paths.taut(0.4)
+    assert (paths.taut(0.4 + h)[0] - paths.taut(0.4 - h)[0]) / (2.0 * h) == pytest.approx(arm, rel=1e-6)
+
+
+def test_each_direction_is_pulled_by_the_papers_two_tendons() -> None:
+    for plane, tendons in (("ulnar", {4, 5}), ("flexion", {2, 5})):
+        assert {tendon for tendon, on in zip(TENDONS, on_plus_side(plane), strict=True) if on} == tendons
+
+
+def test_torque_at_the_pulley_is_tension_times_radius() -> None:
+    assert SPOOLS.torque(np.array([60.0])) == pytest.approx([0.45])
+
+
+@settings(deadline=None)
+@given(st.floats(-2000.0, 2000.0), st.floats(-3000.0, 3000.0))
+def test_a_spool_reaches_a_moving_target_without_exceeding_speed_or_acceleration(gap: float, moving: float) -> None:
+    """Chasing a target that moves at a steady rate, the gap closes and is not overrun by more than a step."""
+    h, position, target, rate = 5e-3, 0.0, gap, 0.0
+    furthest = 0.0
+    for _ in range(600):
+        wanted = SPOOLS.rate(np.array([target - position]), np.array([moving]), np.array([rate]), h)[0]
+        assert abs(wanted) <= SPOOLS.speed and abs(wanted - rate) <= SPOOLS.acceleration * h + 1e-9
+        position, rate, target = position + h * wanted, float(wanted), target + h * moving
+        furthest = max(furthest, math.copysign(1.0, gap) * (position - target))
+    assert abs(target - position) < 0.01
+    if gap * moving >= 0.0:
+        assert furthest < 1.0 + abs(moving) ** 2 / SPOOLS.acceleration

@@ -1,0 +1,48 @@
+"""`wristctl hw-run`: the paper's experiment on the whole chain, from marker to motor."""
+
+from __future__ import annotations
+
+from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.stands_on import stands_on
+from wristctl.config.study import Study
+from wristctl.runs import Run
+
+
+def plan(study: Study, inputs: dict[str, Run]) -> str:
+    """What would be done; opens nothing."""
+    settings = study.hw_run
+    pushes = settings.without_push + (settings.push.force != 0.0)
+    count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
+    each = settings.horizon + settings.back + settings.rest
+    return f"{stands_on(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
+
+
+def hw_run(session: Session) -> list[Table]:
+    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
+    session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
+    from wristctl.cli.hw_tables import reported
+    from wristctl.cli.hw_trials import performed
+
+    table = performed(session)
+    return reported(session, table)
+
+
+app = study_command(
+    "hw-run",
+    work=hw_run,
+    plan=plan,
+    inputs=(
+        Input("calibration", kind="calibrate-wrist", optional=True),
+        Input("optics", kind="calibrate-camera", optional=True),
+        Input("tuned", kind="tune", optional=True),
+        Input("network", kind="train", optional=True),
+    ),
+    shortcuts=("port", "camera", "repetitions", "real_time", "video"),
+    flags={"yes": "Ask nobody before the motors of real hardware move."},
+    examples=(
+        "wristctl hw-run",
+        "wristctl hw-run --set directions=\\[ulnar] --set push.force=0",
+        "wristctl hw-run --dry-run --port /dev/ttyACM0",
+        "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
+    ),
+)

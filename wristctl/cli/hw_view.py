@@ -1,0 +1,79 @@
+"""The trials while they go on: a live panel on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.table import Table as Grid
+
+from wristctl.cli.command import Session
+from wristctl.hardware.trial.loop import Shown
+from wristctl.hardware.trial.spools import TENDONS
+from wristctl.hardware.trial.trials import Trial
+
+_PICTURES = 8.0
+"""Panels a second."""
+
+
+class _Panel:
+    """The newest tick, drawn when asked."""
+
+    def __init__(self, trials: Sequence[Trial]) -> None:
+        self._trials, self._row, self._done = trials, dict[str, Any](), 0
+
+    def take(self, row: dict[str, Any]) -> None:
+        self._row = row
+
+    def __rich__(self) -> Panel:
+        row = self._row
+        if not row:
+            return Panel("homing: each motor reels in until its tendon bends the wrist", title="hw-run")
+        number = row["trial"]
+        self._done = max(self._done, number)
+        grid = Grid.grid(padding=(0, 2))
+        angle, wanted = math.degrees(row["theta"]), math.degrees(row["theta_ref"])
+        grid.add_row("angle", f"{angle:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", f"{row['load']:+.3f} N m")
+        for name, unit in (("tension", "N"), ("sent", "steps/s")):
+            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in TENDONS)
+            grid.add_row(name, *values, unit)
+        grid.add_row("board", row["state"], "marker", str(row["verdict"]) or "-", "late", f"{1e3 * row['late']:.2f} ms")
+        grid.add_row("time", f"{row['time']:.2f} s")
+        title = "between trials" if number < 0 else told(self._trials[number], len(self._trials))
+        whole = Grid.grid()
+        whole.add_row(grid)
+        whole.add_row(ProgressBar(total=len(self._trials), completed=self._done, width=60))
+        return Panel(whole, title=title)
+
+
+@contextmanager
+def trials_shown(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
+    """Show each tick that is handed in, and count the trials."""
+    live = session.console.is_terminal and not session.quiet
+    if live:
+        panel = _Panel(trials)
+        with Live(panel, console=session.console, refresh_per_second=_PICTURES, transient=True):
+            yield panel.take
+        return
+    with session.progress("trials", len(trials), "trials") as done:
+        begun = -1
+
+        def take(row: dict[str, Any]) -> None:
+            nonlocal begun
+            if row["trial"] > begun:
+                begun = row["trial"]
+                done(begun)
+
+        yield take
+        done(begun + 1)
+
+
+def told(trial: Trial, count: int) -> str:
+    """A trial in a few words."""
+    pushed = f", pushed with {trial.push:g} N" if trial.push else ""
+    return f"trial {trial.number + 1} of {count}: {trial.direction}{pushed}"

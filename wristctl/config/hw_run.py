@@ -1,0 +1,124 @@
+"""Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from wristctl.config.bench import BenchSettings
+from wristctl.config.control import Row
+from wristctl.config.loop import Direction, Loop, Reference
+from wristctl.config.plant import Actuator, Plant, Push, Sensor
+from wristctl.config.section import Section, choice, quantity
+from wristctl.config.vision import Device, Gates, Markers
+
+
+class Homing(Section):
+    """How zero is found: each motor reels in by small moves until its tendon bends the wrist, then lets go again."""
+
+    slack: float = quantity(2e-3, "m", "longest slack of a tendon that is looked for", "assumed", gt=0, le=0.02)
+    move: float = quantity(60e-6, "m", "tendon reeled in by one move", "assumed", gt=0)
+    pull: float = quantity(0.6e-3, "m", "tendon reeled in beyond the first bend, to measure by", "assumed", gt=0)
+    bend_deg: float = quantity(0.5, "deg", "bend that counts as one, above the marker's noise", "assumed", gt=0)
+    rest: float = quantity(0.15, "s", "pause after a move before the marker is read", "assumed", ge=0)
+    frames: int = choice(5, "frames whose mean is one reading", ge=1)
+    let_go: float = quantity(3.0, "s", "longest wait for the wrist to straighten again", "assumed", gt=0)
+
+
+class Safety(Section):
+    """Limits whose violation stops the motors, and how they stop."""
+
+    angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "range and a tenth", gt=0)
+    rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
+    tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
+    travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
+    stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
+    late: float = quantity(0.05, "s", "longest delay of one tick; below the watchdog time", "assumed", gt=0)
+    watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
+    hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")
+
+    @model_validator(mode="after")
+    def _the_host_notices_first(self) -> Self:
+        if self.late >= self.watchdog:
+            raise ValueError(f"late ({self.late} s) must be below watchdog ({self.watchdog} s)")
+        return self
+
+
+class RigSettings(Section):
+    """Motors, camera and how they are known. Without a port the whole rig is emulated."""
+
+    port: str | None = choice(None, "serial port of the motor board; without one the whole rig is emulated")
+    baud: int = choice(250_000, "of the serial line", gt=0)
+    camera: str = choice("0", "camera beside a real board: its number, or device path")
+    real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
+    actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
+    sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
+    homing: Homing = Homing()
+    safety: Safety = Safety()
+    markers: Markers = Markers()
+    gates: Gates = Gates()
+    device: Device = Device()
+    bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
+    optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
+
+    @model_validator(mode="after")
+    def _spools_and_frames(self) -> Self:
+        if self.actuator.level != "tendon" or self.sensor.level != "camera":
+            raise ValueError("a rig has actuator.level: tendon and sensor.level: camera")
+        return self
+
+
+class CalibrateWristSettings(RigSettings):
+    """Zero, senses of turning and steps per radian of a rig."""
+
+    plane: Literal["ulnar", "flexion"] = choice("ulnar", "bending plane that the camera looks at")
+
+
+class HwRunSettings(RigSettings):
+    """The paper's experiment: directions x repetitions, with and without a push, for each row of controllers."""
+
+    rows: tuple[Row, ...] = choice(
+        (Row(controller="smc-tracking", gains="stepper"), Row(controller="smc", gains="stepper")),
+        "controllers and gains: the better one and the paper's",
+        min_length=1,
+    )
+    directions: tuple[Direction, ...] = choice(
+        ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1
+    )
+    repetitions: int = choice(1, "of each direction", ge=1, le=1000)
+    push: Push = choice(Push(force=2.0), "a person's push against the bend; force 0: none", "assumed")
+    without_push: bool = choice(True, "trials without the push too")
+    reference: Reference = choice(Reference(), "motion of each trial; its angle counts toward the direction")
+    horizon: float = quantity(5.0, "s", "duration of a trial", "assumed", gt=0)
+    back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
+    rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
+    control_period: float = quantity(5e-3, "s", "time between two evaluations of the law", "assumed", ge=2e-3, le=0.05)
+    calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
+    positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
+    tuned: str | None = choice(None, "tune run behind gains: tuned")
+    network: str | None = choice(None, "train run behind a reference with inverse: network")
+    video: bool = choice(False, "keep the frames as a video, annotated")
+
+    @model_validator(mode="after")
+    def _something_to_do(self) -> Self:
+        if self.push.force == 0.0 and not self.without_push:
+            raise ValueError("without_push: false and push.force: 0 leave no trial")
+        if self.sensor.frame_rate * self.control_period > 1.0:
+            raise ValueError("sensor.frame_rate is above one frame per control_period")
+        if self.positions == "stored" and self.calibration is None:
+            raise ValueError("positions: stored needs a calibration run")
+        return self
+
+    @property
+    def loop(self) -> Loop:
+        """The same loop in simulation: the emulated wrist's plant, or where the wrist is real the known one."""
+        emulated = self.port is None
+        return Loop(
+            plant_segments=self.bench.segments,
+            plant=self.bench.plant if emulated else Plant(),
+            actuator=self.actuator,
+            sensor=self.sensor,
+            control_period=self.control_period,
+            substeps=max(1, round(self.control_period / 1e-3)),
+        )

@@ -1,0 +1,1 @@
+"""The experiment on hardware, real or emulated: homing, closed loop, trials, safety, log."""

@@ -1,0 +1,95 @@
+"""A rig's calibration as a run keeps it: what stays true of the rig, and where its motors stood."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Self
+
+from wristctl.config.errors import UserError
+from wristctl.config.hw_run import CalibrateWristSettings
+from wristctl.hardware.board import Board
+from wristctl.hardware.errors import BoardError
+from wristctl.hardware.messages import JOG_RATE, Flag, Target
+from wristctl.hardware.trial.halt import halt
+from wristctl.hardware.trial.homing import Patience, Zero, find_zero
+from wristctl.hardware.trial.prepare import prepare
+from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.stands import Stand
+from wristctl.runs import Run
+from wristctl.runs.interrupt import undisturbed
+
+FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """`zero` is durable; `position` [steps] holds only as long as the board has neither restarted nor moved since."""
+
+    zero: Zero
+    plane: str
+    boot_nonce: int
+    position: tuple[int, ...]
+    """Of the board's axes where the calibration left them, counted from zero."""
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        known = {"plane": self.plane, "boot_nonce": self.boot_nonce, "position": self.position}
+        return {"schema": SCHEMA, **self.zero.plain(), **known}
+
+    @classmethod
+    def load(cls, run: Run) -> Self:
+        """Read a calibrate-wrist run. Raises UserError."""
+        file = run.file(FILE)
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+            if found["schema"] != SCHEMA:
+                raise ValueError(found["schema"])
+            signs, slopes, slack = (tuple(found[name]) for name in ("signs", "steps_per_radian", "slack"))
+            zero = Zero(signs, slopes, float(found["marker"]), slack)
+            return cls(zero, found["plane"], found["boot_nonce"], tuple(found["position"]))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise UserError("not a wrist calibration", str(file), "wristctl hw calibrate wrist") from error
+
+    def restore(self, board: Board) -> None:
+        """Take up its zero positions. Raises BoardError where they hold no longer."""
+        hello = board.hello or board.connect()
+        position = board.read().position
+        if hello.boot_nonce != self.boot_nonce:
+            what = "the calibration's zero positions are lost: the board has restarted since"
+        elif position != self.position:
+            what = f"the calibration left the motors at {self.position}, the board says {position}"
+        else:
+            board.home(position)
+            return
+        fix = "leave out positions: stored, and zero is found anew; senses of turning are kept"
+        raise BoardError("host", what, board.transport.name, fix)
+
+
+def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
+    """Home a rig, slacken its tendons again, and say what was found. Closes the stand.
+
+    Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
+    """
+    board, spools = Board(stand.transport), spools_of(settings.actuator)
+    try:
+        hello = board.connect()
+        try:
+            stand.face(settings.plane, Patience(board))
+            eye = stand.eye()
+            Patience(board).angle(eye, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            stand.confirm()
+            prepare(board, settings)
+            zero = find_zero(board, eye, spools, settings.homing, settings.plane)
+            slack = round(settings.homing.pull / spools.step)
+            one, two, four, five = (-slack * sign for sign in zero.signs)
+            board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))
+            position = board.wait_while(Flag.MOVING, timeout=5.0).position
+        except BaseException:
+            with undisturbed():
+                board.close(emergency=not halt(board, settings.safety.watchdog).verified)
+            raise
+        board.close()
+    finally:
+        stand.close()
+    return Calibration(zero, settings.plane, hello.boot_nonce, position)

@@ -1,0 +1,184 @@
+"""The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from wristctl.config.errors import UserError
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.plant import Disturbances
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.hardware.board import Board
+from wristctl.hardware.trial.calibration import Calibration
+from wristctl.hardware.trial.eye import Eye
+from wristctl.hardware.trial.faults import HostFaults
+from wristctl.hardware.trial.halt import Halt, halt
+from wristctl.hardware.trial.homing import Patience, Zero, find_zero
+from wristctl.hardware.trial.log import TrialLog
+from wristctl.hardware.trial.loop import ControlLoop, Shown, Timing
+from wristctl.hardware.trial.moves import at_rest, back, motion_of
+from wristctl.hardware.trial.prepare import prepare
+from wristctl.hardware.trial.safety import SafetyStop
+from wristctl.hardware.trial.spools import Paths, spools_of
+from wristctl.hardware.trial.stands import Stand
+from wristctl.hardware.trial.steering import Steering
+from wristctl.hardware.trial.trials import Trial
+from wristctl.runs.interrupt import undisturbed
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.kinematics import Inverse
+
+
+class Stop:
+    """Why and how an experiment was stopped before its end."""
+
+    def __init__(self, error: BaseException, trial: int | None, halted: Halt) -> None:
+        self.reason = f"{type(error).__name__}: {error}"
+        if isinstance(error, UserError):
+            self.reason = error.what
+        elif isinstance(error, KeyboardInterrupt):
+            self.reason = "interrupted by the operator"
+        self.trial, self.halt = trial, halted
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        status = self.halt.status
+        known: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
+        if status is not None:
+            faults = status.faults.name or "none"
+            known |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
+        return {
+            "reason": self.reason,
+            "trial": self.trial,
+            "motors_stand": self.halt.verified,
+            "how": self.halt.how,
+            "seconds": self.halt.seconds,
+            **known,
+        }
+
+
+class Experiment:
+    """Trials; `outcomes` holds how each trial that began has ended, `stop` why they ended early.
+
+    Raises UserError for what is wrong with controllers, gains or motions.
+    """
+
+    def __init__(
+        self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
+        network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
+        calibration: Calibration | None = None,
+    ) -> None:  # fmt: skip
+        self._settings, self._wrist, self._trials, self._log = settings, wrist, trials, kept
+        self._calibration = calibration
+        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
+        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
+        self._back = controller("feedforward")
+        self.motions = {each: motion_of(settings, wrist, each, network) for each in settings.directions}
+        self.timing = Timing(settings.control_period)
+        self.outcomes: dict[int, str] = {}
+        self.stop: Stop | None = None
+        self.zero: Zero | None = None
+        self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
+
+    def run(self, stand: Stand, shown: Shown | None = None) -> None:
+        """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
+
+        Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
+        """
+        board = Board(stand.transport)
+        try:
+            self._warm_up()
+            board.connect()
+            try:
+                self._all(stand, board, shown)
+            except BaseException as error:
+                with undisturbed():
+                    self._stopped(stand, board, error)
+                if isinstance(error, OSError):
+                    what = f"the log cannot be written: {error.strerror}"
+                    raise SafetyStop(what, str(error.filename or "data"), "free space") from error
+                raise
+            with undisturbed():
+                halt(board, self._settings.safety.watchdog)
+                board.close()
+        finally:
+            stand.close()
+
+    def _warm_up(self) -> None:
+        """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
+        settings = self._settings
+        steering = Steering(self._wrist, settings.actuator, settings.sensor, settings.control_period, 0.0)
+        taut, _ = Paths(self._wrist, self._trials[0].plane).taut(0.0)
+        for law, gains in [*self._laws, (self._back, ())]:
+            steering.use(law, gains)
+            steering.respond(0.0, 0.0, 0.0)
+            steering.expect(float(taut[0]), float(taut[0]))
+        steering.see(0.0, 0.0)
+
+    def _all(self, stand: Stand, board: Board, shown: Shown | None) -> None:
+        plane = ""
+        for trial in self._trials:
+            if trial.plane != plane:
+                stand.face(trial.direction, Patience(board))
+                loop = self._loop(stand, board, trial.plane, shown)
+                plane = trial.plane
+            self._one(stand, loop, trial)
+
+    def _loop(self, stand: Stand, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
+        """A loop at rest at zero in this plane; the first one homes the board, later ones read the marker's zero."""
+        settings, eye = self._settings, stand.eye()
+        marker = Patience(board).angle(eye, 4 * settings.homing.frames)
+        if self.zero is None:  # the marker is seen, and nothing moves yet
+            stand.confirm()
+            prepare(board, settings)
+            self.zero = self._home(board, eye, plane)
+            marker = self.zero.marker
+        eye.zero = marker
+        toward = "ulnar" if plane == "ulnar" else "flexion"
+        loop = ControlLoop(
+            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, self.timing, self._log, shown,
+        )  # fmt: skip
+        loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
+        return loop
+
+    def _home(self, board: Board, eye: Eye, plane: str) -> Zero:
+        settings, known = self._settings, self._calibration
+        if known is not None and settings.positions == "stored":
+            known.restore(board)
+            return known.zero
+        signs = known.zero.signs if known else None
+        return find_zero(board, eye, spools_of(settings.actuator), settings.homing, plane, signs)
+
+    def _one(self, stand: Stand, loop: ControlLoop, trial: Trial) -> None:
+        """One trial, and the way back to zero."""
+        settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
+        law, gains = self._laws[trial.row]
+        against = -DIRECTIONS[trial.direction].sign * trial.push
+        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
+        stand.begin(start, Disturbances(push=settings.push.model_copy(update={"force": against})))
+        faults = HostFaults(settings.bench.faults) if stand.emulated else None
+        loop.follow(followed, law, gains, trial.number, faults)
+        self._trial_ended(stand, "ok")
+        self._log.flush()
+        loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
+
+    def _trial_ended(self, stand: Stand, outcome: str) -> None:
+        if self._under_way is not None:
+            number, start = self._under_way
+            self.outcomes[number], self._under_way = outcome, None
+            self._log.truth([number, *row] for row in stand.truth(start))
+
+    def _stopped(self, stand: Stand, board: Board, error: BaseException) -> None:
+        """Stop the motors and let the board go, then note what happened."""
+        halted = halt(board, self._settings.safety.watchdog)
+        if self._settings.safety.hold and halted.verified:
+            board.transport.close()  # the board's watchdog ends it, and holds
+        else:
+            board.close(emergency=not halted.verified)
+        self.stop = Stop(error, self._under_way[0] if self._under_way else None, halted)
+        self._log.disk.give_up_reserve()
+        try:
+            self._trial_ended(stand, self.stop.reason)
+        except (OSError, UserError) as lost:
+            error.add_note(f"what the bench knows of the trial is lost: {lost}")

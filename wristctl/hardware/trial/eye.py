@@ -1,0 +1,86 @@
+"""The camera's and the tracker's side of the loop: marker angles as they come."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from wristctl.hardware.vision.camera import Camera, Frame
+from wristctl.hardware.vision.marker import Sighting, Tracker
+
+Kept = Callable[[Frame, Sighting], None]
+"""Takes a frame and what was seen in it, to keep it."""
+
+
+class Eye(Protocol):
+    """Gives sightings to the loop."""
+
+    zero: float
+    """Marker angle of the straight wrist [rad], taken off every angle."""
+
+    def look(self) -> list[Sighting]:
+        """What was seen since the last look, oldest first; never waits for a frame."""
+
+    def close(self) -> None:
+        """Look no more; the camera stays open."""
+
+
+class InlineEye:
+    """Looks when asked: in virtual time, where looking takes none."""
+
+    def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
+        self._camera, self._tracker, self._keep = camera, tracker, keep
+        self.zero = 0.0
+
+    def look(self) -> list[Sighting]:
+        """The newest frame's sighting, if there is one."""
+        frame = self._camera.newest()
+        if frame is None:
+            return []
+        seen = self._tracker.see(frame)
+        if self._keep is not None:
+            self._keep(frame, seen)
+        return [seen._replace(theta=seen.theta - self.zero)]
+
+    def close(self) -> None:
+        """Nothing goes on between looks."""
+
+
+class ThreadedEye:
+    """Looks in a thread of its own, so that the loop waits neither for the camera nor for the tracker."""
+
+    def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
+        self._inner = InlineEye(camera, tracker, keep)
+        self.zero = 0.0
+        self._seen: deque[Sighting] = deque(maxlen=64)
+        self._error: BaseException | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="eye", daemon=True)
+        self._thread.start()
+
+    def look(self) -> list[Sighting]:
+        """What was seen since the last look. Raises what ended the thread."""
+        if self._error is not None:
+            raise self._error
+        found = []
+        while self._seen:
+            found.append(self._seen.popleft())
+        return [each._replace(theta=each.theta - self.zero) for each in found]
+
+    def close(self) -> None:
+        """Stop looking."""
+        self._stop.set()
+        self._thread.join(timeout=2.0)
+
+    def _watch(self) -> None:
+        try:
+            while not self._stop.is_set():
+                if found := self._inner.look():
+                    self._seen.extend(found)
+                else:
+                    time.sleep(1e-3)
+        except BaseException as error:  # handed to the loop, which stops the motors
+            self._error = error

@@ -1,0 +1,178 @@
+"""The log of trials: tables that are written as they come, and lose nothing when the disk is full."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+from collections import deque
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.hardware.trial.spools import TENDONS
+
+Columns = Mapping[str, tuple[str, str]]
+"""Name -> unit and meaning."""
+
+
+def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
+    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in TENDONS}
+
+
+LOG: Columns = {
+    "trial": ("", "number, from 0"),
+    "time": ("s", "since the trial's motion began"),
+    "clock": ("s", "the run's one clock"),
+    "theta": ("rad", "bending angle as estimated"),
+    "rate": ("rad/s", "its rate as estimated"),
+    "load": ("N m", "load torque as estimated: what the model does not explain"),
+    "theta_measured": ("rad", "newest usable marker angle; empty where none came in this tick"),
+    "captured": ("s", "when that frame was taken, on the trial's time"),
+    "verdict": ("", "on the newest frame; empty where none came"),
+    "theta_ref": ("rad", "reference angle that the controller follows"),
+    "rate_ref": ("rad/s", "its rate"),
+    "acceleration_ref": ("rad/s^2", "its acceleration"),
+    "theta_desired": ("rad", "true wanted angle"),
+    "error": ("rad", "theta - theta_ref (E12)"),
+    "torque_wanted": ("N m", "the law's torque"),
+    "torque": ("N m", "torque of the commanded tensions on the one-segment model"),
+    **_of_tendons("tension", "N", "commanded"),
+    **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
+    **_of_tendons("position", "steps", "spool position by the board's status"),
+    **_of_tendons("sent", "1/s", "step rate really sent"),
+    "state": ("", "of the board"),
+    "faults": ("", "of the board"),
+    "late": ("s", "from the tick's due time to its beginning"),
+}
+FRAMES: Columns = {
+    "trial": ("", "number, from 0"),
+    "number": ("", "of the frame, as the camera counts; gaps are frames that nobody saw"),
+    "captured": ("s", "middle of the exposure, on the trial's time"),
+    "used": ("s", "when the loop had its angle, on the trial's time"),
+    "theta": ("rad", "marker angle less zero; empty where unusable"),
+    "verdict": ("", "whether it can be used, and if not why"),
+}
+
+_PIECE = 50
+_RESERVED = 4 << 20
+
+
+def truth_columns(segments: int) -> Columns:
+    """What the emulated bench knows besides, of a wrist of so many segments."""
+    own = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(segments)}
+    return {
+        "trial": ("", "number, from 0"),
+        "time": ("s", "since the trial's motion began"),
+        **own,
+        "theta": ("rad", "true bending angle"),
+        **_of_tendons("pull", "N", "true tension at the spool"),
+    }
+
+
+class Disk:
+    """Space kept in a folder for what is still to be written when the disk is full: a trial's truth, some rows."""
+
+    def __init__(self, folder: Path) -> None:
+        self._reserve = folder / ".reserve"
+        self._reserve.write_bytes(bytes(_RESERVED))
+        self.pretend_full = False
+        """A fault to inject: every further write fails until the reserve is given up."""
+
+    def write(self, descriptor: int, data: bytes) -> int:
+        """Write some of `data`; how much. Raises OSError."""
+        if self.pretend_full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return os.write(descriptor, data)
+
+    def give_up_reserve(self) -> None:
+        """Free the space."""
+        self._reserve.unlink(missing_ok=True)
+        self.pretend_full = False
+
+
+class Stream:
+    """A CSV file that grows row by row; rows that the disk does not take are kept and tried again at the end."""
+
+    def __init__(self, path: Path, columns: Columns, disk: Disk) -> None:
+        self.columns, self._disk = columns, disk
+        self._file = path.open("wb", buffering=0)
+        self._pending = bytearray(",".join(columns).encode() + b"\n")
+        self._rows = 0
+
+    def row(self, values: Iterable[Any]) -> None:
+        """Add a row, in the order of the columns. Raises OSError."""
+        self._pending += ",".join(map(_cell, values)).encode() + b"\n"
+        self._rows += 1
+        if self._rows % _PIECE == 0:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand over to the system what is pending. Raises OSError."""
+        while self._pending:
+            del self._pending[: self._disk.write(self._file.fileno(), bytes(self._pending))]
+
+    def close(self) -> None:
+        """Write the rest. Raises OSError."""
+        try:
+            self.flush()
+        finally:
+            self._file.close()
+
+
+class TrialLog:
+    """log.csv and frames.csv of trials; between.csv for the moves between them; truth.csv of an emulated bench."""
+
+    def __init__(self, folder: Path, segments: int | None, period: float) -> None:
+        self.disk = Disk(folder)
+        self.streams = {
+            name: Stream(folder / f"{name}.csv", columns, self.disk)
+            for name, columns in (("log", LOG), ("between", LOG), ("frames", FRAMES))
+        }
+        if segments is not None:
+            self.streams["truth"] = Stream(folder / "truth.csv", truth_columns(segments), self.disk)
+        self.last: deque[dict[str, Any]] = deque(maxlen=round(1.0 / period))
+        """The last second of ticks."""
+
+    def tick(self, row: Mapping[str, Any]) -> None:
+        """One control tick; in between.csv where it belongs to no trial."""
+        self.last.append(dict(row))
+        self.streams["between" if row["trial"] < 0 else "log"].row(row[name] for name in LOG)
+
+    def frame(self, *values: Any) -> None:
+        """One frame of a trial."""
+        self.streams["frames"].row(values)
+
+    def truth(self, rows: Iterable[Iterable[Any]]) -> None:
+        """What the bench knows of a trial."""
+        for row in rows:
+            self.streams["truth"].row(row)
+
+    def flush(self) -> None:
+        """Hand over to the system what is pending. Raises OSError."""
+        for each in self.streams.values():
+            each.flush()
+
+    def close(self) -> None:
+        """Write what is left, if need be into the space reserved for it. Raises OSError."""
+        self.disk.give_up_reserve()
+        for each in self.streams.values():
+            each.close()
+
+
+def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
+    """Columns of values (4,) of the board's axes."""
+    return {
+        f"{name}_{tendon}": value
+        for name, four in values.items()
+        for tendon, value in zip(TENDONS, four.tolist(), strict=True)
+    }
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return repr(float(value)) if math.isfinite(value) else ""
+    return str(value)

@@ -1,0 +1,188 @@
+"""The control loop at a fixed period: marker angle, observer, law, tensions, spool targets, step rates, board.
+
+One tick is one exchange with the board: step rates out, status back. What the spools reeled in is the observer's
+input, a frame is fused at its capture time. Everything runs on the transport's clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.hw_run import RigSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.hardware.board import Board
+from wristctl.hardware.messages import AXES, Fault
+from wristctl.hardware.trial.eye import Eye
+from wristctl.hardware.trial.faults import HostFaults
+from wristctl.hardware.trial.log import TrialLog, of_axes
+from wristctl.hardware.trial.safety import Monitor, SafetyStop, Seen
+from wristctl.hardware.trial.spools import Paths, spools_of
+from wristctl.hardware.trial.steering import Answer, Estimate, Steering
+from wristctl.simulation.reference import Motion
+
+Array = NDArray[np.float64]
+Shown = Callable[[dict[str, Any]], None]
+"""Takes each tick's row of the log, to show it."""
+
+_UNDERWAY = 0.35
+"""Share of a command's round trip until the board has read it, by the bytes of command and answer."""
+
+
+@dataclass
+class Timing:
+    """When ticks began, against when they were due."""
+
+    period: float
+    late: list[float] = field(default_factory=list)
+    """Of each tick [s]."""
+    overruns: int = 0
+    """Ticks that were skipped because one before took too long."""
+
+    def jitter(self, share: float) -> float:
+        """This quantile of lateness [s]."""
+        return float(np.quantile(self.late, share)) if self.late else math.nan
+
+
+class Task(NamedTuple):
+    """What the loop follows, and as what."""
+
+    motion: Motion
+    """Sampled at the loop's period."""
+    trial: int
+    """Its number; -1 between trials."""
+    begin: float
+    """When it begins, on the clock."""
+    faults: HostFaults
+
+
+class ControlLoop:
+    """Drives a homed, enabled board in one bending plane; `signs` say which way each motor's positive steps turn."""
+
+    def __init__(
+        self, board: Board, eye: Eye, settings: RigSettings, wrist: WristParameters, plane: str,
+        signs: Sequence[int], timing: Timing, log: TrialLog, shown: Shown | None = None,
+    ) -> None:  # fmt: skip
+        self._board, self._eye, self._log, self._timing, self._shown = board, eye, log, timing, shown
+        self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
+        self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
+        self._monitor = Monitor(settings.safety, self._spools)
+        self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
+        self._status, self._sent = board.read(), np.zeros(AXES)
+        self._epoch = self._last_usable = self._clock.now()
+        self._underway, self._skipped, self._verdict = 0.0, 0, "no frame"
+
+    @property
+    def next_tick(self) -> float:
+        """When the next tick is due, on the clock [s]."""
+        return self._epoch + self._steering.tick * self._period
+
+    def follow(
+        self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
+        faults: HostFaults | None = None,
+    ) -> None:  # fmt: skip
+        """Follow a motion sampled at the period; its ticks are logged under the number of the trial.
+
+        Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
+        """
+        self._steering.use(controller, gains)
+        task, first = Task(motion, trial, self.next_tick, faults or HostFaults(())), self._steering.tick
+        while (k := self._steering.tick - first) < len(motion.time):
+            if (ahead := self.next_tick - self._clock.now()) > 0.0:
+                self._clock.wait(ahead)
+            self._tick(task, k)
+
+    def _tick(self, task: Task, k: int) -> None:
+        clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
+        seen = self._look(task)
+        estimate, position = steering.estimate, self._reeled()
+        self._watch(estimate, position, clock, clock - due)
+        reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
+        answer = self._answer(reference, clock - task.begin, task.faults)
+        tension = self._paths.each(answer.plus, answer.minus)
+        target = self._turn(tension, position, *reference[:2])
+        known = {
+            "trial": task.trial,
+            "time": clock - task.begin,
+            "clock": clock,
+            **estimate._asdict(),
+            **seen,
+            "theta_ref": reference[0],
+            "rate_ref": reference[1],
+            "acceleration_ref": reference[2],
+            "theta_desired": float(motion.theta_desired[k]),
+            "error": estimate.theta - reference[0],
+            "torque_wanted": answer.torque_wanted,
+            "torque": answer.torque,
+            "state": self._status.state.name,
+            "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
+            "late": clock - due,
+        }
+        self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
+        row = known | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
+        self._log.tick(row)
+        if self._shown is not None:
+            self._shown(row)
+        self._timing.late.append(clock - due)
+        self._go_on()
+
+    def _look(self, task: Task) -> dict[str, Any]:
+        """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
+        found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
+        for seen in self._eye.look():
+            found["verdict"] = self._verdict = str(seen.verdict)
+            if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
+                self._last_usable = seen.time
+                found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
+            if task.trial >= 0:
+                used = self._clock.now() - task.begin
+                self._log.frame(task.trial, seen.number, seen.time - task.begin, used, seen.theta, seen.verdict)
+        return found
+
+    def _watch(self, estimate: Estimate, position: Array, clock: float, late: float) -> None:
+        """Raises SafetyStop where the limits are exceeded."""
+        age, delay = clock - self._last_usable, late + self._skipped * self._period
+        taut, _ = self._paths.taut(estimate.theta)
+        self._monitor.see(Seen(estimate, age, self._verdict, position, taut, self._status.state, delay))
+
+    def _answer(self, reference: tuple[float, float, float], time: float, faults: HostFaults) -> Answer:
+        try:
+            answer = faults.answer(self._steering.respond(*reference), time)
+        except Exception as error:
+            what = f"the controller failed: {type(error).__name__}: {error}"
+            raise SafetyStop(what, fix="run again with --debug for the traceback") from error
+        self._monitor.answer(answer)
+        return answer
+
+    def _turn(self, tension: Array, position: Array, theta_ref: float, rate_ref: float) -> Array:
+        """Send the step rates that lead to these tensions, and hear where the spools are; the targets [steps]."""
+        taut, arm = self._paths.taut(theta_ref)
+        target, moving = self._spools.target(tension, taut), arm * rate_ref / self._spools.step
+        # the command acts once the board has read it; by then the one before has moved the spools for a whole period
+        gap = target + moving * self._underway - (position + self._sent * self._period)
+        rates = self._signs * self._spools.rate(gap, moving, self._sent, self._period)
+        sent, self._status = self._board.turn(rates.tolist())
+        self._sent = self._signs * np.array(sent)
+        self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
+        return target
+
+    def _go_on(self) -> None:
+        """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
+        middle = self._reeled() + self._sent * (0.5 * self._period - self._underway)
+        plus, minus = self._paths.sides(self._spools.step * middle)
+        self._steering.expect(plus, minus)
+        self._skipped = max(0, int((self._clock.now() - self.next_tick) / self._period))
+        for _ in range(self._skipped):
+            self._steering.expect(plus, minus)
+        self._timing.overruns += self._skipped
+
+    def _reeled(self) -> Array:
+        """What the spools hold [steps], by the last status."""
+        reeled: Array = self._signs * np.array(self._status.position, float)
+        return reeled

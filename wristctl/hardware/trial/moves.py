@@ -1,0 +1,39 @@
+"""What the wrist follows: the motion of a trial, the way back to zero, and rest there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.loop import Direction
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.reference import Motion, minimum_jerk, motion
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.kinematics import Inverse
+
+Array = NDArray[np.float64]
+
+
+def motion_of(
+    settings: HwRunSettings, wrist: WristParameters, direction: Direction, network: Inverse | None = None
+) -> Motion:
+    """A trial's motion in this direction, sampled at the control period. Raises UserError for one out of reach."""
+    reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()
+    return motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
+
+
+def back(theta: float, duration: float, rest: float, period: float) -> Motion:
+    """From theta [rad] to straight in `duration` [s], and rest there."""
+    time: Array = np.arange(round((duration + rest) / period), dtype=np.float64) * period
+    course, rate, acceleration = minimum_jerk(time, duration)
+    angle = theta * (1.0 - course)
+    return Motion(
+        time, angle, -theta * rate, -theta * acceleration, angle, np.zeros((len(time), 2)),
+        move=-theta, begin=0.0, rest=duration, horizon=duration + rest,
+    )  # fmt: skip
+
+
+def at_rest(duration: float, period: float) -> Motion:
+    """Straight for so long [s]."""
+    return back(0.0, duration, 0.0, period)

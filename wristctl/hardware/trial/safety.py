@@ -1,0 +1,81 @@
+"""When trials must stop: limits on what is measured, commanded and late."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.errors import UserError
+from wristctl.config.hw_run import Safety
+from wristctl.hardware.errors import SAFETY_STOP
+from wristctl.hardware.messages import State
+from wristctl.hardware.trial.spools import Spools
+from wristctl.hardware.trial.steering import Answer, Estimate
+
+Array = NDArray[np.float64]
+
+
+class SafetyStop(UserError):
+    """The trial was stopped; motors are to be stopped too."""
+
+    def __init__(self, what: str, where: str = "", fix: str = "") -> None:
+        super().__init__(f"stopped: {what}", where, fix, SAFETY_STOP)
+
+
+class Seen(NamedTuple):
+    """What the monitor judges at one tick; SI units."""
+
+    estimate: Estimate
+    age: float
+    """Since the capture of the last usable marker angle."""
+    verdict: str
+    """Of the newest frame."""
+    position: Array
+    """Spools, (4,) [steps]."""
+    taut: Array
+    """Where the tendons are taut at the estimated angle, (4,) [m]."""
+    state: State
+    late: float
+
+
+class Monitor:
+    """Raises SafetyStop at the first tick whose values are beyond the limits."""
+
+    def __init__(self, limits: Safety, spools: Spools) -> None:
+        self._limits, self._spools = limits, spools
+
+    def see(self, seen: Seen) -> None:
+        """Judge what was measured."""
+        limits, angle = self._limits, seen.estimate.theta
+        if not all(map(math.isfinite, seen.estimate)):
+            raise SafetyStop("the observer's estimate is not a number", fix="see the frames in data/frames.csv")
+        if abs(angle) > math.radians(limits.angle_deg):
+            fix = "gentler gains or reference, or widen safety.angle_deg"
+            raise SafetyStop(f"angle {math.degrees(angle):.1f} deg beyond +-{limits.angle_deg:g} deg", fix=fix)
+        if abs(seen.estimate.rate) > limits.rate:
+            fix = "gentler gains or reference, or widen safety.rate"
+            raise SafetyStop(f"rate {seen.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
+        if seen.age > limits.stale:
+            what = f"no usable marker angle for {1e3 * seen.age:.0f} ms (newest frame: {seen.verdict})"
+            raise SafetyStop(what, fix="see that nothing covers the markers, and the camera's light and focus")
+        pulling = float(self._spools.tension(seen.position, seen.taut).max())
+        if pulling > limits.tension:
+            fix = "something holds the wrist, or the zero positions are wrong: home again"
+            raise SafetyStop(f"tension of about {pulling:.0f} N beyond {limits.tension:g} N", fix=fix)
+        reeled = float(np.abs(seen.position).max()) * self._spools.step
+        if reeled > limits.travel:
+            fix = "a smaller reference, or widen safety.travel"
+            raise SafetyStop(f"a spool {1e3 * reeled:.1f} mm from zero, beyond {1e3 * limits.travel:g} mm", fix=fix)
+        if seen.state != State.ENABLED:
+            raise SafetyStop(f"the board is {seen.state.name}, not ENABLED", fix="home again")
+        if seen.late > limits.late:
+            what = f"a tick came {1e3 * seen.late:.0f} ms late"
+            raise SafetyStop(what, fix="close other programs, or a longer control_period")
+
+    def answer(self, answer: Answer) -> None:
+        """Judge what the law wants."""
+        if not all(map(math.isfinite, answer)):
+            raise SafetyStop("the law's torque is not a number", fix="see its gains and model")

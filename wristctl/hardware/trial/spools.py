@@ -1,0 +1,121 @@
+"""Force to motion: from tendon tension to the spool's position, and to the step rate that takes it there.
+
+A stepper is a position source. Tension T [N] asks of the motor the torque T r_p [N m] at the pulley, and gets it from
+the tendon's stretch T/k_t [m]. So the spool has to hold stretch + taut [m] of tendon, where `taut` is what a tendon
+without tension must be reeled in by at the reference angle: the path's shortening there. In microsteps of length s [m]
+
+    target = (T/k_t + taut)/s,   T = k_t (s position - taut),
+
+counted positive reeling in and zero where the tendon of the straight wrist is just taut. Taken at the measured angle,
+delayed, `taut` would feed back positively with a gain near 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.plant import Actuator
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
+from wristctl.wrist.directions import DIRECTIONS
+from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import lengths, moment_arms
+
+Array = NDArray[np.float64]
+
+TENDONS = (1, 2, 4, 5)
+"""The tendon that each of the board's axes winds."""
+
+
+def on_plus_side(plane: str) -> NDArray[np.bool_]:
+    """Which axes wind a tendon of the + side of this bending plane (ulnar or flexion), (4,)."""
+    pulling = DIRECTIONS[plane].tendons
+    return np.array([tendon in pulling for tendon in TENDONS])
+
+
+@dataclass(frozen=True)
+class Spools:
+    """Four equal motors with their pulleys and tendons; SI units, microsteps counted positive reeling in."""
+
+    step: float
+    """Tendon moved by one microstep [m]."""
+    pulley_radius: float
+    stiffness: float
+    """Of one tendon [N/m]."""
+    speed: float
+    """Largest step rate [1/s]."""
+    acceleration: float
+    """Largest change of it [1/s^2]."""
+
+    def torque(self, tension: Array) -> Array:
+        """Torque at the pulley [N m] that these tensions [N] ask of the motors."""
+        return tension * self.pulley_radius
+
+    def target(self, tension: Array, taut: Array) -> Array:
+        """Positions [steps] at which tendons that are taut when reeled in by `taut` [m] have these tensions [N]."""
+        return (tension / self.stiffness + taut) / self.step
+
+    def tension(self, position: Array, taut: Array) -> Array:
+        """Tensions [N] at these positions [steps]; negative by how much a tendon is slack, times its stiffness."""
+        return self.stiffness * (self.step * position - taut)
+
+    def rate(self, gap: Array, moving: Array, before: Array, period: float) -> Array:
+        """Step rates [1/s] for one period that close the gap [steps] to targets moving at a known rate [1/s].
+
+        On top of `moving` each spool takes the speed v from which one more period and then braking stay within the
+        gap, v^2/(2 a) + h v = |gap|, and changes from `before` by no more than a h: for a small gap v = gap/h.
+        """
+        change = self.acceleration * period
+        closing = np.sqrt(change * change + 2.0 * self.acceleration * np.abs(gap)) - change
+        wanted = np.clip(moving + np.copysign(closing, gap), -self.speed, self.speed)
+        return np.clip(wanted, before - change, before + change)
+
+
+def spools_of(actuator: Actuator) -> Spools:
+    """The spools of an actuator section."""
+    return Spools(
+        actuator.step_length,
+        actuator.pulley_radius,
+        actuator.tendon_stiffness,
+        actuator.step_rate,
+        actuator.step_acceleration,
+    )
+
+
+class Paths:
+    """The tendons' paths through the controller's one-segment wrist, for each axis of the board."""
+
+    def __init__(self, wrist: WristParameters, plane: str) -> None:
+        self._model = to_blocks(segments(wrist, 1)[None])[0]
+        self._plus = on_plus_side(plane)
+        self._found = np.zeros((4, self._model.shape[-1]))
+
+    def taut(self, theta: float) -> tuple[Array, Array]:
+        """By how much each tendon is reeled in where it is just taut at theta [m], and its change by theta [m/rad]."""
+        _paths(self._model, theta, self._found)
+        reeled_plus, reeled_minus, arm_plus, arm_minus = self._found[:, 0]
+        return np.where(self._plus, reeled_plus, reeled_minus), np.where(self._plus, arm_plus, arm_minus)
+
+    def sides(self, values: Array) -> tuple[float, float]:
+        """Means over the + and the - side's two axes of values (4,)."""
+        return float(values[self._plus].mean()), float(values[~self._plus].mean())
+
+    def each(self, plus: float, minus: float) -> Array:
+        """The + side's value for its axes and the - side's for the others, (4,)."""
+        return np.where(self._plus, plus, minus)
+
+
+@compiled
+def _paths(model: Any, theta: float, found: Any) -> None:
+    known, row = load_segments(rows_of(model)), rows_of(found)
+    angle = theta + 0.0 * known.length
+    plus, minus = lengths(angle, known)
+    row[0] = known.length - plus
+    row[1] = known.length - minus
+    row[2], row[3] = moment_arms(angle, known)

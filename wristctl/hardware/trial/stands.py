@@ -1,0 +1,159 @@
+"""What trials stand on: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Protocol
+
+from wristctl.config.hw_run import RigSettings
+from wristctl.config.plant import Disturbances
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.bench import Bench
+from wristctl.hardware.bench.connect import RealTimeBench, connect
+from wristctl.hardware.transport import Transport, open_transport
+from wristctl.hardware.trial.eye import Eye, InlineEye, Kept, ThreadedEye
+from wristctl.hardware.trial.homing import Patience
+from wristctl.hardware.vision.camera import DeviceCamera
+from wristctl.hardware.vision.marker import Tracker
+from wristctl.hardware.vision.view import View
+
+_PULSE = 0.02
+
+Ask = Callable[[str], None]
+"""Tells the operator what to do, and returns once it is done. Raises UserError where the operator declines."""
+
+
+BEFORE_MOTION = (
+    "The motors will now move. Emergency stop within reach, nobody's hands in the tendons, wrist straight, tendons "
+    "slack, both markers in the camera's picture?"
+)
+
+
+class Stand(Protocol):
+    """Board and camera with the wrist before them."""
+
+    emulated: bool
+    transport: Transport
+
+    def confirm(self) -> None:
+        """Have a person agree to the first motion, where there is something to be hurt. Raises UserError."""
+
+    def eye(self) -> Eye:
+        """The camera with a fresh tracker."""
+
+    def face(self, direction: str, patience: Patience) -> None:
+        """Turn the wrist so that this direction's plane is the one that bends and is seen."""
+
+    def begin(self, start: float, disturbances: Disturbances) -> None:
+        """A trial's motion starts at `start` on the transport's clock."""
+
+    def truth(self, since: float) -> list[list[float]]:
+        """Rows (time since then, segment angles, their sum, pulls) of an emulated wrist; none of a real one."""
+
+    def close(self) -> None:
+        """Give everything back."""
+
+
+class EmulatedStand:
+    """The emulated bench; in virtual time it looks when asked, in real time in a thread."""
+
+    emulated = True
+
+    def __init__(self, bench: Bench | RealTimeBench, settings: RigSettings, view: View, keep: Kept | None) -> None:
+        self._bench, self._settings, self._view, self._keep = bench, settings, view, keep
+        self.transport: Transport = bench.transport
+        self._eye: Eye | None = None
+
+    def confirm(self) -> None:
+        """Nobody is near."""
+
+    def eye(self) -> Eye:
+        """The rendered camera with a fresh tracker."""
+        if self._eye is not None:
+            self._eye.close()
+        kind = ThreadedEye if isinstance(self._bench, RealTimeBench) else InlineEye
+        tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
+        self._eye = kind(self._bench.camera, tracker, self._keep)
+        return self._eye
+
+    def face(self, direction: str, patience: Patience) -> None:
+        """Turn the bench."""
+        self._bench.face(direction)
+
+    def begin(self, start: float, disturbances: Disturbances) -> None:
+        """Disturbances and faults count from here."""
+        self._bench.begin(start, disturbances)
+
+    def truth(self, since: float) -> list[list[float]]:
+        """What the emulated wrist did since then."""
+        truth = self._bench.truth(since)
+        rows = zip(truth.time - since, truth.theta, truth.theta.sum(axis=1), truth.pull, strict=True)
+        return [[float(time), *theta.tolist(), float(total), *pull.tolist()] for time, theta, total, pull in rows]
+
+    def close(self) -> None:
+        """End the eye and the bench."""
+        if self._eye is not None:
+            self._eye.close()
+        self._bench.close()
+
+
+class RealStand:
+    """A real board and camera; the operator turns the wrist. Raises PortUnusable and CameraError."""
+
+    emulated = False
+
+    def __init__(self, settings: RigSettings, view: View, keep: Kept | None, ask: Ask) -> None:
+        self._settings, self._view, self._keep, self._ask = settings, view, keep, ask
+        self.transport: Transport = open_transport(settings.port, settings.baud)
+        try:
+            self._camera = DeviceCamera(settings.camera, settings.device)
+        except BaseException:
+            self.transport.close()
+            raise
+        self._eye: Eye | None = None
+
+    def confirm(self) -> None:
+        """Ask."""
+        self._ask(BEFORE_MOTION)
+
+    def eye(self) -> Eye:
+        """The camera with a fresh tracker."""
+        if self._eye is not None:
+            self._eye.close()
+        tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
+        self._eye = ThreadedEye(self._camera, tracker, self._keep)
+        return self._eye
+
+    def face(self, direction: str, patience: Patience) -> None:
+        """Ask the operator to turn the wrist, while the board's link is kept alive."""
+        what = f"Set the wrist up so that it bends toward {direction} in the camera's picture, both markers in view."
+        with ThreadPoolExecutor(1) as person:
+            answer = person.submit(self._ask, what)
+            while not answer.done():
+                patience.wait(_PULSE)
+            answer.result()
+
+    def begin(self, start: float, disturbances: Disturbances) -> None:
+        """Nobody disturbs a real wrist but a person."""
+
+    def truth(self, since: float) -> list[list[float]]:
+        """Nobody knows."""
+        return []
+
+    def close(self) -> None:
+        """Give back camera and port."""
+        if self._eye is not None:
+            self._eye.close()
+        self._camera.close()
+        self.transport.close()
+
+
+def open_stand(
+    settings: RigSettings, wrist: WristParameters, seed: int, view: View, ask: Ask, keep: Kept | None = None
+) -> EmulatedStand | RealStand:
+    """The stand of these settings. Raises BoardError and CameraError."""
+    if settings.port is not None:
+        return RealStand(settings, view, keep, ask)
+    build = connect if settings.real_time else Bench
+    return EmulatedStand(build(settings.bench, wrist, seed, settings.markers), settings, view, keep)

@@ -1,0 +1,133 @@
+"""The controller on hardware: the same compiled law, allocation and observer as in simulation, tick by tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.plant import Actuator, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, Controller, now_of, wrist_of
+from wristctl.control.response import respond
+from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
+from wristctl.lanes.types import LANES
+from wristctl.simulation.actuator import drive_of
+from wristctl.simulation.observer import expect, fuse, observer_of
+from wristctl.wrist.allocation import TENDONS_PER_SIDE, torque_of
+from wristctl.wrist.segments import load_segments, segments
+
+Array = NDArray[np.float64]
+
+REMEMBERED = 256
+"""Ticks that a frame may be late."""
+
+
+class Estimate(NamedTuple):
+    """What the observer makes of frames and motion: angle [rad], its rate [rad/s], load torque [N m]."""
+
+    theta: float
+    rate: float
+    load: float
+
+
+class Answer(NamedTuple):
+    """What the law wants and what the tendons are told: torques [N m], tensions of one tendon of each side [N]."""
+
+    torque_wanted: float
+    torque: float
+    plus: float
+    minus: float
+    saturated: bool
+
+
+class Steering:
+    """Observer and law of one bending plane. Ticks are numbered from 0, `period` [s] apart."""
+
+    def __init__(
+        self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float
+    ) -> None:
+        self._drive = drive_of(actuator)
+        self._model = to_blocks(segments(wrist, 1)[None])[0]
+        self._bounds = np.repeat([[wrist.pretension], [wrist.tension_limit]], LANES, axis=1) * TENDONS_PER_SIDE
+        self._observer = observer_of(sensor, self._drive, wrist, period, REMEMBERED, theta)
+        self._signals, self._target, self._found = (np.zeros((rows, LANES)) for rows in (len(NOW), 3, 6))
+        self._period = period
+        self._law: Any = None
+        self._gains = self._memory = np.zeros((1, LANES))
+        self.tick = 0
+
+    @property
+    def estimate(self) -> Estimate:
+        """As of the present tick."""
+        theta, rate, load = self._observer.now[:, 0]
+        return Estimate(float(theta), float(rate), float(load))
+
+    def use(self, controller: Controller, gains: Sequence[float]) -> None:
+        """Take up a law, its memory empty."""
+        self._law = controller.compiled
+        self._gains = np.repeat(np.array([*gains, 0.0])[:, None], LANES, axis=1)
+        self._memory = np.zeros((max(1, controller.memory), LANES))
+
+    def see(self, theta: float, captured: float) -> bool:
+        """Fuse an angle [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come."""
+        tick = math.floor(captured / self._period)
+        if not max(int(self._observer.at[0]), self.tick - REMEMBERED + 1) <= tick <= self.tick:
+            return False
+        since = captured - tick * self._period
+        _fuse(self._observer, self._drive, self._model, tick, since, self.tick, theta, self._period)
+        return True
+
+    def respond(self, theta_ref: float, rate_ref: float, acceleration_ref: float) -> Answer:
+        """The law's answer to this reference at the present estimate."""
+        self._target[:] = [[theta_ref], [rate_ref], [acceleration_ref]]
+        _respond(
+            self._law, self._model, self._bounds, self._gains, self._memory, self._signals, self._target,
+            self._observer.now, self._period, self._found,
+        )  # fmt: skip
+        wanted, torque, plus, minus, low, high = map(float, self._found[:, 0])
+        return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
+
+    def expect(self, reeled_plus: float, reeled_minus: float) -> None:
+        """Go on to the next tick, with the sides reeled in by so much [m] until then."""
+        _expect(self._observer, self._drive, self._model, self.tick, reeled_plus, reeled_minus, self._period)
+        self.tick += 1
+
+
+@compiled
+def _respond(
+    law: Any, model: Any, bounds: Any, gains: Any, memory: Any, signals: Any, target: Any, now: Any, period: float,
+    found: Any,
+) -> None:  # fmt: skip
+    known, x, bound, row = load_segments(rows_of(model)), rows_of(now), rows_of(bounds), rows_of(found)
+    wanted, low, high, plus, minus = respond(
+        law, now_of(signals), rows_of(signals), wrist_of(model), known, rows_of(gains), rows_of(memory),
+        x[0], x[1], rows_of(target), 0.0, bound[0], bound[1], period,
+    )  # fmt: skip
+    row[0] = wanted
+    row[1] = torque_of(x[0], known, plus, minus)
+    row[2] = plus
+    row[3] = minus
+    row[4] = low
+    row[5] = high
+
+
+@compiled
+def _fuse(
+    observer: Any, drive: Any, model: Any, captured: int, since: float, tick: int, theta: float, h: float
+) -> None:
+    known = load_segments(rows_of(model))
+    zero = 0.0 * known.length
+    fuse(observer, drive, known, captured, since, tick, theta + zero, 1.0 + zero, h)
+
+
+@compiled
+def _expect(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
+    known = load_segments(rows_of(model))
+    zero = 0.0 * known.length
+    expect(observer, drive, known, tick, plus + zero, minus + zero, h)

@@ -1,0 +1,31 @@
+"""The same trial in simulation: loop, reference, push and controller of a trial, without board and camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from wristctl.config.control import SimulateSettings
+from wristctl.config.plant import Disturbances
+from wristctl.config.study import Study
+from wristctl.hardware.trial.trials import Trial
+from wristctl.simulation.simulate import Simulation, simulate
+from wristctl.wrist.directions import DIRECTIONS
+from wristctl.wrist.kinematics import Inverse
+
+
+def twin(
+    study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None
+) -> Simulation:
+    """Simulate a trial of the study's hw-run section."""
+    settings = study.hw_run
+    row = settings.rows[trial.row]
+    push = settings.push.model_copy(update={"force": -DIRECTIONS[trial.direction].sign * trial.push})
+    chosen = SimulateSettings(
+        controller=row.controller,
+        gains=row.gains,
+        loop=settings.loop.model_copy(update={"disturbances": Disturbances(push=push)}),
+        reference=settings.reference,
+        direction=trial.direction,
+        horizon=settings.horizon,
+    )
+    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned)

@@ -1,0 +1,129 @@
+"""Figures of trials as in the paper: desired and obtained angle, error, in four directions, with and without a push."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from wristctl.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    figure,
+    legend_below,
+    line,
+    title,
+)
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
+"""In the paper's order."""
+
+_BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
+_SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
+_SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
+
+
+@dataclass(frozen=True)
+class Course:
+    """One trial over time, T samples, as logged; SI units."""
+
+    direction: str
+    label: str
+    """controller/gains"""
+    repetition: int
+    time: Array
+    theta: Array
+    theta_ref: Array
+    theta_desired: Array
+    tension: Array
+    """(T, 2), per tendon of the side that the direction lies on and of the other"""
+    simulated: tuple[Array, Array, Array] | None = None
+    """Time, angle and error of the same trial in simulation."""
+    push: tuple[float, float] | None = None
+    """When the push began and ended [s]."""
+
+
+def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure:
+    """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
+    made, panels = _panels(courses)
+    for course in courses:
+        panel = panels[course.direction]
+        if course.simulated is not None and course.repetition == 0:
+            _simulated(panel, course, course.simulated[1])
+        panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
+        panel.plot(course.time, np.degrees(course.theta_desired), label="desired", **_BAND)
+    return _finished(made, panels, courses, heading, "bending angle [deg]")
+
+
+def errors(courses: Sequence[Course], heading: str = "") -> Figure:
+    """Error e = theta - theta_ref [deg] over time [s], one panel for each direction."""
+    made, panels = _panels(courses, sharey=True)
+    for course in courses:
+        panel = panels[course.direction]
+        if course.simulated is not None and course.repetition == 0:
+            _simulated(panel, course, course.simulated[2])
+        panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
+        panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    return _finished(made, panels, courses, heading, "error [deg]")
+
+
+def tensions(courses: Sequence[Course], heading: str = "") -> Figure:
+    """Commanded tension [N] of each tendon of both sides over time [s], one panel for each direction."""
+    made, panels = _panels(courses, sharey=True)
+    for course in courses:
+        for (side, colour), tension in zip(_SIDES.items(), course.tension.T, strict=True):
+            panels[course.direction].plot(course.time, tension, color=colour, linewidth=1.0, label=side)
+    return _finished(made, panels, courses, heading, "tension [N]")
+
+
+def lateness(late: Array, period: float) -> Figure:
+    """How many ticks began how late [ms]."""
+    made, ((axes,),) = figure(height=2.6)
+    axes.hist(1e3 * late, bins=np.linspace(0.0, 1e3 * max(period, float(late.max())), 60).tolist(), color=BLUE)
+    axes.set_yscale("log")
+    axes.set(xlabel="from due to begun [ms]", ylabel="ticks")
+    return made
+
+
+def _simulated(panel: Axes, course: Course, angle: Array) -> None:
+    assert course.simulated is not None
+    colour = line(course.label)["color"]
+    label = f"{course.label}, simulated"
+    panel.plot(course.simulated[0], np.degrees(angle), color=colour, label=label, **_SIMULATED)
+
+
+def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
+    names = [name for name in DIRECTIONS if any(course.direction == name for course in courses)]
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    made, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
+    for each in axes.flat[len(names) :]:
+        each.set_visible(False)
+    return made, dict(zip(names, axes.ravel().tolist(), strict=False))
+
+
+def _finished(
+    made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str
+) -> Figure:
+    for name, panel in panels.items():
+        title(panel, name)
+        pushes = {course.push for course in courses if course.direction == name and course.push is not None}
+        for start, end in pushes:
+            panel.axvspan(start, end, color=LIGHT, zorder=0.5, label="push")
+    for panel in list(panels.values())[-2:]:
+        panel.set_xlabel("time [s]")
+    made.suptitle(heading, fontsize=10.0)
+    made.supylabel(ylabel, fontsize=10.0)
+    legend_below(made)
+    return made
