@@ -67,7 +67,6 @@ def identify(session: Session) -> list[Table]:
 
 def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
     """The trials of all runs, and where the search for the parameters begins: at what the first run's study says."""
-    from wristctl.config.plant import Actuator
     from wristctl.identification.fit import Problem
     from wristctl.identification.trials import trials_of
     from wristctl.identification.unknowns import check_fixed
@@ -77,7 +76,7 @@ def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
     check_fixed(settings.fix)
     for run in inputs.values():
         config = run.config
-        actuator: Actuator = config.hw_run.actuator if hasattr(config, "hw_run") else Actuator()
+        actuator = config.hw_run.actuator
         wrist, tables = config.wrist, [run.data(name) for name in ("log", "frames", "trials")]
         trials += trials_of(run.id, wrist, actuator.step_length, settings.step, *tables)
         own = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}

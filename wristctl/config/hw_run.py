@@ -96,6 +96,7 @@ class HwRunSettings(RigSettings):
     control_period: float = quantity(5e-3, "s", "time between two evaluations of the law", "assumed", ge=2e-3, le=0.05)
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
+    from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames as a video, annotated")
@@ -112,8 +113,8 @@ class HwRunSettings(RigSettings):
 
     @property
     def loop(self) -> Loop:
-        """The same loop in simulation: the emulated wrist's plant, or where the wrist is real the known one."""
-        emulated = self.port is None
+        """The same loop in simulation: the emulated wrist's plant, or the known one of a real or an identified wrist."""
+        emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,
             plant=self.bench.plant if emulated else Plant(),
