@@ -79,9 +79,7 @@ class HwRunSettings(RigSettings):
     """The paper's experiment: directions x repetitions, with and without a push, for each row of controllers."""
 
     rows: tuple[Row, ...] = choice(
-        (Row(controller="smc-tracking", gains="stepper"), Row(controller="smc", gains="stepper")),
-        "controllers and gains: the better one and the paper's",
-        min_length=1,
+        (Row(controller="smc-tracking", gains="stepper"),), "controllers and gains", min_length=1
     )
     directions: tuple[Direction, ...] = choice(
         ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1
