@@ -113,7 +113,7 @@ class HwRunSettings(RigSettings):
 
     @property
     def loop(self) -> Loop:
-        """The same loop in simulation: the emulated wrist's plant, or the known one of a real or an identified wrist."""
+        """The same loop in simulation: the emulated wrist's plant, or, of a real or identified wrist, the known one."""
         emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,
