@@ -17,7 +17,7 @@ run: .venv/run
 	printf '\nRuns:\n%s\n%s\n%s\n%s\n' "$$data" "$$network" "$$tuned" "$$made"
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --maxprocesses 4
 
 lint: .venv/dev
 	$(BIN)/ruff check .
@@ -26,6 +26,8 @@ lint: .venv/dev
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
 	$(BIN)/python benchmarks/board.py
+	$(BIN)/python benchmarks/emulated_bench.py
+	$(BIN)/python benchmarks/vision.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:
@@ -40,9 +42,9 @@ test-firmware: .venv/dev firmware
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
 
-# Runs killed at 50 random moments, 10,000 runs listed.
+# Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/runs/test_query.py
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/cli/test_replay.py tests/runs/test_query.py
 
 venv: .venv/dev
 

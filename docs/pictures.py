@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+
+import cv2
+import numpy as np
 
 from wristctl.benchmark.compare import Result, compare
 from wristctl.benchmark.paper import T2
 from wristctl.config.load import load_study
+from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.vision.annotate import annotate
+from wristctl.hardware.vision.camera import Frame
+from wristctl.hardware.vision.marker import Tracker
+from wristctl.hardware.vision.scene import Scene
 from wristctl.report.loop_figures import errors
 from wristctl.report.wrist_drawing import directions
 from wristctl.runs.formats import write_figure
@@ -38,7 +48,16 @@ def table(results: list[Result]) -> str:
     return "\n".join(lines)
 
 
+def camera() -> None:
+    """What the rendered camera sees of the wrist bent by 30 deg, with the tracker's markers and angle drawn in."""
+    scene = Scene(SceneSettings(), WristParameters())
+    image = scene.render(np.full((1, 4), math.radians(30.0) / 4), np.random.default_rng(0))
+    seen = Tracker(Markers(), scene.view, Gates()).see(Frame(image, 0.0, 0))
+    cv2.imwrite(str(HERE / "images" / "camera.jpg"), annotate(image, seen), [cv2.IMWRITE_JPEG_QUALITY, 88])
+
+
 def main() -> None:
+    camera()
     study = load_study([], [f"rows={ROWS}", "inverses=[none]"], "compare")
     results = compare(study)
     shown = ("smc/exchanged", "smc/initial", "pid/printed", "computed-torque/default")

@@ -3,6 +3,30 @@
 from __future__ import annotations
 
 import signal
+from typing import Any
+
+import pytest
+from hypothesis import settings
 
 # A shell starts background jobs with Ctrl-C ignored, and children inherit that: tests that interrupt need it back.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# How long an example takes depends on what else the machine does.
+settings.register_profile("wristctl", deadline=None)
+settings.load_profile("wristctl")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Over several processes (`pytest -n 2`) each file goes to one, so that its fixtures are made once.
+
+    The boards all go to the same: one process compiles their emulator, and what runs in real time has no rival there.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            board = nodeid.startswith(("tests/hardware", "tests/firmware"))
+            return "board" if board else nodeid.partition("::")[0]
+
+    return ByFile(config, log)

@@ -1,8 +1,9 @@
-"""The command line as a real process."""
+"""The command line, in this process and in one of its own."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -10,38 +11,36 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.probe import COMMANDS
+from wristctl.cli import app
 from wristctl.cli.app import main
 
 ROOT = Path(__file__).parents[2]
-WRISTCTL = ["-c", "from wristctl.cli.app import main; main()"]
-PROBE = [str(Path(__file__).parent / "probe.py")]
+PROBE = ["-m", "tests.cli.probe"]
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
 Call = Callable[..., tuple[int, str, str]]
 
 
-def _environment(probe: str) -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(ROOT), "PROBE": probe, "COLUMNS": "80", "TERM": "xterm"}
-
-
 @pytest.fixture
-def wristctl(tmp_path: Path) -> Command:
+def wristctl(call: Call) -> Command:
     """Runs `wristctl ...` in an empty folder."""
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, *WRISTCTL, *arguments]
-        return subprocess.run(command, cwd=tmp_path, env=_environment(""), capture_output=True, text=True)
+        return subprocess.CompletedProcess(arguments, *call(*arguments))
 
     return run
 
 
 @pytest.fixture
-def probe(tmp_path: Path) -> Command:
+def probe(call: Call, monkeypatch: pytest.MonkeyPatch) -> Command:
     """Runs the stand-in for `wristctl gen-data` and `train` in an empty folder; it behaves as `action` says."""
 
     def run(*arguments: str, action: str = "") -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, *PROBE, *arguments]
-        return subprocess.run(command, cwd=tmp_path, env=_environment(action), capture_output=True, text=True)
+        with monkeypatch.context() as during:
+            during.setenv("PROBE", action)
+            during.setattr(app, "COMMANDS", COMMANDS)
+            return subprocess.CompletedProcess(arguments, *call(*arguments))
 
     return run
 
@@ -53,7 +52,8 @@ def begin(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
 
     def start(*arguments: str, **streams: int) -> subprocess.Popen[bytes]:
         command = [sys.executable, *PROBE, *arguments]
-        child = subprocess.Popen(command, cwd=tmp_path, env=_environment("sleep"), **streams)  # type: ignore[call-overload]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PROBE": "sleep", "COLUMNS": "80", "TERM": "xterm"}
+        child = subprocess.Popen(command, cwd=tmp_path, env=environment, **streams)  # type: ignore[call-overload]
         started.append(child)
         return child
 
@@ -67,6 +67,7 @@ def begin(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
 def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
     """Runs `wristctl ...` in this process, in an empty folder: exit code, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["wristctl", *arguments])
@@ -74,5 +75,23 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
             main()
         out, err = capsys.readouterr()
         return int(ended.value.code or 0), out, err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Runs `wristctl ...` for a whole module, each in a folder that goes on from an earlier one; gives the folder."""
+
+    def run(*arguments: str, after: Path | None = None) -> Path:
+        folder = tmp_path_factory.mktemp(arguments[0])
+        if after:
+            shutil.copytree(after / "results", folder / "results")
+        with pytest.MonkeyPatch.context() as during, pytest.raises(SystemExit) as ended:
+            during.chdir(folder)
+            during.setattr(sys, "argv", ["wristctl", *arguments])
+            main()
+        assert ended.value.code == 0
+        return folder
 
     return run

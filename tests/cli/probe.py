@@ -38,17 +38,18 @@ def train(session: Session) -> None:
     session.run.metric("samples", len(session.inputs["data"].data("samples")))
 
 
-commands = {
+_PROBES = {
     "gen-data": study_command(
         "gen-data", work=gen_data, plan=lambda study, inputs: f"{study.gen_data.samples} samples"
     ),
     "train": study_command("train", work=train, inputs=(Input("data", "gen-data"),), shortcuts=("epochs",)),
 }
+for _name, _app in _PROBES.items():
+    sys.modules[f"probe-{_name}"] = SimpleNamespace(app=_app)  # type: ignore[assignment]
+COMMANDS = {name: (f"probe-{name}", "Probe", name) for name in _PROBES}
 
 
 if __name__ == "__main__":
     application.COMMANDS.clear()
-    for name, probe in commands.items():
-        sys.modules[f"probe-{name}"] = SimpleNamespace(app=probe)  # type: ignore[assignment]
-        application.COMMANDS[name] = (f"probe-{name}", "Probe", name)
+    application.COMMANDS.update(COMMANDS)
     application.main()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from wristctl.runs import list_runs, open_run
 
 LEAVES = ("hidden=[16,8]", "activation=tanh", "learning_rate=0.01", "workers=1", "epochs=12")
 QUICK = tuple(word for leaf in LEAVES for word in ("--set", leaf))
+TRAIN = ("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
 
 
 def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
@@ -28,13 +30,29 @@ def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
     assert {"coverage.png", "coverage.svg"} == {file.name for file in (run.path / "figures").iterdir()}
 
 
-def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(call) -> None:
-    call("gen-data", "--samples", "400")
-    code, out, _ = call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2", "--json")
-    run, result = open_run("latest:train"), json.loads(out)
+@pytest.fixture(scope="module")
+def sampled(made) -> Path:
+    """A folder with a gen-data run."""
+    return made("gen-data", "--samples", "400")
+
+
+@pytest.fixture(scope="module")
+def trained(made, sampled: Path) -> Path:
+    """The same with a train run."""
+    return made(*TRAIN, after=sampled)
+
+
+@pytest.fixture
+def data(call, sampled: Path, tmp_path: Path) -> str:
+    """The id of the gen-data run, in the folder of this test."""
+    shutil.copytree(sampled / "results", tmp_path / "results")
+    return open_run("latest:gen-data").id
+
+
+def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(trained: Path) -> None:
+    run = open_run("latest:train", trained / "results")
     network, metrics = load_network(run.file("models/network.safetensors")), run.metrics
     predictions = run.data("predictions")
-    assert code == 0 and result["id"] == run.id
     np.testing.assert_allclose(
         network.angle(predictions[["x", "y"]].to_numpy()), predictions["theta_network"], atol=1e-13
     )
@@ -45,20 +63,20 @@ def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(cal
     assert metrics["exact_max_error_deg"]["value"] < 1e-13
     assert metrics["gradient_norm"]["value"] > 0.0
     assert len(run.data("curves")) == 2 * 12
-    data = open_run("latest:gen-data")
-    assert run.manifest.inputs[0].run == data.id
+    assert run.manifest.inputs[0].run == open_run("latest:gen-data", trained / "results").id
     record = training_record(run.file("models/network.safetensors"))
     assert record["seed"] == 0 and record["settings"]["epochs"] == 12
 
 
-def test_the_same_seed_gives_the_same_results(call) -> None:
-    hashes = []
-    for seed in ("4", "4", "5"):
-        call("gen-data", "--samples", "100", "--seed", seed)
-        call("train", "--data", "latest:gen-data", *QUICK, "--epochs", "2", "--seed", seed)
-        hashes.append((open_run("latest:gen-data").result_hash, open_run("latest:train").result_hash))
-    assert hashes[0] == hashes[1]
-    assert hashes[0][0] != hashes[2][0] and hashes[0][1] != hashes[2][1]
+def test_the_same_seed_gives_the_same_results(call, data: str, trained: Path) -> None:
+    def hashes(seed: str) -> tuple[str, ...]:
+        sampled = call("gen-data", "--samples", "400", "--seed", seed, "--json")
+        trained = call(*TRAIN, "--data", data, "--seed", seed, "--json")
+        return tuple(json.loads(out)["result_sha256"] for _, out, _ in (sampled, trained))
+
+    before = tuple(open_run(f"latest:{kind}", trained / "results").result_hash for kind in ("gen-data", "train"))
+    same, other = hashes("0"), hashes("5")
+    assert same == before and other[0] != before[0] and other[1] != before[1]
 
 
 def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,8 +94,9 @@ def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "train_one", interrupted)
 
 
-def test_interrupted_training_keeps_the_network_found_so_far(call, monkeypatch: pytest.MonkeyPatch) -> None:
-    call("gen-data", "--samples", "100")
+def test_interrupted_training_keeps_the_network_found_so_far(
+    call, data: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     interrupt_at(3, monkeypatch)
     code, _, _ = call("train", "--data", "latest:gen-data", *QUICK)
     (run,) = (run for run in list_runs(Path("results")) if run.kind == "train")
@@ -86,19 +105,18 @@ def test_interrupted_training_keeps_the_network_found_so_far(call, monkeypatch: 
     run.check()
 
 
-def test_a_training_that_was_stopped_resumes_to_the_same_result(call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_training_that_was_stopped_resumes_to_the_same_result(
+    call, data: str, trained: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(training, "SAVE_EVERY", 0.0)
-    call("gen-data", "--samples", "100")
     with monkeypatch.context() as stopping:
         interrupt_at(5, stopping)
-        call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
+        call(*TRAIN)
     (stopped,) = (run for run in list_runs(Path("results")) if run.kind == "train")
     assert (stopped.path / "checkpoints" / "network-0.pt").is_file()
-    code, _, _ = call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2", "--resume", stopped.id)
-    resumed = open_run("latest:train")
-    call("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
-    whole = open_run("latest:train")
-    assert code == 0 and resumed.id != whole.id and resumed.result_hash == whole.result_hash
+    code, _, _ = call(*TRAIN, "--resume", stopped.id)
+    resumed, whole = open_run("latest:train"), open_run("latest:train", trained / "results")
+    assert code == 0 and resumed.result_hash == whole.result_hash
     assert not (resumed.path / "checkpoints").exists()
     code, _, err = call("train", "--data", "latest:gen-data", *QUICK, "--seed", "9", "--resume", stopped.id)
     assert code == 2 and "other settings, data or seed" in err
@@ -162,13 +180,12 @@ def test_samples_of_an_earlier_run_are_its_course(call) -> None:
     assert set(zip(table["x"], table["y"], table["theta"], strict=True)) <= known
 
 
-def test_dry_runs_write_nothing(call, tmp_path: Path) -> None:
-    code, out, _ = call("gen-data", "--dry-run")
-    assert code == 0 and "1000 samples" in out and not list(tmp_path.iterdir())
-    call("gen-data", "--samples", "100")
+def test_dry_runs_write_nothing(call, data: str, tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
     code, out, _ = call("train", "--data", "latest:gen-data", "--dry-run")
-    assert code == 0 and "75 samples to train on" in out and sorted(tmp_path.rglob("*")) == before
+    assert code == 0 and "300 samples to train on" in out
+    code, out, _ = call("gen-data", "--dry-run")
+    assert code == 0 and "1000 samples" in out and sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize(
@@ -183,14 +200,13 @@ def test_dry_runs_write_nothing(call, tmp_path: Path) -> None:
         (("train", "--resume", "latest:gen-data"), "train run is needed"),
         (("train", "--search", "--set", "rows=[{name: a}]"), "not both"),
         (("train", "--data", "latest:gen-data", "--set", "activation=gelu"), "activation"),
-        (("train", "--data", "latest:gen-data", "--set", "train_share=0.99"), "train_share"),
+        (("train", "--data", "latest:gen-data", "--set", "train_share=0.999"), "train_share"),
         (("train", "--data", "latest:gen-data", "--set", "hidden=[0]"), "hidden"),
     ],
 )
 def test_what_the_user_got_wrong_is_said_in_one_line_and_leaves_no_run(
-    call, tmp_path: Path, arguments, message
+    call, data: str, tmp_path: Path, arguments, message
 ) -> None:
-    call("gen-data", "--samples", "100")
     code, _, err = call(*arguments)
     assert code == 2 and len(err.splitlines()) == 1 and message in err
     assert len(list((tmp_path / "results").iterdir())) == 1

@@ -67,6 +67,35 @@ def test_a_repetition_is_identical_to_the_byte(wristctl: Command, data: str) -> 
     assert set(each.values()) == {"identical"} and {"data/samples.npz", "figures/coverage.svg"} <= set(each)
 
 
+LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.4")
+ROW = "rows=[{controller: smc, gains: tuned}, {controller: feedforward, gains: default}]"
+SEARCH = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
+CHAIN = (
+    ("gen-data", "--source", "plant", "--samples", "60"),
+    ("simulate", "--set", "horizon=0.3"),
+    ("gen-data", "--source", "run", "--run", "latest:simulate", "--samples", "50"),
+    ("train", "--search", "--epochs", "3", "--set", SEARCH, "--set", "gen-data.samples=80"),
+    ("train", "--epochs", "3", "--set", "hidden=[8]", "--set", "gen-data.samples=80"),
+    ("tune", *LOOP, "--candidates", "4", "--iterations", "2", "--set", "scenarios=[{loop: fast}]"),
+    (
+        "compare", *LOOP, "--network", "latest:train", "--tuned", "latest:tune", "--set", ROW,
+        "--set", "references=[{kind: step}]",
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.skipif(not os.environ.get("WRISTCTL_THOROUGH"), reason="long: make test-trust")
+def test_a_run_of_every_kind_is_repeated_to_the_byte(wristctl: Command) -> None:
+    for typed in CHAIN:
+        status, out = wristctl(*typed, "-q")
+        assert status == 0, typed
+        run = Path(out.splitlines()[-1]).name
+        assert wristctl("runs", "verify", run)[0] == 0
+        status, found = _verdict(wristctl, run)
+        differing = [each for each in found["files"] if each["verdict"] not in ("identical", "volatile")]
+        assert status == 0 and not differing, (typed, found["causes"], differing)
+
+
 def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
     status, found = _verdict(wristctl, data, "--set", "samples=11")
     assert status == 3 and found["causes"] == ["config: gen-data.samples: 10 -> 11"]

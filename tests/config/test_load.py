@@ -8,6 +8,8 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
+from wristctl.config.loop import LOOPS, Loop
+from wristctl.config.plant import Actuator, Plant
 
 ROOT = Path(__file__).parents[2]
 
@@ -108,3 +110,20 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 def test_every_committed_experiment_is_valid(file: Path) -> None:
     if file.name != "claims.yaml":
         assert load_study([file]) != load_study([])
+
+
+def test_named_loops_are_all_there_are_and_a_built_in_one_keeps_what_is_not_given(tmp_path: Path) -> None:
+    soft = "loops: {soft: {plant: {stiffness_scale: 0.8}}, exact: {substeps: 2}, sampled: {}}"
+    file = _file(tmp_path, f"compare: {{{soft}}}")
+    overrides = ["loops.soft.substeps=3", "loops.sampled.actuator.level=lagged"]
+    loops = load_study([file], overrides, "compare").compare.loops
+    assert list(loops) == ["soft", "exact", "sampled"]
+    assert loops["soft"] == Loop(plant=Plant(stiffness_scale=0.8), substeps=3)
+    assert loops["exact"] == LOOPS["exact"].model_copy(update={"substeps": 2})
+    assert loops["sampled"] == LOOPS["sampled"].model_copy(update={"actuator": Actuator(level="lagged")})
+    assert load_study([], ["loops.exact.limits=true"], "tune").tune.loops == {
+        "exact": LOOPS["exact"].model_copy(update={"limits": True})
+    }
+    assert load_study([]).compare.loops == LOOPS
+    with pytest.raises(UserError, match="at least 1 item"):
+        load_study([], ["loops={}"], "compare")

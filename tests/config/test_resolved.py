@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.config.control import Row, SimulateSettings
+from wristctl.config.control import CompareSettings, Row, SimulateSettings
 from wristctl.config.load import load_study
+from wristctl.config.loop import Loop
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.section import Section
 from wristctl.config.strict_yaml import parse_yaml
@@ -36,10 +38,12 @@ def test_the_resolved_study_gives_the_same_study(command: str, tmp_path: Path) -
     assert resolved_yaml(again, command) == resolved_yaml(study, command)
 
 
+@settings(max_examples=500 if os.environ.get("WRISTCTL_THOROUGH") else 25)
 @given(st.text(max_size=30), st.dictionaries(st.text(max_size=8), st.floats(allow_nan=False, allow_infinity=False)))
 def test_any_text_survives_the_round_trip(text: str, gains: dict[str, float]) -> None:
-    settings = SimulateSettings(controller=text, gains=gains, network=text)
-    study = Study(simulate=settings, compare={"rows": (Row(controller=text, gains=gains),)})  # type: ignore[arg-type]
+    simulated = SimulateSettings(controller=text, gains=gains, network=text)
+    compared = CompareSettings(rows=(Row(controller=text, gains=gains),), loops={text: Loop()})
+    study = Study(simulate=simulated, compare=compared)
     assert _read_back(resolved_yaml(study, "simulate")).simulate == study.simulate
     assert _read_back(resolved_yaml(study, "compare")).compare == study.compare
 

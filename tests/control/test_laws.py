@@ -52,7 +52,7 @@ def inertia_and_load(theta: float, rate: float) -> tuple[float, float]:
 state = st.tuples(st.floats(-0.87, 0.87), st.floats(-5.0, 5.0), st.floats(-0.87, 0.87))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(state)
 def test_one_segment_model_of_the_laws_is_the_wrists(at: tuple[float, float, float]) -> None:
     theta, rate, _ = at
@@ -63,7 +63,7 @@ def test_one_segment_model_of_the_laws_is_the_wrists(at: tuple[float, float, flo
     assert to_rows(out[None], 1)[0] == pytest.approx(inertia_and_load(theta, rate), rel=1e-12, abs=1e-14)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(state, st.sampled_from(["printed", "exchanged", "initial"]))
 def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float], preset: str) -> None:
     """With an exact model sigma' = P1 rate + P2 theta'' = -P3 tanh(sigma) (E19-E21)."""
@@ -75,7 +75,7 @@ def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float],
     assert p1 * rate + p2 * (u - load) / inertia == pytest.approx(-p3 * np.tanh(sigma), rel=1e-9, abs=1e-8 * p3)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(state)
 def test_computed_torque_gives_the_linear_error_equation(at: tuple[float, float, float]) -> None:
     theta, rate, theta_ref = at
@@ -108,7 +108,7 @@ def test_pid_holds_its_integral_in_saturation_and_lets_it_unwind(side: float) ->
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(state, st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5), st.floats(-5.0, 5.0))
 def test_every_law_is_finite_for_any_state_and_gains_in_the_box(
     name: str, at: tuple[float, float, float], share: list[float], rate_ref: float

@@ -45,7 +45,7 @@ def test_firmware_makes_the_same_steps_on_both() -> None:
         bench = Bench(chip)
         bench.get_ready()
         reached = []
-        for _ in range(20):
+        for _ in range(8):
             goal = tuple(int(n) for n in rng.integers(-2000, 2000, 4))
             bench.do(Target(goal, tuple(int(n) for n in rng.integers(500, 10_000, 4))))  # type: ignore[arg-type]
             bench.wait_for_rest()

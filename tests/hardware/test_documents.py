@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from wristctl.config.bench import FAULTS
 from wristctl.hardware.dictionary import load
+from wristctl.hardware.vision.marker import MEANING
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
 FIRMWARE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware"
@@ -22,6 +24,18 @@ def test_each_fault_refusal_and_state_is_explained_in_the_tables_words(group: st
             continue
         words = [name, entry["meaning"], *([entry["fix"]] if "fix" in entry else [])]
         assert "| " + " | ".join(words) + " |" in text
+
+
+def test_every_fault_that_can_be_injected_is_explained_in_the_schemas_words() -> None:
+    text = (DOCUMENTS / "emulated-bench.md").read_text()
+    for kind, meaning in FAULTS.items():
+        assert f"| {kind} | {meaning} |" in text
+
+
+def test_each_verdict_on_a_frame_is_explained_in_the_trackers_words() -> None:
+    text = (DOCUMENTS / "camera.md").read_text()
+    for verdict, meaning in MEANING.items():
+        assert f"| {verdict} | {meaning} |" in text
 
 
 def test_wiring_names_the_pins_the_firmware_uses() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -12,16 +13,34 @@ from pathlib import Path
 
 import pytest
 
+from wristctl.cli.app import main
+
 ROOT = Path(__file__).parents[2]
 WRISTCTL = [sys.executable, "-c", "from wristctl.cli.app import main; main()", "hw"]
 BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "120"}
 
 Served = Callable[..., str]
+Typed = Callable[..., subprocess.CompletedProcess[str]]
 
 
-def hw(*arguments: str, typed: str = "") -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*WRISTCTL, *arguments], capture_output=True, text=True, env=ENVIRONMENT, input=typed)
+def hw_alone(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs `wristctl hw ...` in a process of its own."""
+    return subprocess.run([*WRISTCTL, *arguments], capture_output=True, text=True, env=ENVIRONMENT)
+
+
+@pytest.fixture
+def hw(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Typed:
+    """Runs `wristctl hw ...` in this process, with what a person types."""
+
+    def run(*arguments: str, typed: str = "") -> subprocess.CompletedProcess[str]:
+        monkeypatch.setattr(sys, "argv", ["wristctl", "hw", *arguments])
+        monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return subprocess.CompletedProcess(arguments, int(ended.value.code or 0), *capsys.readouterr())
+
+    return run
 
 
 @pytest.fixture
@@ -44,7 +63,7 @@ def emulate(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"]], ids=["pty", "tcp", "wrist"])
-def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, how: list[str]) -> None:
+def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, hw: Typed, how: list[str]) -> None:
     port = emulate(*how)
     done = hw("check", "--port", port, "--rounds", "20", "--json", "-q")
     assert done.returncode == 0, done.stderr
@@ -74,11 +93,11 @@ with Board(SerialTransport({port!r}, 250_000)) as board:
 """
     with subprocess.Popen([sys.executable, "-c", holder], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as mover:
         assert mover.stdout is not None and mover.stdout.readline() == "moving\n"
-        hw("stop", "--port", port)  # its answer may go to either program
+        hw_alone("stop", "--port", port)  # its answer may go to either program
         assert "ESTOP_COMMAND" in mover.stdout.readline()
 
 
-def test_an_axis_moves_only_after_a_typed_yes() -> None:
+def test_an_axis_moves_only_after_a_typed_yes(hw: Typed) -> None:
     told = [
         hw("check", "--port", "emulated", "--rounds", "1", "--wiring", "2", "--json", typed=typed)
         for typed in ("yes\n", "y\n", "")
@@ -88,23 +107,23 @@ def test_an_axis_moves_only_after_a_typed_yes() -> None:
     assert told[2].returncode in (3, 130)
 
 
-def test_without_a_board_check_says_how_to_go_on() -> None:
+def test_without_a_board_check_says_how_to_go_on(hw: Typed) -> None:
     done = hw("check", "--port", "/dev/no-such-port")
     assert done.returncode == 4 and done.stdout == ""
     assert done.stderr.startswith("error: host: there is no such port") and "hw ports" in done.stderr
 
 
-def test_ports_are_listed_for_people_and_programs() -> None:
+def test_ports_are_listed_for_people_and_programs(hw: Typed) -> None:
     assert hw("ports").returncode == 0
     assert json.loads(hw("ports", "--json").stdout)["schema"] == "wristctl.ports/1"
 
 
-def test_finding_a_board_that_was_not_unplugged_fails_and_says_so() -> None:
+def test_finding_a_board_that_was_not_unplugged_fails_and_says_so(hw: Typed) -> None:
     done = hw("ports", "--find", typed="\n")
     assert done.returncode == 4 and "no port went away" in done.stderr
 
 
-def test_flash_refuses_an_image_that_is_not_there() -> None:
+def test_flash_refuses_an_image_that_is_not_there(hw: Typed) -> None:
     done = hw("flash", "--port", "/dev/null", "--image", "none.hex")
     assert done.returncode == 2 and "none.hex" in done.stderr
 
@@ -114,7 +133,7 @@ def test_flash_writes_the_firmware_through_the_stock_boot_loader(emulate: Served
     empty = tmp_path / "empty.hex"
     empty.write_text(":00000001FF\n")
     port = emulate("--image", str(empty), "--boot-loader", str(BOOT_LOADER))
-    done = hw("flash", "--port", port)
+    done = hw_alone("flash", "--port", port)
     assert done.returncode == 0, done.stderr
     assert "written, verified and answering" in done.stdout
     assert "bytes of flash verified" in done.stderr
@@ -125,6 +144,6 @@ def test_a_compiled_emulator_starts_within_a_second_of_processor_time() -> None:
     code = f"import time; {start}; print(time.process_time())"
     took = [
         float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT).stdout)
-        for _ in range(3)
+        for _ in range(2)
     ]
-    assert min(took[1:]) < 1.0
+    assert min(took) < 1.0

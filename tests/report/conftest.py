@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,12 @@ def course(label: str, tau: float = 0.3, diverges: bool = False, network_error: 
     return Trajectory(label, time, theta, segments, rate, reference, wanted, *tips, 2.0 * torque, torque, tension)
 
 
+def late() -> Trajectory:
+    """The same behind a camera and slow motors."""
+    one = course("smc/exchanged")
+    return replace(one, seen=np.roll(one.theta, 3), acting=0.5 * one.tension)
+
+
 def result(row: str, reference: str, rmse: float, failed: bool = False) -> Result:
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
@@ -70,6 +77,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "errors": lambda: errors([course("smc/printed"), course("smc/tuned", 0.1)], "SMC"),
     "errors, log": lambda: errors([course("pid/printed"), course("pid/tuned", 0.1)], log=True),
     "tensions": lambda: tensions(course("smc/exchanged")),
+    "angles, late": lambda: angles([late()]),
+    "tensions, late": lambda: tensions(late()),
     "angle grid": lambda: angle_grid(results(), "Loop default"),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
     "chattering": lambda: chattering_bars(results(), "Loop default"),

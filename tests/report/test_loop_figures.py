@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,6 +66,23 @@ def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(co
     np.testing.assert_array_equal(plus.lines[0].get_ydata(), one.tension[:, 0])
     np.testing.assert_array_equal(minus.lines[0].get_ydata(), one.tension[:, 1])
     np.testing.assert_array_equal(line(torque, "wanted by the law").get_ydata(), one.torque_wanted)
-    np.testing.assert_array_equal(line(torque, "given by the tendons").get_ydata(), one.torque)
+    np.testing.assert_array_equal(line(torque, "of the commanded tensions").get_ydata(), one.torque)
     np.testing.assert_array_equal(close.lines[0].get_ydata(), one.tension[-20:, 0])
     assert np.asarray(close.lines[0].get_xdata())[0] == pytest.approx(1e3 * (one.time[-20] - one.time[-1]))
+    assert labels(plus) == ["commanded"]
+
+
+def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(course: Course) -> None:
+    one = course("smc/exchanged")
+    late = replace(one, seen=np.roll(one.theta, 3), acting=0.5 * one.tension)
+    (axes,) = angles([late]).axes
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(late.seen))
+    (axes,) = errors([late]).axes
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), late.seen - late.theta_ref)
+    plus, _, minus, *_ = tensions(late).axes
+    for side, drawn in enumerate((plus, minus)):
+        np.testing.assert_array_equal(line(drawn, "commanded").get_ydata(), late.tension[:, side])
+        np.testing.assert_array_equal(line(drawn, "acting").get_ydata(), late.acting[:, side])
+    same = replace(one, seen=one.theta, acting=one.tension)
+    assert labels(angles([same]).axes[0]) == ["smc/exchanged", "desired"]
+    assert "acting" not in labels(tensions(same).axes[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.runs import Run, list_runs, open_run, require, start_run
+from wristctl.runs.index import INDEX, indexed
 
 Make = Callable[..., Run]
 
@@ -28,6 +30,28 @@ def test_latest_passes_over_runs_that_did_not_end_well(make: Make, results: Path
     with pytest.raises(RuntimeError), start_run("gen-data", Study(), "", results):
         raise RuntimeError
     assert open_run("latest:gen-data", results).path == good.path
+
+
+def test_the_latest_is_right_whatever_the_index_says(make: Make, results: Path) -> None:
+    older, newer = make(label="older"), make(label="newer")
+
+    def latest() -> str:
+        return open_run("latest:gen-data", results).id
+
+    assert latest() == newer.id and not (results / INDEX).exists(), "to look writes nothing"
+    indexed(results)
+    stale = (results / INDEX).read_bytes()
+    newest = make(label="newest")
+    assert latest() == newest.id
+    shutil.rmtree(newest.path)
+    assert latest() == newer.id
+    for content in (stale, b"{", b'{"schema": "wristctl.index/1", "fields": [], "runs": 3}', None):
+        (results / INDEX).unlink() if content is None else (results / INDEX).write_bytes(content)
+        assert latest() == newer.id
+    (newer.path / "SHA256SUMS").unlink()
+    assert latest() == older.id
+    (results / "tags.json").write_text("damaged")
+    assert latest() == older.id
 
 
 def test_what_cannot_be_found_is_named_with_a_cure(make: Make, results: Path) -> None:

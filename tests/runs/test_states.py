@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from datetime import datetime, tzinfo
 from pathlib import Path
 
 import pytest
@@ -81,13 +82,20 @@ def test_a_failed_run_says_why_and_raises_again(results: Path) -> None:
     first.check()
 
 
-def test_runs_of_the_same_second_have_directories_of_their_own(results: Path) -> None:
+def test_runs_of_the_same_second_have_directories_of_their_own(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stopped(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> Stopped:
+            return cls(2026, 1, 1, tzinfo=tz)
+
+    monkeypatch.setattr("wristctl.runs.start.datetime", Stopped)
     for _ in range(3):
         with start_run("tune", Study(), "", results):
             pass
     ids = [run.id for run in list_runs(results)]
-    assert len(set(ids)) == 3
-    assert len({name[:16] for name in ids}) < 3, "at least two of them within one second"
+    assert len(set(ids)) == 3 and {name[:16] for name in ids} == {"20260101T000000Z"}
 
 
 def test_processes_at_the_same_time_do_not_share_a_directory(process: Start, results: Path) -> None:

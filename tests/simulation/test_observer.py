@@ -7,8 +7,10 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
+from wristctl.config.control import SimulateSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
+from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.actuator import drive_of
@@ -16,6 +18,7 @@ from wristctl.simulation.camera import frames
 from wristctl.simulation.observer import stationary_gain
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.simulate import simulate
 from wristctl.wrist.model import linearised, terms
 from wristctl.wrist.segments import segments
 
@@ -140,3 +143,14 @@ def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
     pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(force=2.0, start=2.5, duration=0.5))})
     settled = run("smc-tracking", "camera", pushed, seeds=20, record=False).metrics["settling"]
     assert np.median(settled) <= 3.0 + 0.5
+
+
+def test_a_trajectory_holds_what_the_law_saw_and_what_acted_beside_what_was_and_was_commanded() -> None:
+    loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"))
+    settings = SimulateSettings(controller="smc-tracking", gains="camera", loop=loop, horizon=0.5)
+    table = simulate(Study(simulate=settings)).trajectory.frame()
+    late = np.abs(table["theta_seen"] - table["theta"])
+    assert 1e-4 < late.max() < 0.05
+    for side in ("plus", "minus"):
+        assert (table[f"acting_{side}"] - table[f"tension_{side}"]).abs().max() > 1.0
+        assert (table[f"acting_{side}"] >= 0.0).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tracemalloc
 
 import numpy as np
@@ -72,7 +73,7 @@ def test_a_lane_has_the_same_bytes_alone_in_a_batch_and_on_two_threads(segments_
 
 def test_rollout_agrees_with_an_independent_implicit_solver() -> None:
     """Four segments under the feedforward torque held over each millisecond, by SciPy's Radau."""
-    loop, horizon = LOOPS["default"], 0.3
+    loop, horizon = LOOPS["default"], 0.3 if os.environ.get("WRISTCTL_THOROUGH") else 0.08
     outcome = run("feedforward", [()], loop, STEP, horizon=horizon)
     plus, minus = (2 * float(outcome.column(f"tension_{side}", 0)[0]) for side in ("plus", "minus"))
     values, n = segments(WRIST, 4), 4
@@ -86,7 +87,7 @@ def test_rollout_agrees_with_an_independent_implicit_solver() -> None:
     y, found = np.zeros(2 * n), []
     tensions = np.stack([outcome.column("tension_plus", 0), outcome.column("tension_minus", 0)], axis=1)
     assert np.ptp(tensions, axis=0).max() < 2.0 and plus > minus
-    for tick in range(299):
+    for tick in range(len(tensions) - 1):
         y = solve_ivp(slope, (0, 1e-3), y, "Radau", rtol=1e-8, atol=1e-11, args=(2 * tensions[tick],)).y[:, -1]
         found.append(y[:n].sum())
     assert np.abs(np.array(found) - outcome.column("theta", 0)[1:]).max() < 1e-6

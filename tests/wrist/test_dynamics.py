@@ -65,7 +65,7 @@ def test_mass_of_one_segment_equals_its_closed_form() -> None:
     assert straight == pytest.approx(m * length**2 / 16, rel=1e-15)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(n=st.sampled_from([1, 2, 4, 8]), data=st.data())
 def test_mass_matrix_is_symmetric_and_positive_definite_over_the_range(n: int, data: st.DataObject) -> None:
     angle = st.floats(-ANGLE, ANGLE)
@@ -86,7 +86,7 @@ def test_rate_of_mass_matrix_less_twice_coriolis_is_skew(n: int) -> None:
     np.testing.assert_allclose(skew, -skew.T, atol=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(n=st.sampled_from([1, 2, 4]), seed=st.integers(0, 10_000))
 def test_jacobians_are_the_derivatives_of_the_residual(n: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -37,7 +37,7 @@ def allocated(theta: float, torque: float, low: float, high: float) -> np.ndarra
     return to_rows(out[None], 1)[0]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     theta=st.floats(-0.9, 0.9),
     torque=st.floats(-3.0, 3.0),

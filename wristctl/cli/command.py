@@ -22,8 +22,9 @@ from wristctl.cli.options import Options, signature
 from wristctl.cli.progress import PLAIN, Done, listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
+from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
-from wristctl.config.load import load_study
+from wristctl.config.load import read_study
 from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
 from wristctl.runs import InputRun, LiveRun, Run, open_run, require, start_run
@@ -123,11 +124,14 @@ def study_command(
 def _execute(command: _Command, options: Options, shortcuts: Sequence[str], flags: frozenset[str]) -> None:
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
-    study = load_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
+    study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], command.kind)
     with listening(options.quiet, options.verbose) as console:
         inputs = _opened(command, study, options.out)
         study = _naming(inputs, study, command, options.out)
-        plan = command.plan(study, inputs) if command.plan else ""
+        try:
+            plan = command.plan(study, inputs) if command.plan else ""
+        except UserError as error:
+            raise located(error, origins) from error
         if options.dry_run:
             return _print_plan(command.kind, study, plan, options)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]

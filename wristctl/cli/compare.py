@@ -7,6 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
@@ -23,13 +24,16 @@ _HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chatte
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.control.table import controller, gains_of
+    from wristctl.cli.loops import check_row
+    from wristctl.cli.tune import check_search
 
     settings = study.compare
-    for row in settings.rows:
-        if row.gains != "tuned":
-            gains_of(controller(row.controller), row.gains)
-        controller(row.controller)
+    for number, row in enumerate(settings.rows):
+        with under(f"compare.rows.{number}"):
+            check_row(row)
+    if settings.tuning is not None:
+        with under("compare.tuning"):
+            check_search(settings.tuning)
     count = len(settings.rows) * len(settings.loops) * len(settings.references) * len(settings.inverses)
     return f"{count} rollouts of {settings.horizon:g} s"
 

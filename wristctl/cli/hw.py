@@ -187,14 +187,20 @@ def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
         with progress(console, _no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
             from wristctl.config.bench import BenchSettings
             from wristctl.config.wrist import WristParameters
+            from wristctl.hardware.bench.film import start_film
             from wristctl.hardware.bench.rig import Rig
             from wristctl.hardware.bench.server import BenchServer
 
-            server = BenchServer(Rig(BenchSettings(), WristParameters(), 0, chip=chip), line, pictures)
+            settings, its = BenchSettings(), WristParameters()
+            camera, film = start_film(settings.camera, its, None, pictures)
+            server = BenchServer(Rig(settings, its, 0, chip=chip), line, film)
         log.info("serving, with a wrist of the default settings on axes 0 to 3; its camera's frames: %s", pictures)
         log.info("try: wristctl hw check --port %s --wiring 3", line.address)
         print(line.address, flush=True)
-        server.run()
+        try:
+            server.run()
+        finally:
+            camera.join()
 
 
 @app.command("stop")

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Session
+from wristctl.config.control import Row, SimulateSettings
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
@@ -18,6 +19,15 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Gains = Mapping[str, Mapping[str, float]]
+
+
+def check_row(row: Row | SimulateSettings) -> None:
+    """UserError, naming the key, for an unknown controller, preset or gain; tuned gains are another run's."""
+    from wristctl.control.table import controller, gains_of
+
+    chosen = controller(row.controller)
+    if row.gains != "tuned":
+        gains_of(chosen, row.gains)
 
 
 def network_of(session: Session) -> Inverse | None:

@@ -3,6 +3,19 @@
 from __future__ import annotations
 
 from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.config.errors import under
+from wristctl.config.study import Study
+from wristctl.runs import Run
+
+
+def plan(study: Study, inputs: dict[str, Run]) -> str:
+    """Check the controller and its gains."""
+    from wristctl.cli.loops import check_row
+
+    settings = study.simulate
+    with under("simulate"):
+        check_row(settings)
+    return f"one rollout of {settings.horizon:g} s"
 
 
 def simulate(session: Session) -> Table:
@@ -48,6 +61,7 @@ def simulate(session: Session) -> Table:
 app = study_command(
     "simulate",
     work=simulate,
+    plan=plan,
     inputs=(Input("network", kind="train", optional=True), Input("tuned", kind="tune", optional=True)),
     shortcuts=("controller", "gains"),
     examples=(

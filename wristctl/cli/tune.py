@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Input, Session, Table, study_command
 from wristctl.config.control import TuneSettings
+from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
@@ -15,15 +16,24 @@ if TYPE_CHECKING:
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check the controllers' names and say what the search costs."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import check_loops
-
     settings = study.tune
-    check_loops(settings)
-    for name in settings.controllers:
-        controller(name)
+    with under("tune"):
+        check_search(settings)
     rollouts = settings.candidates * settings.iterations * len(settings.scenarios)
     return f"{rollouts} rollouts of {settings.horizon:g} s for each of {', '.join(settings.controllers)}"
+
+
+def check_search(settings: TuneSettings) -> None:
+    """UserError, naming the key, for an unknown controller, one without gains, or a scenario on an unknown loop."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import check_loops, check_tunable
+
+    check_loops(settings)
+    for number, name in enumerate(settings.controllers):
+        try:
+            check_tunable(controller(name))
+        except UserError as error:
+            raise UserError(error.what, f"controllers.{number}", error.fix) from error
 
 
 def tune(session: Session) -> Table:

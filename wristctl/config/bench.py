@@ -72,18 +72,24 @@ class RenderedCamera(Section):
         return self
 
 
+class WeakenedPlant(Plant):
+    """The wrist as it is; a controller knows it with its stiffness when new."""
+
+    stiffness_scale: float = quantity(0.7, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
+
+
+class StepperActuator(Actuator):
+    """Elastic tendons on the stepper motors that the board turns."""
+
+    level: Literal["tendon"] = choice("tendon", "the simulation's actuator with motors and elastic tendons")
+
+
 class BenchSettings(Section):
-    """The wrist on the emulated bench. Its controller does not know how `plant` differs."""
+    """The emulated bench."""
 
     segments: int = choice(4, "constant-curvature segments of the wrist", "assumed", ge=1, le=8)
-    plant: Plant = choice(Plant(stiffness_scale=0.7), "the wrist as it is", "paper: springs lose stiffness")
-    actuator: Actuator = choice(Actuator(level="tendon"), "elastic tendons on stepper motors")
+    plant: WeakenedPlant = WeakenedPlant()
+    actuator: StepperActuator = StepperActuator()
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
     faults: tuple[Fault, ...] = choice((), "what goes wrong in each trial")
-
-    @model_validator(mode="after")
-    def _tendons_are_elastic(self) -> Self:
-        if self.actuator.level != "tendon":
-            raise ValueError("the bench has elastic tendons on motors: actuator.level must be tendon")
-        return self

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from wristctl.config.loop import LOOPS, Direction, Loop, Reference, Scenario
+from wristctl.config.loop import LOOPS, Direction, Loop, Loops, Reference, Scenario
 from wristctl.config.section import Section, choice, quantity
 
 Gains = str | dict[str, float]
@@ -54,7 +54,11 @@ class TuneSettings(Section):
         "tuning scenarios; compare refuses to judge on any of them",
         min_length=1,
     )
-    loops: dict[str, Loop] = choice(LOOPS, "named loops")
+    loops: Loops = choice(
+        LOOPS,
+        "the loops that scenarios may name; naming any replaces these (`exact: {}` is the built-in one)",
+        min_length=1,
+    )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run behind references with inverse: network")
 
@@ -63,7 +67,11 @@ class CompareSettings(Section):
     """Controllers x loops x references x inverses, beside the paper's T2."""
 
     rows: tuple[Row, ...] = choice((Row(controller="smc", gains="printed"),), "controllers and gains", min_length=1)
-    loops: dict[str, Loop] = choice(LOOPS, "named loops, each one a block of the table")
+    loops: Loops = choice(
+        LOOPS,
+        "the loops to judge on, each a block of the table; naming any replaces these (`exact: {}` is the built-in one)",
+        min_length=1,
+    )
     references: tuple[Reference, ...] = choice(
         (
             Reference(kind="step"),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class UserError(Exception):
@@ -19,6 +20,16 @@ class UserError(Exception):
     def __str__(self) -> str:
         parts = [self.what, self.where, self.fix and f"fix: {self.fix}"]
         return " ".join(" - ".join(part for part in parts if part).split())
+
+
+@contextmanager
+def under(path: str) -> Iterator[None]:
+    """Let an error of the block, which names a key, say that the key stands below this key path."""
+    try:
+        yield
+    except UserError as error:
+        where = f"{path}.{error.where}" if error.where else path
+        raise UserError(error.what, where, error.fix, error.exit_code) from error
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:

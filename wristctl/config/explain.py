@@ -26,6 +26,17 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserErr
     return UserError(_what(detail), where, _fix(detail))
 
 
+def located(error: UserError, origins: Mapping[KeyPath, str]) -> UserError:
+    """The error with the file and line (or override) of the key path that it names; as it is where it names none."""
+    path: KeyPath = ()
+    for key in error.where.split("."):
+        at = (*path, int(key) if key.isdigit() else key)
+        if at not in origins:
+            break
+        path = at
+    return UserError(error.what, f"{origins[path]}: {error.where}", error.fix, error.exit_code) if path else error
+
+
 def _what(detail: Any) -> str:
     if detail["type"] == "extra_forbidden":
         return f"unknown key {detail['loc'][-1]!r}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import NoneType, UnionType
 from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
@@ -25,11 +26,17 @@ def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
     for key in path:
         if known := keys_of(kind):
             field = known.get(str(key))
-            kind = field.annotation if field else None
+            kind = _given(field.annotation) if field else None
         else:
             items = [item for item in get_args(kind) if item is not ...]
             kind = items[-1] if items else None
     return kind, field
+
+
+def _given(annotation: Any) -> Any:
+    """The annotation of a leaf that is given: `X | None` is X."""
+    others = [each for each in get_args(annotation) if each is not NoneType]
+    return others[0] if isinstance(annotation, UnionType) and len(others) == 1 else annotation
 
 
 def section_keys(command: str | None) -> dict[str, FieldInfo]:

@@ -15,15 +15,20 @@ from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
 
 
-def load_study(
-    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None
-) -> Study:
+def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None) -> Study:
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
 
     A sequence is one leaf. An override's key is first looked for in the section of `command`: for train, `epochs=5` is
     `train.epochs=5`. Raises UserError with file and line (or override), key path, and nearest key or what is
     expected.
     """
+    return read_study(files, overrides, command)[0]
+
+
+def read_study(
+    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None
+) -> tuple[Study, Mapping[KeyPath, str]]:
+    """As load_study, with the file and line (or override) of each key that was given."""
     data: dict[str, Any] = {}
     origins: dict[KeyPath, str] = {}
     for file in files:
@@ -31,7 +36,7 @@ def load_study(
     for override in overrides:
         _merge(data, _override(override, command), f"--set {override}", origins)
     try:
-        return Study.model_validate(data, by_alias=True, by_name=False)
+        return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
         raise explained(error, origins) from error
 

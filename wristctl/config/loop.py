@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import Section, choice, quantity
@@ -84,4 +85,18 @@ LOOPS: dict[str, Loop] = {
     "sampled": Loop(plant_segments=1),
     "default": Loop(),
 }
-"""Named loops (PAPER C5): model = plant in nearly continuous time, the same sampled, and the four-segment plant."""
+"""Built-in loops (PAPER C5): model = plant in nearly continuous time, the same sampled, and the four-segment plant."""
+
+
+def _from_built_in(given: Any) -> Any:
+    """Loops as given; what a loop with a built-in one's name leaves out is that one's."""
+    if not isinstance(given, Mapping):
+        return given
+    built_in = {name: loop.model_dump(exclude_unset=True) for name, loop in LOOPS.items()}
+    return {
+        name: {**built_in.get(name, {}), **loop} if isinstance(loop, Mapping) else loop for name, loop in given.items()
+    }
+
+
+Loops = Annotated[dict[str, Loop], BeforeValidator(_from_built_in)]
+"""Loops by name. Those given are all there are: a study that names its loops is judged on these and no others."""

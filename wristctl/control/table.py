@@ -24,7 +24,7 @@ CONTROLLERS: dict[str, Controller] = {
 def controller(name: str) -> Controller:
     """The controller of this name; UserError with the nearest name if there is none."""
     if name not in CONTROLLERS:
-        raise UserError(f"unknown controller '{name}'", fix=meant(name, CONTROLLERS))
+        raise UserError(f"unknown controller '{name}'", "controller", meant(name, CONTROLLERS))
     return CONTROLLERS[name]
 
 
@@ -37,16 +37,19 @@ def gains_of(
     """
     if gains == "tuned":
         if tuned is None or chosen.name not in tuned:
-            raise UserError(f"no tuned gains of {chosen.name}", fix=f"--tuned RUN, a tune run that tuned {chosen.name}")
+            fix = f"--tuned RUN, a tune run that tuned {chosen.name}"
+            raise UserError(f"no tuned gains of {chosen.name}", "gains", fix)
         gains = tuned[chosen.name]
     if isinstance(gains, str):
         if gains not in chosen.presets:
-            raise UserError(f"unknown gains '{gains}' of {chosen.name}", fix=meant(gains, [*chosen.presets, "tuned"]))
+            raise UserError(
+                f"unknown gains '{gains}' of {chosen.name}", "gains", meant(gains, [*chosen.presets, "tuned"])
+            )
         return chosen.presets[gains]
     for name in gains:
         if name not in chosen.gains:
-            raise UserError(f"unknown gain '{name}' of {chosen.name}", fix=meant(name, chosen.gains))
+            raise UserError(f"unknown gain '{name}' of {chosen.name}", f"gains.{name}", meant(name, chosen.gains))
     missing = [name for name in chosen.gains if name not in gains]
     if missing:
-        raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", fix="give every gain by name")
+        raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", "gains", "give every gain by name")
     return tuple(float(gains[name]) for name in chosen.gains)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from wristctl.report.style import BLACK, GREY, ORANGE, PURPLE, figure, legend, legend_below, line, title
 from wristctl.simulation.trajectory import Trajectory
@@ -17,17 +18,21 @@ _SMALLEST = 1e-8
 _LAST = 20
 """Samples in the close-up of tensions."""
 _BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
+_OTHER: Any = {"color": BLACK, "linewidth": 0.7}
 _DOTS: Any = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
 
 
 def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     """Desired and obtained bending angle [deg] over time [s], one line for each trajectory.
 
-    The reference is drawn on its own where it differs from the desired angle (a network's error).
+    The reference is drawn on its own where it differs from the desired angle (a network's error), and so is what the
+    controller sees where that differs from the angle (a camera's delay).
     """
     made, ((axes,),) = figure(height=3.4)
     for course in trajectories:
         axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
+        if (seen := _apart(course.seen, course.theta)) is not None:
+            axes.plot(course.time, np.degrees(seen), label=f"{course.label} as seen", **_OTHER)
     draw_desired(axes, trajectories)
     within_half_a_move(axes, trajectories)
     axes.set(xlabel="time [s]", ylabel="bending angle [deg]")
@@ -37,11 +42,16 @@ def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
 
 
 def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = False) -> Figure:
-    """Error e = theta - theta_ref [rad] over time [s], as in the paper's figures of SMC and PID; `log` for |e|."""
+    """Error e = theta - theta_ref [rad] over time [s], as in the paper's figures of SMC and PID; `log` for |e|.
+
+    Beside it, but not with `log`, the error that the controller sees where that differs (a camera's delay and noise).
+    """
     made, ((axes,),) = figure(height=3.4)
     for course in trajectories:
         error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
         axes.plot(course.time, error, label=label(course), **line(course.label))
+        if not log and (seen := _apart(course.seen, course.theta)) is not None:
+            axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **_OTHER)
     if log:
         axes.set_yscale("log")
     else:
@@ -55,32 +65,45 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
 
 
 def tensions(trajectory: Trajectory) -> Figure:
-    """Tension per tendon [N] of both sides, and the torque [N m] that the law wants and that the tendons give.
+    """Tension per tendon [N] of both sides, and the torque [N m] that the law wants and that the tensions should give.
 
+    Where tensions do not act as they are commanded (lag, steps, elastic tendons) both are drawn.
     On the right the last samples alone, so that tensions which jump at every tick can be told from a filled area.
     """
     made, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
+    acting = _apart(trajectory.acting, trajectory.tension)
+    largest = max(float(np.nanmax(each)) for each in (trajectory.tension, acting) if each is not None)
     end = float(trajectory.time[-1])
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
         for each, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
-            each.step(time[part], tension[part], color=colour, linewidth=1.0, where="post")
+            each.step(time[part], tension[part], color=colour, linewidth=1.0, where="post", label="commanded")
+        for each, tension in zip(column, () if acting is None else acting.T, strict=False):
+            each.plot(time[part], tension[part], label="acting", **_OTHER)
         wanted = {"color": GREY, "label": "wanted by the law"}
-        given = {"color": BLACK, "label": "given by the tendons"}
+        given = {"color": BLACK, "label": "of the commanded tensions"}
         for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
             column[2].step(time[part], torque[part], linewidth=1.0, where="post", **style)
     for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
         each.set_ylabel(name)
     for each in axes[:2, 0]:
-        each.set_ylim(0.0, 1.05 * float(np.nanmax(trajectory.tension)))
+        each.set_ylim(0.0, 1.05 * largest)
     size = 2.0 * float(np.nanmax(np.abs(trajectory.torque), initial=1e-3))
     _at_most(axes[2, 0], -size, size)
     axes[2, 0].set_xlabel("time [s]")
     axes[2, 1].set_xlabel(f"time - {end:.4g} s [ms]")
     title(axes[0, 0], f"{label(trajectory)}: tension per tendon, torque")
     title(axes[0, 1], f"last {_LAST} samples")
+    if acting is not None:
+        legend(axes[1, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     legend(axes[2, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     return made
+
+
+def _apart(other: NDArray[np.float64] | None, known: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The other course if it is not the known one, to a millionth of its size."""
+    size = 1e-6 * float(np.nanmax(np.abs(known), initial=1e-6))
+    return None if other is None or np.allclose(other, known, rtol=0.0, atol=size, equal_nan=True) else other
 
 
 def label(trajectory: Trajectory) -> str:

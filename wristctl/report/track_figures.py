@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import zip_longest
 
+import cv2
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from wristctl.hardware.vision.marker import Sighting, Verdict
 from wristctl.report.style import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION, WINE, figure, undress
 
+_WIDE = 480
+"""Pixels across a frame in a figure."""
 _COLOURS = dict(zip(list(Verdict)[1:], (VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK), strict=True))
 
 
@@ -46,5 +49,7 @@ def frames(pictures: Sequence[NDArray[np.uint8]]) -> Figure:
         undress(place)
         place.set(xticks=[], yticks=[])
         if picture is not None:
-            place.imshow(picture[..., ::-1])
+            smaller = _WIDE / picture.shape[1]
+            shown = cv2.resize(picture, None, fx=smaller, fy=smaller, interpolation=cv2.INTER_AREA)
+            place.imshow(shown[..., ::-1])
     return made

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
+from wristctl.runs.index import RESULTS, indexed, run_names
 from wristctl.runs.manifest import MANIFEST, command_of
 from wristctl.runs.run import Run
-
-RESULTS = Path("results")
 
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
     """All runs of a results folder, oldest first; broken ones are among them and raise nothing."""
     return [Run(results / name) for name in run_names(results)]
-
-
-def run_names(results: Path) -> list[str]:
-    """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
-    try:
-        with os.scandir(results) as found:
-            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith("."))
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise UserError(
-            f"cannot read the results folder: {error.strerror}", str(results), "name it with --out"
-        ) from error
 
 
 def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
@@ -81,10 +66,10 @@ def _readable(path: Path) -> Run:
 
 def _latest(ref: str, results: Path) -> Run:
     kind = ref.removeprefix("latest:")
-    ended = [run for run in list_runs(results) if run.state == "ok"]
+    ended = [run for run in indexed(results, renew=False) if run.state == "ok"]
     found = [run for run in ended if run.kind == kind]
     if not found:
         kinds = {run.kind for run in ended}
         fix = meant(kind, kinds) if kinds else f"run `wristctl {command_of(kind)}` first"
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
-    return max(found, key=lambda run: run.manifest.timing.started)
+    return Run(results / max(found, key=lambda run: run.started).id)

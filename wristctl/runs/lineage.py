@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.runs.index import indexed
 from wristctl.runs.manifest import Input
-from wristctl.runs.query import entries
 from wristctl.runs.run import Run
 
 
@@ -56,4 +56,4 @@ def input_run(run: Run, record: Input) -> Run:
 
 def dependents(run: Run, results: Path) -> list[str]:
     """Ids of the runs in `results` that read this one."""
-    return [each.id for each in entries(results) if run.id in each.inputs]
+    return [each.id for each in indexed(results) if run.id in each.inputs]

@@ -1,14 +1,10 @@
-"""Which runs there are: one line about each, from the manifests or from a disposable index of them."""
+"""Choose among runs: by kind, label, state, tag, age and metrics."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import tempfile
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from operator import eq, ge, gt, le, lt, ne
@@ -16,58 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError, meant
-from wristctl.runs.find import RESULTS, run_names
-from wristctl.runs.manifest import MANIFEST, SUMS
-from wristctl.runs.run import Run
+from wristctl.runs.index import RESULTS, Entry, indexed
 from wristctl.runs.tags import read_tags
 
-INDEX = ".index.json"
-_SCHEMA = "wristctl.index/1"
 _COMPARISONS = {"<=": le, ">=": ge, "!=": ne, "==": eq, "<": lt, ">": gt, "=": eq}
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A run in one line; `note` says why it failed or is broken, `metrics` are the values by name."""
-
-    id: str
-    kind: str
-    label: str
-    state: str
-    started: str
-    wall_s: float | None
-    note: str
-    metrics: dict[str, float | None] = field(default_factory=dict)
-    inputs: list[str] = field(default_factory=list)
-    tags: list[str] = field(default_factory=list)
-
-    def value(self, name: str) -> Any:
-        """A metric, or one of the entry's own fields; None where it has neither."""
-        return self.metrics.get(name, getattr(self, name, None))
-
-
 def entries(results: Path = RESULTS) -> list[Entry]:
-    """All runs of a results folder, oldest first, with their tags.
-
-    Sealed runs do not change, so theirs are kept in the folder's `.index.json`, which may be deleted at any time; an
-    entry counts as long as the run's manifest has the date and size it was made from.
-    """
-    known = _read_index(results)
-    kept: dict[str, Any] = {}
-    found, tags = [], read_tags(results)
-    for name in run_names(results):
-        stamp, old = _stamp(f"{results}/{name}"), known.get(name)
-        if stamp and old and old[0] == stamp:
-            entry, kept[name] = Entry(**old[1]), old
-        else:
-            entry = _entry(Run(results / name))
-            if stamp and entry.state not in ("running", "broken", "crashed"):
-                kept[name] = [stamp, asdict(entry)]
-        found.append(replace(entry, tags=tags[name]) if name in tags else entry)
-    if kept != known:
-        _write_index(results, kept)
-    return found
+    """All runs of a results folder, oldest first, with their tags."""
+    tags = read_tags(results)
+    return [replace(each, tags=tags[each.id]) if each.id in tags else each for each in indexed(results)]
 
 
 def select(
@@ -135,48 +90,3 @@ def _before(age: str, option: str) -> str:
 
 def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _entry(run: Run) -> Entry:
-    state = run.state
-    try:
-        manifest = run.manifest
-        metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
-    except (UserError, AttributeError) as error:
-        return Entry(run.id, "-", "", "broken", "", None, getattr(error, "what", "metrics.json is no table of metrics"))
-    note = manifest.error.what if manifest.error else ""
-    timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
-    return Entry(run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs)
-
-
-def _stamp(path: str) -> list[int] | None:
-    """What tells a sealed run from any other under its name; None where it is not sealed."""
-    try:
-        manifest, sums = os.stat(f"{path}/{MANIFEST}"), os.stat(f"{path}/{SUMS}")
-    except OSError:
-        return None
-    return [manifest.st_mtime_ns, manifest.st_size, sums.st_mtime_ns, sums.st_size]
-
-
-def _read_index(results: Path) -> dict[str, Any]:
-    try:
-        index = json.loads((results / INDEX).read_bytes())
-        if index["schema"] == _SCHEMA and index["fields"] == list(Entry.__dataclass_fields__):
-            runs: dict[str, Any] = index["runs"]
-            return runs
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    return {}
-
-
-def _write_index(results: Path, runs: dict[str, Any]) -> None:
-    """Replace the index; a folder that cannot be written does without."""
-    text = json.dumps({"schema": _SCHEMA, "fields": list(Entry.__dataclass_fields__), "runs": runs})
-    with suppress(OSError):
-        descriptor, temporary = tempfile.mkstemp(prefix=".index", dir=results)
-        try:
-            with open(descriptor, "w", encoding="utf-8") as file:
-                file.write(text)
-            os.replace(temporary, results / INDEX)
-        except OSError:
-            os.unlink(temporary)

@@ -46,8 +46,15 @@ def trajectory(outcome: Outcome, index: int, followed: Motion, wrist: WristParam
         tip_desired=followed.tip_desired,
         torque_wanted=outcome.column("torque_wanted", index),
         torque=outcome.column("torque", index),
-        tension=np.stack([outcome.column("tension_plus", index), outcome.column("tension_minus", index)], axis=-1),
+        tension=_sides(outcome, "tension", index),
+        acting=_sides(outcome, "acting", index),
+        seen=outcome.column("seen", index),
     )
+
+
+def _sides(outcome: Outcome, name: str, index: int) -> Array:
+    """A recorded pair of columns of the + and the - side, (T, 2)."""
+    return np.stack([outcome.column(f"{name}_{side}", index) for side in ("plus", "minus")], axis=-1)
 
 
 def simulation(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Simulation:

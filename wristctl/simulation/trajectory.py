@@ -17,6 +17,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "time": ("s", "time from the start of the move"),
     "theta": ("rad", "bending angle of the last disc"),
     "rate": ("rad/s", "its rate"),
+    "theta_seen": ("rad", "bending angle that the controller sees: behind a camera the observer's"),
     "theta_ref": ("rad", "reference angle that the controller follows"),
     "theta_desired": ("rad", "true wanted angle"),
     "error": ("rad", "theta - theta_ref (E12)"),
@@ -26,8 +27,10 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "tip_desired_y": ("m", "wanted tip position"),
     "torque_wanted": ("N m", "the law's torque"),
     "torque": ("N m", "torque of the tensions on the one-segment model"),
-    "tension_plus": ("N", "tension of each tendon of the + side"),
-    "tension_minus": ("N", "tension of each tendon of the - side"),
+    "tension_plus": ("N", "commanded tension of each tendon of the + side"),
+    "tension_minus": ("N", "commanded tension of each tendon of the - side"),
+    "acting_plus": ("N", "tension of the + side as it acts on the wrist: late and in steps behind real motors"),
+    "acting_minus": ("N", "tension of the - side as it acts on the wrist"),
 }
 """Columns of a trajectory's table with unit and meaning; the segments' angles theta_1 ... theta_n [rad] follow."""
 
@@ -55,7 +58,11 @@ class Trajectory:
     torque: Array
     """Torque of the commanded tensions on the controller's one-segment model, (T,)."""
     tension: Array
-    """Per tendon of the + and the - side, (T, 2)."""
+    """Commanded, per tendon of the + and the - side, (T, 2)."""
+    acting: Array | None = None
+    """Tension as it acts on the wrist, (T, 2); None where it is as commanded or cannot be known."""
+    seen: Array | None = None
+    """Angle that the controller sees, (T,); None where that is theta."""
 
     @property
     def error(self) -> Array:
@@ -66,10 +73,12 @@ class Trajectory:
         """Everything as a table with the columns of COLUMNS."""
         import pandas as pd
 
+        acting = self.tension if self.acting is None else self.acting
         columns = {
             "time": self.time,
             "theta": self.theta,
             "rate": self.rate,
+            "theta_seen": self.theta if self.seen is None else self.seen,
             "theta_ref": self.theta_ref,
             "theta_desired": self.theta_desired,
             "error": self.error,
@@ -81,6 +90,8 @@ class Trajectory:
             "torque": self.torque,
             "tension_plus": self.tension[:, 0],
             "tension_minus": self.tension[:, 1],
+            "acting_plus": acting[:, 0],
+            "acting_minus": acting[:, 1],
         }
         columns |= {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
         return pd.DataFrame(columns)

@@ -58,11 +58,17 @@ def objective(outcome: Outcome, weights: Objective, horizon: float) -> Array:
 
 
 def check_loops(settings: TuneSettings) -> None:
-    """UserError if a scenario names a loop that the study does not have."""
+    """UserError, naming the key, if a scenario is on a loop that the search does not have."""
     for number, scenario in enumerate(settings.scenarios):
         if scenario.loop not in settings.loops:
-            where = f"tune.scenarios.{number}.loop"
+            where = f"scenarios.{number}.loop"
             raise UserError(f"unknown loop '{scenario.loop}'", where, meant(scenario.loop, settings.loops))
+
+
+def check_tunable(controller: Controller) -> None:
+    """UserError if the controller has no gains."""
+    if not controller.gains:
+        raise UserError(f"{controller.name} has no gains to tune", fix="leave it out")
 
 
 class Evaluator:
@@ -102,8 +108,7 @@ def search(
 
     `progress` gets the search so far after every iteration, so that an interrupted one loses nothing.
     """
-    if not controller.gains:
-        raise UserError(f"{controller.name} has no gains to tune", "tune.controllers", "leave it out")
+    check_tunable(controller)
     settings = study.tune
     space, evaluate = GainSpace.of(controller.gains), Evaluator(study, controller, network)
     start = np.full(len(controller.gains), 0.5)

@@ -47,7 +47,7 @@ def keep_rate(bench: Bench, rate: Rate, seconds: float) -> None:
 def test_random_moves_end_exactly_on_their_targets(bench: Bench, rounds: int) -> None:
     rng = np.random.default_rng(1)
     bench.get_ready()
-    for _ in range(40 * rounds):
+    for _ in range(15 * rounds):
         target = random_target(rng)
         bench.do(target)
         status = bench.wait_for_rest()

@@ -140,7 +140,7 @@ def test_emergency_stop_input_ends_stepping_within_two_milliseconds(bench: Bench
 
 def test_no_axis_starts_again_when_a_stop_falls_into_the_working_out_of_its_rate(bench: Bench, rounds: int) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(60 + 10 * rounds):
+    for _ in range(20 + 10 * rounds):
         bench.get_ready()
         for _ in range(rng.integers(10, 20)):  # always accelerating, the main loop never idle
             bench.send(Rate(tuple(rng.uniform(-10_000, 10_000, 4))))  # type: ignore[arg-type]

@@ -16,24 +16,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.hardware.emulated_bench import client
+from tests.hardware.emulated_bench.client import WATCHDOG
 from tests.hardware.emulated_bench.conftest import TAUT
 from wristctl.config.bench import BenchSettings, Fault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.bench.film import start_film
 from wristctl.hardware.bench.frame_memory import FrameMemory, SharedCamera
+from wristctl.hardware.bench.line import FaultyLine
 from wristctl.hardware.bench.rig import Rig
 from wristctl.hardware.bench.server import BenchServer
 from wristctl.hardware.board import Board
 from wristctl.hardware.emulator.serve import PtyLine
-from wristctl.hardware.errors import PortLost
-from wristctl.hardware.messages import BAUD
+from wristctl.hardware.errors import NoAnswer, PortLost, Restarted
+from wristctl.hardware.messages import BAUD, Configure
 from wristctl.hardware.transport import SerialTransport
 from wristctl.hardware.vision.camera import Frame
 
 SMALL = SceneSettings(width=160, height=120)
-STOPPED_WITHIN = 0.1 + 0.03
+STOPPED_WITHIN = WATCHDOG + 0.03
 """Seconds from the last that the board heard to its last step: watchdog and ramp."""
+AT_ONCE = 0.1
+"""Seconds of the board's time that a late server runs in one go."""
 
 Serving = Callable[..., tuple[BenchServer, Path]]
 
@@ -45,8 +50,9 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 
     def start(*faults: Fault) -> tuple[BenchServer, Path]:
         settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
-        line = PtyLine()
-        server = BenchServer(Rig(settings, WristParameters(), 0), line, tmp_path / "frame", tmp_path / "record")
+        line, wrist = PtyLine(), WristParameters()
+        _, film = start_film(settings.camera, wrist, None, tmp_path / "frame")
+        server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record")
         server.address = line.address  # type: ignore[attr-defined]
         thread = threading.Thread(target=server.run)
         thread.start()
@@ -62,6 +68,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
 def board_of(server: BenchServer) -> Board:
     board = Board(SerialTransport(server.address, BAUD))  # type: ignore[attr-defined]
     board.connect()
+    board.configure(Configure(watchdog=WATCHDOG))
     board.enable()
     board.home()
     return board
@@ -82,11 +89,11 @@ def read(record: Path) -> dict[str, Any]:
 
 
 def last_step(told: dict[str, Any]) -> float:
-    return max(at for at in told["last_step"] if at is not None)
+    return max((at for at in told.get("last_step", ()) if at is not None), default=0.0)
 
 
 def is_released(told: dict[str, Any]) -> bool:
-    return bool(told) and any(told["last_step"]) and not any(told["energised"])
+    return last_step(told) > 0.0 and not any(told["energised"])
 
 
 def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:
@@ -119,25 +126,85 @@ def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving
     assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
 
 
-def test_a_stopped_client_and_a_killed_one_leave_the_board_to_stop_the_motors(tmp_path: Path) -> None:
-    record = tmp_path / "record"
-    command = [sys.executable, client.__file__, str(record)]
+def test_a_board_that_restarts_is_found_out_and_its_drives_are_off(serving: Serving) -> None:
+    server, folder = serving(Fault(kind="board-reset", at=0.2))
+    board = board_of(server)
+    began = time.monotonic()
+    server.begin(began, None)
+    with pytest.raises((Restarted, NoAnswer)):
+        while True:
+            board.turn((0.0, 0.0, 50.0, 50.0))
+    told = wait_for(lambda: is_released(r := read(folder / "record")) and r)
+    assert last_step(told) < began + 0.2 + AT_ONCE + 1e-3
+    board.close()
+
+
+class Wire:
+    """A line on which a host always says one byte."""
+
+    address = "wire"
+
+    def __init__(self) -> None:
+        self.closed = False
+
+    def wait(self, timeout: float) -> bool:
+        return True
+
+    def receive(self) -> bytes:
+        assert not self.closed
+        return b"x"
+
+    def send(self, data: bytes) -> None:
+        assert not self.closed
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_on_a_faulty_line_the_host_is_not_heard_for_a_while_and_a_lost_port_is_closed() -> None:
+    clock, wire = [0.0], Wire()
+    faults = Faults([Fault(kind="host-silent", at=1.0, duration=0.5), Fault(kind="port-lost", at=2.0)])
+    faults.begin(10.0)
+    line = FaultyLine(wire, faults, lambda: clock[0])
+    heard = {}
+    for clock[0] in (9.0, 11.2, 11.6, 12.1, 13.0):
+        assert line.wait(0.0)  # the board keeps its power
+        line.send(b"y")
+        heard[clock[0]] = (line.receive(), line.heard)
+    assert heard == {9.0: (b"x", 9.0), 11.2: (b"", 9.0), 11.6: (b"x", 11.6), 12.1: (b"", 11.6), 13.0: (b"", 11.6)}
+    assert wire.closed
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
+    """A client in a process of its own, and the record of its bench."""
+    script, record = Path(__file__).with_name("client.py"), tmp_path / "record"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "turning\n"
-        wait_for(lambda: any(read(record).get("energised", ())))
-        process.send_signal(signal.SIGSTOP)
-        told = wait_for(lambda: is_released(r := read(record)) and r)
-        assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
-        process.send_signal(signal.SIGCONT)
-        assert process.stdout.readline() == "LINK\n"
-        assert process.stdout.readline() == "turning\n"
-        wait_for(lambda: last_step(read(record)) > last_step(told))
-        process.kill()
-    told = wait_for(lambda: (r := read(record))["ended"] and r)
-    assert is_released(told)
-    assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
+    process = subprocess.Popen([sys.executable, script, record], stdout=subprocess.PIPE, text=True, env=environment)
+    yield process, record
+    process.kill()
+    process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+def test_a_stopped_client_and_a_killed_one_leave_the_board_to_stop_the_motors(
+    client: tuple[subprocess.Popen[str], Path],
+) -> None:
+    process, record = client
+    assert process.stdout is not None and process.stdout.readline() == "turning\n"
+    wait_for(lambda: last_step(read(record)) > 0.0)
+    process.send_signal(signal.SIGSTOP)
+    stopped = wait_for(lambda: is_released(r := read(record)) and r)
+    assert 0.0 < last_step(stopped) - stopped["last_heard"] < STOPPED_WITHIN
+    process.send_signal(signal.SIGCONT)
+    assert process.stdout.readline() == "LINK\n"
+    assert process.stdout.readline() == "turning\n"
+    wait_for(lambda: last_step(read(record)) > last_step(stopped))
+    process.kill()
+    killed = wait_for(lambda: (r := read(record))["ended"] and r)
+    assert is_released(killed)
+    assert 0.0 < last_step(killed) - killed["last_heard"] < STOPPED_WITHIN
 
 
 def test_a_frame_being_written_is_not_seen_and_none_is_seen_twice(tmp_path: Path) -> None:

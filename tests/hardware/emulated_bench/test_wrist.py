@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.hardware.emulated_bench.conftest import TAUT, HostOn
-from wristctl.config.bench import BenchSettings, Motors
-from wristctl.config.plant import Actuator, Disturbances, Plant, Push
+from wristctl.config.bench import BenchSettings, Motors, WeakenedPlant
+from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.hardware.bench.bench import Bench
 from wristctl.hardware.bench.wrist import Truth
@@ -64,6 +64,19 @@ def test_at_rest_the_wrist_stands_where_statics_put_it_under_the_same_pulls(host
     assert plus > minus > 1.0
     assert truth.theta[-1].sum() > 0.1
     np.testing.assert_allclose(truth.theta[-1], equilibrium(PLANT, N, (plus, minus)), atol=1e-5)
+
+
+def test_a_pushed_wrist_on_held_spools_yields_and_comes_back_to_where_it_was(host_on: HostOn) -> None:
+    host = host_on()
+    host.reel(BEND)
+    host.rest(4.0)
+    start = host.bench.transport.now()
+    before = host.bench.truth().theta[-1].sum()
+    host.bench.begin(start, Disturbances(push=Push(force=5.0, start=0.1, duration=0.4)))
+    host.rest(3.0)
+    moved = host.bench.truth(start).theta.sum(axis=1) - before
+    assert moved.max() > 1e-3 and moved.min() > -0.1 * moved.max()  # damped: hardly beyond where it came from
+    assert moved[-1] == pytest.approx(0.0, abs=1e-5)
 
 
 def test_the_other_side_and_the_other_plane_bend_alike(host_on: HostOn) -> None:
@@ -166,7 +179,7 @@ def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:
 def test_a_softer_plant_bends_further(host_on: HostOn) -> None:
     angles = []
     for scale in (0.7, 1.0):
-        host = host_on(BenchSettings(motors=TAUT, plant=Plant(stiffness_scale=scale)))
+        host = host_on(BenchSettings(motors=TAUT, plant=WeakenedPlant(stiffness_scale=scale)))
         host.reel((-300, -300, 60, 60))
         host.rest(2.0)
         angles.append(host.bench.truth().theta[-1].sum())
@@ -183,6 +196,8 @@ def test_the_last_minute_is_remembered_with_its_times() -> None:
     assert len(bench.truth(129.0).time) == pytest.approx(1000, abs=1)
 
 
-def test_the_bench_needs_elastic_tendons() -> None:
-    with pytest.raises(ValueError, match=r"actuator\.level must be tendon"):
-        BenchSettings(actuator=Actuator())
+def test_a_bench_stays_weak_and_elastic_where_other_leaves_are_set() -> None:
+    some = BenchSettings.model_validate({"plant": {"payload": 0.1}, "actuator": {"friction": 0.2}})
+    assert some.plant.stiffness_scale == 0.7 and some.actuator.level == "tendon"
+    with pytest.raises(ValueError, match="tendon"):
+        BenchSettings.model_validate({"actuator": {"level": "ideal"}})

@@ -200,7 +200,7 @@ def test_every_verdict_is_explained() -> None:
     assert set(MEANING) == set(Verdict)
 
 
-# --- the angle of a square ----------------------------------------------------------------------------------------------
+# --- the angle of a square -------------------------------------------------------------------------------------------
 
 
 @given(st.floats(-3.1, 3.1), st.floats(0.1, 500.0), st.floats(-1e3, 1e3))

@@ -10,8 +10,9 @@ import typer
 
 from wristctl.cli.runs.options import RESULTS, Debug, Json, Out
 from wristctl.cli.tables import Table
+from wristctl.runs.index import Entry
 from wristctl.runs.journal import plain
-from wristctl.runs.query import Entry, entries, in_order, select
+from wristctl.runs.query import entries, in_order, select
 
 
 def ls(

@@ -6,7 +6,9 @@ import multiprocessing
 import shutil
 import signal
 import tempfile
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,6 +18,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.film import start_film
 from wristctl.hardware.bench.frame_memory import SharedCamera
 from wristctl.hardware.bench.wrist import Motion, Truth
 from wristctl.hardware.errors import BoardError
@@ -32,8 +35,8 @@ class RealTimeBench:
     BoardError where the process has died.
     """
 
-    def __init__(self, process: Any, control: Connection, address: str, pictures: Path) -> None:
-        self._process, self._control = process, control
+    def __init__(self, processes: Sequence[BaseProcess], control: Connection, address: str, pictures: Path) -> None:
+        self._processes, self._control = processes, control
         self.transport = SerialTransport(address, BAUD)
         self.camera = SharedCamera(pictures)
 
@@ -67,8 +70,9 @@ class RealTimeBench:
         """End the bench's process."""
         self.transport.close()
         self._control.close()
-        self._process.terminate()
-        self._process.join(_END)
+        self._processes[0].terminate()
+        for process in self._processes:
+            process.join(_END)
 
     def _ask(self, *request: Any) -> Any:
         try:
@@ -85,15 +89,18 @@ def connect(
     markers: Markers | None = None,
     record: Path | None = None,
 ) -> RealTimeBench:
-    """Start a bench in a process of its own. What its board did is left in the file `record`.
+    """Start a bench in processes of its own, wrist and camera. What its board did is left in the file `record`.
 
     It takes as long to start as its parts take to be compiled, if this is the first time.
     """
+    folder = Path(tempfile.mkdtemp(prefix="wristctl-bench-"))
+    camera, film = start_film(settings.camera, wrist, markers, folder / "frame")
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs, settings, wrist, seed, markers, record), daemon=True)
-    process.start()
+    bench = context.Process(target=_serve, args=(theirs, film, folder, settings, wrist, seed, record), daemon=True)
+    bench.start()
     theirs.close()
+    film.close()
     try:
         told = ours.recv()
     except EOFError as error:
@@ -101,31 +108,31 @@ def connect(
         raise BoardError("host", "the emulated bench did not start", fix=fix) from error
     if isinstance(told, UserError):
         raise told
-    return RealTimeBench(process, ours, *told)
+    return RealTimeBench((bench, camera), ours, told, folder / "frame")
 
 
 def _serve(
     control: Connection,
+    film: Connection,
+    folder: Path,
     settings: BenchSettings,
     wrist: WristParameters,
     seed: int,
-    markers: Markers | None,
     record: Path | None,
 ) -> None:
-    """The bench's process: Ctrl-C is the client's affair."""
+    """The bench's process: Ctrl-C is the client's affair. It takes the camera's folder with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from wristctl.hardware.bench.rig import Rig
     from wristctl.hardware.bench.server import BenchServer
     from wristctl.hardware.emulator.serve import PtyLine
 
-    folder = Path(tempfile.mkdtemp(prefix="wristctl-bench-"))
     try:
-        rig, line = Rig(settings, wrist, seed, markers), PtyLine()
-        server = BenchServer(rig, line, folder / "frame", record, control)
+        line = PtyLine()
+        server = BenchServer(Rig(settings, wrist, seed), line, film, record, control)
         signal.signal(signal.SIGTERM, lambda *_: server.stop())
-        control.send((line.address, folder / "frame"))
+        control.send(line.address)
         server.run()
     except UserError as error:
-        control.send(error)
+        control.send(UserError(error.what, error.where, error.fix, error.exit_code))
     finally:
         shutil.rmtree(folder, ignore_errors=True)

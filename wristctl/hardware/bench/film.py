@@ -1,39 +1,64 @@
-"""Draws the pictures of a bench in real time, in a thread of its own beside the board's."""
+"""Draws the pictures of a bench in real time, in a process of its own: the board's must not wait for a picture."""
 
 from __future__ import annotations
 
-import queue
-import threading
+import multiprocessing
+import signal
 import time
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
 
-from wristctl.hardware.bench.camera import Exposure, Painter, Shutter
+import cv2
+
+from wristctl.config.bench import RenderedCamera
+from wristctl.config.vision import Markers
+from wristctl.config.wrist import WristParameters
+from wristctl.hardware.bench.exposure import Exposure, picture
 from wristctl.hardware.bench.frame_memory import FrameMemory
 
 
-class Film:
-    """Draws exposures, and puts each picture into the memory when it arrives; late, it leaves pictures out."""
+def start_film(
+    settings: RenderedCamera, wrist: WristParameters, markers: Markers | None, pictures: Path
+) -> tuple[BaseProcess, Connection]:
+    """A process that puts pictures into the file `pictures`, and the way to it.
 
-    def __init__(self, shutter: Shutter, painter: Painter, memory: FrameMemory) -> None:
-        self._shutter, self._painter, self._memory = shutter, painter, memory
-        self._exposed: queue.SimpleQueue[tuple[Exposure, float] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._develop, name="film", daemon=True)
-        self._thread.start()
+    It says when it is ready (None), takes exposures with the time at which their clock was 0 (`time.monotonic`), and
+    ends when the other side is closed.
+    """
+    FrameMemory(pictures, (settings.scene.height, settings.scene.width))
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_develop, args=(theirs, settings, wrist, markers, pictures), daemon=True)
+    process.start()
+    theirs.close()
+    return process, ours
 
-    def expose(self, exposure: Exposure, start: float) -> None:
-        """Draw this soon; the exposure's clock was 0 at `start` of `time.monotonic`."""
-        self._exposed.put((exposure, start))
 
-    def close(self) -> None:
-        """End the thread."""
-        self._exposed.put(None)
-        self._thread.join()
+def _develop(
+    exposed: Connection, settings: RenderedCamera, wrist: WristParameters, markers: Markers | None, pictures: Path
+) -> None:
+    """Draw each exposure and show it when it arrives; late, leave pictures out. Ctrl-C is others' affair."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from wristctl.hardware.vision.scene import Scene
 
-    def _develop(self) -> None:
-        while (taken := self._exposed.get()) is not None:
-            exposure, start = taken
-            arrival = start + exposure.time + self._shutter.delay
-            if time.monotonic() > arrival and not self._exposed.empty():
+    cv2.setNumThreads(1)
+    painter, memory = Scene(settings.scene, wrist, markers), FrameMemory(pictures)
+    delay = settings.delay_frames / settings.frame_rate
+    try:
+        exposed.send(None)
+        while True:
+            exposure, start = _next(exposed)
+            arrival = start + exposure.time + delay
+            if time.monotonic() > arrival and exposed.poll():
                 continue
-            frame = self._shutter.picture(exposure, self._painter)
+            frame = picture(exposure, painter)
             time.sleep(max(0.0, arrival - time.monotonic()))
-            self._memory.write(frame._replace(time=start + frame.time))
+            memory.write(frame._replace(time=start + frame.time))
+    except (EOFError, OSError):
+        return
+
+
+def _next(exposed: Connection) -> tuple[Exposure, float]:
+    taken: tuple[Exposure, float] = exposed.recv()
+    return taken

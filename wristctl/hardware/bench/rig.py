@@ -11,8 +11,8 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.camera import Shutter
 from wristctl.hardware.bench.faults import Faults
+from wristctl.hardware.bench.shutter import Shutter
 from wristctl.hardware.bench.wrist import BenchWrist
 from wristctl.hardware.emulator.atmega2560 import Atmega2560
 from wristctl.hardware.vision.scene import Scene

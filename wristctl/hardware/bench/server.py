@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import logging
 import math
-import sys
 import time
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
-from wristctl.hardware.bench.film import Film
-from wristctl.hardware.bench.frame_memory import FrameMemory
 from wristctl.hardware.bench.line import FaultyLine
 from wristctl.hardware.bench.record import Record
 from wristctl.hardware.bench.rig import Rig
@@ -29,41 +27,37 @@ log = logging.getLogger(__name__)
 
 _LINGER = 2.0
 """Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors."""
-_TURN = 5e-4
-"""Seconds after which the drawing thread hands over to the board's."""
 
 
 class BenchServer:
-    """Runs a rig against the wall clock. Frames go to the file `pictures`, what the board did to the file `record`.
+    """Runs a rig against the wall clock. Exposures go to `film`, what the board did to the file `record`.
 
     Requests of a client come through `control` as a method's name and its arguments, and are answered; their times
     are of `time.monotonic`. When that client has gone the bench ends after a while; without `control` at `stop`.
     """
 
     def __init__(
-        self, rig: Rig, line: Line, pictures: Path, record: Path | None = None, control: Connection | None = None
+        self, rig: Rig, line: Line, film: Connection, record: Path | None = None, control: Connection | None = None
     ) -> None:
-        self._rig, self._control = rig, control
+        self._rig, self._film, self._control = rig, film, control
         self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY)
         self._record = None if record is None else Record(record, rig.wrist, self._line)
-        scene = rig.settings.camera.scene
-        self._film = Film(rig.shutter, rig.scene, FrameMemory(pictures, (scene.height, scene.width)))
         self._start, self._until = time.monotonic(), math.inf
         self._taken, self._reset = -1, -math.inf
         self._energised = False
         rig.chip.run(FREQUENCY // 100)
         rig.catch_up()  # so that what is to be compiled is, before real time begins
+        try:
+            film.recv()
+        except EOFError as error:
+            fix = "give it more memory, or see with --debug"
+            raise UserError("the rendered camera's process has died", fix=fix, exit_code=4) from error
 
     def run(self) -> None:
         """Serve until the end; then the line is closed."""
-        threads, turn = cv2.getNumThreads(), sys.getswitchinterval()
-        cv2.setNumThreads(1)
-        sys.setswitchinterval(_TURN)
         try:
             serve(self._rig.chip, self._line, lambda: time.monotonic() < self._until, self._round)
         finally:
-            cv2.setNumThreads(threads)
-            sys.setswitchinterval(turn)
             self._line.close()
             self._film.close()
             if self._record is not None:
@@ -115,7 +109,8 @@ class BenchServer:
         if number > self._taken:
             self._taken = number
             if self._line.there and shutter.arrives(number):
-                self._film.expose(shutter.expose(number), self._start)
+                with suppress(BrokenPipeError):  # a camera that has died gives no frames
+                    self._film.send((shutter.expose(number), self._start))
 
     def _answer(self, control: Connection) -> None:
         try:

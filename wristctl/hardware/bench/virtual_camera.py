@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wristctl.hardware.bench.exposure import picture
 from wristctl.hardware.bench.rig import Rig
 from wristctl.hardware.vision.camera import Frame
 
@@ -21,7 +22,7 @@ class VirtualCamera:
         newest = shutter.newest(shutter.delay)
         unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
         number = next(filter(shutter.arrives, unseen), None)
-        return None if number is None else shutter.picture(shutter.expose(number), self._rig.scene)
+        return None if number is None else picture(shutter.expose(number), self._rig.scene)
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -15,6 +15,7 @@ Found = dict[int, list[Array]]
 CELLS = 6
 """Cells along a marker's side, with the black border; one more on either side stays white."""
 DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+_NEXT = [1, 2, 3, 0]
 _NEAR_SIDES = 3.0
 """Side of the part searched around the last place, in sides of the marker."""
 
@@ -33,6 +34,11 @@ def square_angle(corners: Array) -> float:
     z = corners[:, 0] + 1j * corners[:, 1]
     upright = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
     return float(np.angle(np.vdot(upright, z - z.mean())))
+
+
+def edges(corners: Array) -> Array:
+    """The four sides (4, 2) of a square of corners (4, 2), each from its corner to the next."""
+    return corners[_NEXT] - corners
 
 
 def askew(corners: Array) -> float:
@@ -61,7 +67,7 @@ class Detector:
 
     def around(self, image: Image, corners: Array) -> Found:
         """The markers around the place where one had these corners (4, 2) [px]."""
-        half = 0.5 * _NEAR_SIDES * float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).mean())
+        half = 0.5 * _NEAR_SIDES * float(np.hypot(*edges(corners).T).mean())
         (x, y), (height, width) = corners.mean(axis=0), image.shape
         left, top = max(0, int(x - half)), max(0, int(y - half))
         part = image[top : min(height, int(y + half)), left : min(width, int(x + half))]

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from wristctl.config.vision import Gates, Markers
 from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.detector import Detector, square_angle
+from wristctl.hardware.vision.detector import Detector, edges, square_angle
 from wristctl.hardware.vision.view import View
 
 Array = NDArray[np.float64]
 
 _UNSEEN = np.full((4, 2), np.nan)
+_BEFORE = [3, 0, 1, 2]
 
 
 class Verdict(StrEnum):
@@ -138,17 +139,17 @@ class Tracker:
         return math.remainder(turned, math.tau)
 
     def _is_square(self, corners: Array) -> bool:
-        edges = np.roll(corners, -1, axis=0) - corners
-        sides = np.hypot(edges[:, 0], edges[:, 1])
-        cosines = np.einsum("ij,ij->i", edges, np.roll(edges, 1, axis=0)) / (sides * np.roll(sides, 1))
+        along = edges(corners)
+        sides = np.hypot(*along.T)
+        cosines = (along * along[_BEFORE]).sum(axis=1) / (sides * sides[_BEFORE])
         skew = math.degrees(math.asin(min(1.0, float(np.abs(cosines).max()))))
         return bool(sides.max() <= self._gates.side_ratio * sides.min()) and skew <= self._gates.corner_deg
 
     def _has_moved(self, corners: Array) -> bool:
         if self._base is None:
             return False
-        side = float(np.linalg.norm(self._base.corners[1] - self._base.corners[0]))
-        away = float(np.linalg.norm(corners - self._base.corners, axis=1).max())
+        side = math.dist(*self._base.corners[:2])
+        away = float(np.hypot(*(corners - self._base.corners).T).max())
         return away > self._gates.base_shift * side
 
     def _average(self, time: float, corners: Array) -> None:

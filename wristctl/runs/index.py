@@ -1,0 +1,121 @@
+"""One line about each run of a results folder, from the manifests or from a disposable index of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wristctl.config.errors import UserError
+from wristctl.runs.manifest import MANIFEST, SUMS
+from wristctl.runs.run import Run
+
+RESULTS = Path("results")
+INDEX = ".index.json"
+_SCHEMA = "wristctl.index/1"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A run in one line; `note` says why it failed or is broken, `metrics` are the values by name."""
+
+    id: str
+    kind: str
+    label: str
+    state: str
+    started: str
+    wall_s: float | None
+    note: str
+    metrics: dict[str, float | None] = field(default_factory=dict)
+    inputs: list[str] = field(default_factory=list)
+    tags: list[str] = field(default_factory=list)
+
+    def value(self, name: str) -> Any:
+        """A metric, or one of the entry's own fields; None where it has neither."""
+        return self.metrics.get(name, getattr(self, name, None))
+
+
+def run_names(results: Path) -> list[str]:
+    """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
+    try:
+        with os.scandir(results) as found:
+            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith("."))
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise UserError(
+            f"cannot read the results folder: {error.strerror}", str(results), "name it with --out"
+        ) from error
+
+
+def indexed(results: Path, renew: bool = True) -> list[Entry]:
+    """All runs of a results folder, oldest first, without their tags.
+
+    Sealed runs do not change, so theirs are kept in the folder's `.index.json`, which may be deleted at any time; an
+    entry counts as long as the run's manifest and seal have the dates and sizes it was made from. `renew` writes the
+    index anew where it was not up to date.
+    """
+    known = _read_index(results)
+    kept: dict[str, Any] = {}
+    found = []
+    for name in run_names(results):
+        stamp, old = _stamp(f"{results}/{name}"), known.get(name)
+        if stamp and old and old[0] == stamp:
+            entry, kept[name] = Entry(**old[1]), old
+        else:
+            entry = _entry(Run(results / name))
+            if stamp and entry.state not in ("running", "broken", "crashed"):
+                kept[name] = [stamp, asdict(entry)]
+        found.append(entry)
+    if renew and kept != known:
+        _write_index(results, kept)
+    return found
+
+
+def _entry(run: Run) -> Entry:
+    state = run.state
+    try:
+        manifest = run.manifest
+        metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
+    except (UserError, AttributeError) as error:
+        return Entry(run.id, "-", "", "broken", "", None, getattr(error, "what", "metrics.json is no table of metrics"))
+    note = manifest.error.what if manifest.error else ""
+    timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
+    return Entry(run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs)
+
+
+def _stamp(path: str) -> list[int] | None:
+    """What tells a sealed run from any other under its name; None where it is not sealed."""
+    try:
+        manifest, sums = os.stat(f"{path}/{MANIFEST}"), os.stat(f"{path}/{SUMS}")
+    except OSError:
+        return None
+    return [manifest.st_mtime_ns, manifest.st_size, sums.st_mtime_ns, sums.st_size]
+
+
+def _read_index(results: Path) -> dict[str, Any]:
+    try:
+        index = json.loads((results / INDEX).read_bytes())
+        if index["schema"] == _SCHEMA and index["fields"] == list(Entry.__dataclass_fields__):
+            runs: dict[str, Any] = dict(index["runs"])
+            return runs
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return {}
+
+
+def _write_index(results: Path, runs: dict[str, Any]) -> None:
+    """Replace the index; a folder that cannot be written does without."""
+    text = json.dumps({"schema": _SCHEMA, "fields": list(Entry.__dataclass_fields__), "runs": runs})
+    with suppress(OSError):
+        descriptor, temporary = tempfile.mkstemp(prefix=".index", dir=results)
+        try:
+            with open(descriptor, "w", encoding="utf-8") as file:
+                file.write(text)
+            os.replace(temporary, results / INDEX)
+        except OSError:
+            os.unlink(temporary)
