@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware test-trust clean venv
+.PHONY: run test lint bench bench-peers firmware test-firmware test-trust test-vision clean venv
 
 run: .venv/run
 	@set -e; \
@@ -38,6 +38,10 @@ firmware:
 test-firmware: .venv/dev firmware
 	$(MAKE) -C tests/firmware
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
+
+# Cameras, markers and calibration with many more frames, and their runs repeated.
+test-vision: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/hardware/vision tests/cli/test_vision_commands.py
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from wristctl.config.vision import SceneSettings
+from wristctl.cli.calibrate_camera import look
+from wristctl.config.vision import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.hardware.vision.board_shots import board_shots
+from wristctl.hardware.vision.camera import FolderCamera, Frame
 from wristctl.hardware.vision.scene import Scene
 from wristctl.runs import Run, open_run
 from wristctl.runs.manifest import command_of
@@ -111,3 +117,49 @@ def test_the_board_is_written_where_asked(call: Call, tmp_path: Path) -> None:
     code, out, err = call("hw", "calibrate", "board-pdf", "sheet.pdf", "--paper", "letter")
     assert code == 0 and out == "sheet.pdf\n" and "100 %" in err
     assert (tmp_path / "sheet.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = CalibrateCameraSettings(camera=0, views=8, scene=SceneSettings(noise=1.0))
+    shots = list(board_shots(settings.scene, settings.board, 9, np.random.default_rng(0)))
+    asked: list[str] = []
+
+    class Webcam:
+        """Gives each view twice, with pauses; the last one, in the plane, only once it was asked for."""
+
+        def __init__(self, source: str, _settings: object) -> None:
+            assert source == "0"
+            self.coming = [shots[0], None, *(shot for shot in shots[:-1] for _ in range(2))]
+            self.closed = False
+            cameras.append(self)
+
+        def newest(self) -> Frame | None:
+            if asked:
+                return shots[-1]
+            return self.coming.pop(0)
+
+        def close(self) -> None:
+            self.closed = True
+
+    def file(name: str) -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    cameras: list[Webcam] = []
+    monkeypatch.setattr("wristctl.hardware.vision.camera.DeviceCamera", Webcam)
+    monkeypatch.setattr("typer.prompt", lambda said, **_: asked.append(said))
+    progress = contextlib.nullcontext(lambda *_, **__: None)
+    session: Any = SimpleNamespace(
+        settings=settings, run=SimpleNamespace(file=file), progress=lambda *_: progress, console=None
+    )
+    album = look(session)
+    assert len(album.views) == 8 and cameras[0].closed
+    assert asked == ["Lay the board in the bending plane, then press Enter"]
+    assert np.array_equal(album.last_picture, shots[-1].image)
+    names = sorted(each.name for each in (tmp_path / "data" / "views").iterdir())
+    assert names == [*(f"{k:03}.png" for k in range(1, 9)), "plane.png"]
+    again = [frame.image for frame in FolderCamera(tmp_path / "data" / "views")]
+    assert len(again) == 9 and np.array_equal(again[-1], shots[-1].image)

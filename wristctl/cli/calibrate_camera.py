@@ -57,7 +57,7 @@ def calibrate_camera(session: Session) -> list[Table]:
 
     cv2.setNumThreads(1)
     run, settings = session.run, session.settings
-    album = _look(session)
+    album = look(session)
     lying = album.last if settings.in_plane else None
     found = calibrate(album.views, lying, album.size or (1, 1), settings)
     tilt = plane_tilt(found.view) if lying is not None else math.nan
@@ -95,7 +95,7 @@ def calibrate_camera(session: Session) -> list[Table]:
     return [Table("Views", ("what", "value"), seen), Table("Lens", columns, rows)]
 
 
-def _look(session: Session) -> Album:
+def look(session: Session) -> Album:
     """The views. Raises UserError where a source gives no pictures, or shows no board where it must."""
     import cv2
 

@@ -8,7 +8,7 @@ import typer
 
 import wristctl
 
-_NO_CONTROLLERS = ("__init__", "law", "model", "table")
+_NO_CONTROLLERS = ("__init__", "law", "model", "response", "table")
 
 
 def run_ids(context: typer.Context, incomplete: str) -> list[str]:

@@ -106,14 +106,15 @@ def track(session: Session) -> list[Table]:
 
 def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
     """What each frame tells, and annotated pictures of some."""
-    from wristctl.hardware.vision.annotate import Film, Picked
+    from wristctl.hardware.vision.annotate import AnnotatedVideo, Picked
     from wristctl.hardware.vision.camera import open_recording
     from wristctl.hardware.vision.marker import Tracker, Verdict
 
     settings = session.settings
     tracker = Tracker(settings.markers, _view(session), settings.gates)
     recording = open_recording(settings.video, settings.frame_rate)
-    film = Film(session.run.file("data/annotated.avi"), recording.frame_rate) if settings.annotate else None
+    video = session.run.file("data/annotated.avi")
+    film = AnnotatedVideo(video, recording.frame_rate) if settings.annotate else None
     sightings, picked, zero = [], Picked(), settings.zero == "first"
     try:
         with session.progress("frames") as done:

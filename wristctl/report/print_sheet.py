@@ -12,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
@@ -121,10 +122,11 @@ def _paint(axes: Axes, ink: Cells, left: float, top: float, cell: float) -> None
 
 
 def _ruler(axes: Axes, left: float, top: float) -> None:
-    for mm in range(int(RULER) + 1):
-        tall = 5.0 if mm % 10 == 0 else 3.5 if mm % 5 == 0 else 2.2
-        axes.plot([left + mm, left + mm], [top, top + tall], color=BLACK, linewidth=0.3, solid_capstyle="butt")
-    axes.plot([left, left + RULER], [top, top], color=BLACK, linewidth=0.3, solid_capstyle="butt")
+    ticks = [(mm, 5.0 if mm % 10 == 0 else 3.5 if mm % 5 == 0 else 2.2) for mm in range(int(RULER) + 1)]
+    lines = [((0.0, 0.0), (RULER, 0.0)), *(((mm, 0.0), (mm, tall)) for mm, tall in ticks)]
+    points = np.array(lines, float).reshape(-1, 2) + np.array([left, top])
+    outline = Outline(points, [Outline.MOVETO, Outline.LINETO] * len(lines))
+    axes.add_patch(PathPatch(outline, fill=False, edgecolor=BLACK, linewidth=0.3, capstyle="butt"))
     axes.text(left + 0.5 * RULER, top + 7.3, "100 mm", fontsize=7.5, ha="center", va="center")
 
 

@@ -20,14 +20,19 @@ from wristctl.hardware.vision.scene import Scene
 from wristctl.hardware.vision.view import FILE, View
 
 SCENE = SceneSettings(tilt_deg=10.0, pan_deg=-4.0)
-SETTINGS = CalibrateCameraSettings(scene=SCENE, views=12)
+SETTINGS = CalibrateCameraSettings(scene=SCENE, views=10)
 SIZE = SCENE.width, SCENE.height
 
 
 @pytest.fixture(scope="module")
-def album() -> Album:
+def shots() -> list[Frame]:
+    return list(board_shots(SCENE, Board(), SETTINGS.views, np.random.default_rng(0)))
+
+
+@pytest.fixture(scope="module")
+def album(shots: list[Frame]) -> Album:
     made = Album(Board())
-    for frame in board_shots(SCENE, Board(), SETTINGS.views, np.random.default_rng(0)):
+    for frame in shots:
         made.look(frame, str(frame.number))
     return made
 
@@ -104,8 +109,7 @@ def test_a_large_reprojection_error_is_refused_and_the_worst_view_named(album: A
         calibrate(spoilt, None, SIZE, SETTINGS)
 
 
-def test_only_new_views_are_kept_and_only_so_many(album: Album) -> None:
-    shots = list(board_shots(SCENE, Board(), 4, np.random.default_rng(0)))
+def test_only_new_views_are_kept_and_only_so_many(shots: list[Frame]) -> None:
     kept = Album(Board(), most=2)
     assert [kept.look(shots[k], str(k)) for k in (0, 0, 1, 2)] == [True, False, True, False]
     assert kept.last is not None and kept.last.name == "2"

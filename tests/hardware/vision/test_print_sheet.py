@@ -28,25 +28,29 @@ def scanned(page: object) -> np.ndarray:
     return np.asarray(canvas.buffer_rgba())[..., 0].copy()
 
 
-@pytest.mark.parametrize("paper", PAPERS)
-def test_the_pdf_has_two_pages_of_the_papers_size(paper: str, tmp_path: Path) -> None:
-    file = tmp_path / "sheets.pdf"
-    write_sheets(file, paper, Board(), Markers())  # type: ignore[arg-type]
-    boxes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", file.read_bytes())
-    assert len(boxes) == 2
-    for box in boxes:
-        assert [POINT * float(each) for each in box] == pytest.approx(PAPERS[paper], abs=0.01)
-
-
-def test_squares_ruler_and_markers_in_the_pdf_measure_what_they_should(tmp_path: Path) -> None:
-    file = tmp_path / "sheets.pdf"
+@pytest.fixture(scope="module")
+def sheets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("sheets") / "a4.pdf"
     write_sheets(file, "a4", Board(), Markers())
-    packed = re.findall(rb"stream\r?\n(x.*?)endstream", file.read_bytes(), re.DOTALL)
+    return file
+
+
+def test_the_pdf_has_two_pages_of_the_papers_size(sheets: Path, tmp_path: Path) -> None:
+    write_sheets(tmp_path / "letter.pdf", "letter", Board(), Markers())
+    for file in (sheets, tmp_path / "letter.pdf"):
+        boxes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", file.read_bytes())
+        assert len(boxes) == 2
+        for box in boxes:
+            assert [POINT * float(each) for each in box] == pytest.approx(PAPERS[file.stem], abs=0.01)
+
+
+def test_squares_ruler_and_markers_in_the_pdf_measure_what_they_should(sheets: Path) -> None:
+    packed = re.findall(rb"stream\r?\n(x.*?)endstream", sheets.read_bytes(), re.DOTALL)
     text = b"\n".join(zlib.decompressobj().decompress(each) for each in packed).decode("latin1")
     at = r"(-?[\d.]+) (-?[\d.]+)"
     lines, boxes = (
         POINT * np.array(re.findall(pattern, text), float)
-        for pattern in (rf"{at} m\n{at} l\n\nS", rf"{at} m\n{at} l\n{at} l\n{at} l\nh\n\nf")
+        for pattern in (rf"{at} m\n{at} l\n(?=-?[\d.]+ -?[\d.]+ m|\nS)", rf"{at} m\n{at} l\n{at} l\n{at} l\nh\n\nf")
     )
     lengths = np.hypot(*(lines[:, 2:] - lines[:, :2]).T)
     assert np.sum(np.abs(lengths - 100.0) < 0.001) == 2  # a ruler on each page

@@ -61,7 +61,7 @@ class Picked:
         return [known[number] for number in sorted(known)]
 
 
-class Film:
+class AnnotatedVideo:
     """An annotated video as Motion JPEG, which every build of OpenCV can write."""
 
     def __init__(self, file: Path, frame_rate: float) -> None:
