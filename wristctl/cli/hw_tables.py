@@ -74,7 +74,8 @@ def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tup
         for name, unit in zip(_MEANS, ("rad", "rad", "s", "s", "rad", "rad"), strict=True):
             if name == "recovery" and not pushed:
                 continue
-            full = "_".join([*["pushed"] * pushed, name, *[label.replace("/", "-").replace(" ", "-")] * (len(labels) > 1)])
+            whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
+            full = "_".join([*["pushed"] * pushed, name, *whose])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
             session.run.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
         yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)

@@ -30,7 +30,7 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
 
 
 def test_tensions_and_spools_in_the_log_are_what_the_emulated_tendons_do(experiment: Run) -> None:
-    """Positions of the status, times the step, are what the bench's spools hold; pulls follow tensions within friction."""
+    """Once the reference rests, each tendon pulls as commanded, within friction and what the springs lack."""
     done = experiment()
     log, truth = done.table("log"), done.table("truth")
     late = log[log["time"] > 0.35]

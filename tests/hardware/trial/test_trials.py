@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,9 +19,9 @@ TIME = np.arange(0.0, 5.0, 5e-3)
 def test_every_trial_comes_once_and_the_wrist_is_turned_once(seed: int) -> None:
     settings = settings_of(directions=("ulnar", "radial", "flexion", "extension"), repetitions=3, push={"force": 2.0})
     trials = trials_of(settings, np.random.default_rng(seed))
-    assert [trial.number for trial in trials] == list(range(24)) and len({trial[1:] for trial in trials}) == 24
+    assert [trial.number for trial in trials] == list(range(24)) and len({t[1:] for t in trials}) == 24
     planes = [trial.plane for trial in trials]
-    assert sum(one != other for one, other in zip(planes, planes[1:], strict=False)) == 1
+    assert sum(one != other for one, other in pairwise(planes)) == 1
     assert trials == trials_of(settings, np.random.default_rng(seed))
 
 

@@ -75,10 +75,12 @@ def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
     try:
         hello = board.connect()
         try:
+            stand.face(settings.plane, Patience(board))
+            eye = stand.eye()
+            Patience(board).angle(eye, settings.homing.frames)  # the marker is seen, and nothing moves yet
             stand.confirm()
             prepare(board, settings)
-            stand.face(settings.plane, Patience(board))
-            zero = find_zero(board, stand.eye(), spools, settings.homing, settings.plane)
+            zero = find_zero(board, eye, spools, settings.homing, settings.plane)
             slack = round(settings.homing.pull / spools.step)
             one, two, four, five = (-slack * sign for sign in zero.signs)
             board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))

@@ -21,8 +21,9 @@ from wristctl.hardware.trial.loop import ControlLoop, Shown, Timing
 from wristctl.hardware.trial.moves import at_rest, back, motion_of
 from wristctl.hardware.trial.prepare import prepare
 from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.spools import spools_of
+from wristctl.hardware.trial.spools import Paths, spools_of
 from wristctl.hardware.trial.stands import Stand
+from wristctl.hardware.trial.steering import Steering
 from wristctl.hardware.trial.trials import Trial
 from wristctl.runs.interrupt import undisturbed
 from wristctl.wrist.directions import DIRECTIONS, in_plane
@@ -87,6 +88,7 @@ class Experiment:
         """
         board = Board(stand.transport)
         try:
+            self._warm_up()
             board.connect()
             try:
                 self._all(stand, board, shown)
@@ -103,9 +105,18 @@ class Experiment:
         finally:
             stand.close()
 
+    def _warm_up(self) -> None:
+        """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
+        settings = self._settings
+        steering = Steering(self._wrist, settings.actuator, settings.sensor, settings.control_period, 0.0)
+        taut, _ = Paths(self._wrist, self._trials[0].plane).taut(0.0)
+        for law, gains in [*self._laws, (self._back, ())]:
+            steering.use(law, gains)
+            steering.respond(0.0, 0.0, 0.0)
+            steering.expect(float(taut[0]), float(taut[0]))
+        steering.see(0.0, 0.0)
+
     def _all(self, stand: Stand, board: Board, shown: Shown | None) -> None:
-        stand.confirm()
-        prepare(board, self._settings)
         plane = ""
         for trial in self._trials:
             if trial.plane != plane:
@@ -117,11 +128,13 @@ class Experiment:
     def _loop(self, stand: Stand, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
         """A loop at rest at zero in this plane; the first one homes the board, later ones read the marker's zero."""
         settings, eye = self._settings, stand.eye()
-        if self.zero is None:
+        marker = Patience(board).angle(eye, 4 * settings.homing.frames)
+        if self.zero is None:  # the marker is seen, and nothing moves yet
+            stand.confirm()
+            prepare(board, settings)
             self.zero = self._home(board, eye, plane)
-            eye.zero = self.zero.marker
-        else:
-            eye.zero = Patience(board).angle(eye, 4 * settings.homing.frames)
+            marker = self.zero.marker
+        eye.zero = marker
         toward = "ulnar" if plane == "ulnar" else "flexion"
         loop = ControlLoop(
             board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, self.timing, self._log, shown,
