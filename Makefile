@@ -5,7 +5,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers firmware test-firmware test-faults test-trust test-vision clean venv
+.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision clean venv
 
 run: .venv/run
 	@set -e; \
@@ -48,7 +48,11 @@ test-faults: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
 
 bench-peers: .venv/run
-	$(BIN)/python benchmarks/peers/run.py --out results/peers-$$(date -u +%Y%m%dT%H%M%SZ)
+	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers
+
+# Everything that docs/benchmarks.md says, measured anew, and the page.
+bench-all: .venv/run
+	$(BIN)/python benchmarks/all.py
 
 # Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev

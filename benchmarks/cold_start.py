@@ -15,6 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[1])}
 STUDY = """\
 gen-data: {samples: 1000}
 train: {epochs: 20}
@@ -41,7 +42,7 @@ def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
     program = [sys.executable, "-c", "from wristctl.cli.app import main; main()"]
     process = subprocess.Popen(
         [*program, command, *arguments, *out], cwd=folder, text=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env={**os.environ, "XDG_CACHE_HOME": str(cache)},
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env={**ENVIRONMENT, "XDG_CACHE_HOME": str(cache)},
     )  # fmt: skip
     assert process.stderr is not None
     first, said = None, []
@@ -58,7 +59,8 @@ def import_seconds(command: str) -> float:
     """Time to import the module of one command."""
     module = "wristctl.cli.app" if command == "--help" else f"wristctl.cli.{command.replace('-', '_')}"
     code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
-    return float(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout)
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, env=ENVIRONMENT)
+    return float(done.stdout)
 
 
 def main() -> None:

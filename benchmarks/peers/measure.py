@@ -1,79 +1,68 @@
-"""Error and speed of every side: one set of processes at a time, alternating runs, all raw numbers kept."""
+"""Speed of every side: one set of processes at a time, alternating runs, all raw numbers kept."""
 
 from __future__ import annotations
 
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import truth
-from running import Running
+from running import Failed, Running
+from say import say
 from table import Side
 
-FEWEST_TICKS = 4
-
-
-def errors(sides: tuple[Side, ...], file: Path, segments: int, implicit: np.ndarray) -> dict[str, dict[str, float]]:
-    """Of each side: largest error of the tip angle [rad] against its reference trajectory, and against wristctl's."""
-    found = {}
-    for side in sides:
-        say(f"error of {side.name}, n = {segments}")
-        theta = _trajectory(side, file, segments, None)
-        own = _trajectory(side, file, segments, side.fine[segments]) if side.fine else implicit
-        found[side.name] = {"error": _far(theta, own), "model_difference": _far(own, implicit)}
-    return found
-
-
-def _trajectory(side: Side, file: Path, segments: int, steps: int | None) -> np.ndarray:
-    with Running(side, file, segments, 1, steps) as running:
-        return np.array(running.ask(1, truth.COMPARED, theta=True)["theta"])
-
-
-def _far(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.max(np.abs(a - b)))
+FEWEST_TICKS, LONGEST = 20, 1.5
+"""A run has no fewer ticks, so that what it costs beside them does not count, unless it took longer than this [s]."""
 
 
 def speeds(
-    sides: tuple[Side, ...], file: Path, segments: int, threads: int, lane_counts: list[int], budget: float, rounds: int
-) -> list[dict[str, Any]]:
-    """Simulated seconds per second of each side and number of lanes, one row each with its raw runs."""
+    sides: list[tuple[Side, int]], file: Path, segments: int, threads: int, lane_counts: list[int], budget: float,
+    rounds: int,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Simulated seconds per second of each side with its steps a tick, a row for each number of lanes, raw runs kept.
+
+    A row whose side failed has `failed` instead of rates.
+    """
     rows: list[dict[str, Any]] = []
     with ExitStack() as stack:
-        running = [stack.enter_context(Running(side, file, segments, threads)) for side in sides]
         plans = []
-        for each in running:
+        for side, steps in sides:
+            running = stack.enter_context(Running(side, file, threads, steps))
             for lanes in lane_counts:
-                if lanes > each.side.most_lanes:
+                if lanes > side.most_lanes or (lanes == 1 and threads > 1):
                     continue
-                say(f"{each.side.name}, n = {segments}, {threads} threads, {lanes} lanes")
-                prepare, ticks, repeats = _plan(each, lanes, budget)
-                row = {"side": each.side.name, "segments": segments, "threads": threads, "lanes": lanes,
-                       "ticks": ticks, "prepare": prepare, "rates": []}  # fmt: skip
+                say(f"{side.name}, n = {segments}, {steps} steps, {threads} threads, {lanes} lanes")
+                row = {"side": side.name, "segments": segments, "threads": threads, "lanes": lanes, "steps": steps}
                 rows.append(row)
-                plans.append((each, lanes, ticks, repeats, row))
+                try:
+                    prepare, ticks, repeats = _plan(running, lanes, budget)
+                except Failed as failure:
+                    say(f"  left out: {failure}")
+                    row["failed"] = str(failure)
+                    break
+                row |= {"ticks": ticks, "prepare": prepare, "rates": []}
+                plans.append((running, lanes, ticks, repeats, row))
+        say(f"{rounds} alternating rounds, n = {segments}, {threads} threads")
         for _ in range(rounds):
-            for each, lanes, ticks, repeats, row in sorted(plans, key=lambda plan: plan[1]):
-                seconds = each.ask(lanes, ticks, repeats)["seconds"]
+            for running, lanes, ticks, repeats, row in sorted(plans, key=lambda plan: plan[1]):
+                seconds = running.ask(lanes, ticks, repeats)["seconds"]
                 row["rates"].append(lanes * ticks * repeats * truth.PERIOD / seconds)
     for row in rows:
-        row["rate"] = float(np.median(row["rates"]))
+        if "rates" in row:
+            row["rate"] = float(np.median(row["rates"]))
     return rows
 
 
 def _plan(running: Running, lanes: int, budget: float) -> tuple[float, int, int]:
-    """Seconds to prepare, and the ticks and repeats that fill the budget [s]."""
+    """Seconds to prepare, and the ticks and repeats of a run that fills the budget [s]."""
     whole = round(truth.HORIZON / truth.PERIOD)
-    prepare = running.ask(lanes, FEWEST_TICKS)["prepare"]
-    ticks, longer = 0, FEWEST_TICKS
-    while longer > 1.5 * ticks:  # what a call costs beside its ticks must not count for short runs
-        ticks = longer
+    first = running.ask(lanes, 2)
+    prepare = first["prepare"]
+    each = min(first["seconds"], running.ask(lanes, 2)["seconds"]) / 2
+    fewest = max(2, min(FEWEST_TICKS, int(LONGEST / each)))
+    ticks = int(np.clip(budget / each, fewest, whole))
+    if each * ticks < 2.0 * LONGEST:  # a longer run says more about its ticks
         each = running.ask(lanes, ticks)["seconds"] / ticks
-        longer = int(np.clip(budget / each, FEWEST_TICKS, whole))
+        ticks = int(np.clip(budget / each, fewest, whole))
     return prepare, ticks, max(1, round(budget / (each * ticks)))
-
-
-def say(message: str) -> None:
-    """Progress for people, to stderr."""
-    print(message, file=sys.stderr, flush=True)

@@ -1,6 +1,7 @@
 """wristctl beside its peers: `make bench-peers`, or `python benchmarks/peers/run.py --out DIR [--quick]`.
 
-Writes result.json, table.md and rates.png/svg into DIR. Peers are installed in environments of their own first.
+Writes peers.json, peers.md and peers.png/svg into DIR. Peers are installed in environments of their own first; one that
+cannot be is left out and named.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import argparse
 import json
 import os
 import platform
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -16,10 +18,19 @@ from typing import Any
 
 import numpy as np
 import truth
-from measure import errors, say, speeds
-from report import figure, markdown
-from table import SIDES
+from claims import beside_peers
+from errors import errors
+from measure import speeds
+from picture import figure
+from rates import Result
+from report import claims_table, markdown
+from roofline import operations, peaks, scratch
+from say import say
+from table import OURS, SIDES, Side
 from venvs import CACHE, HERE, python_of
+
+BLOWN_UP = 0.1
+"""Error [rad] beyond which a step is no solution."""
 
 
 def machine() -> dict[str, Any]:
@@ -38,6 +49,32 @@ def machine() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def installed(sides: tuple[Side, ...]) -> tuple[tuple[Side, ...], dict[str, str]]:
+    """The sides that can run, and why others cannot."""
+    missing: dict[str, str] = {}
+    for side in sides:
+        try:
+            python_of(side.venv)
+        except (OSError, subprocess.CalledProcessError) as failure:
+            missing[side.name] = f"could not be installed: {failure}"
+    if shutil.which("g++") is None:
+        missing |= {side.name: "no g++ here" for side in sides if side.peer == "C"}
+    for name, why in missing.items():
+        say(f"left out: {name}: {why}")
+    return tuple(side for side in sides if side.name not in missing), missing
+
+
+def variants(sides: tuple[Side, ...], found: dict[str, Any]) -> list[tuple[Side, int]]:
+    """Each side with one step a tick, unless that blows up, and with the steps that reach wristctl's error."""
+    pairs = []
+    for side in sides:
+        if "errors" in found[side.name]:
+            errors_by_steps = found[side.name]["errors"]
+            steps = {1, found[side.name]["steps"]}
+            pairs += [(side, count) for count in sorted(steps) if errors_by_steps[count] < BLOWN_UP]
+    return pairs
+
+
 def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -45,34 +82,44 @@ def main() -> None:
     parser.add_argument("--sides", nargs="*", help="names of table.py; all by default")
     parser.add_argument("--segments", nargs="*", type=int, default=[1, 4])
     parser.add_argument("--lanes", nargs="*", type=int, default=[1, 64, 1024])
-    parser.add_argument("--budget", type=float, default=1.0, help="seconds of one timed run")
-    parser.add_argument("--rounds", type=int, default=7, help="alternating runs of each side")
-    parser.add_argument("--quick", action="store_true", help="short runs, three rounds")
+    parser.add_argument("--budget", type=float, default=0.2, help="seconds of one timed run")
+    parser.add_argument("--rounds", type=int, default=5, help="alternating runs of each side")
+    parser.add_argument("--quick", action="store_true", help="shorter runs, three rounds")
     options = parser.parse_args()
     if options.quick:
-        options.budget, options.rounds = 0.2, 3
-    sides = tuple(side for side in SIDES if not options.sides or side.name in options.sides)
-    for venv in {side.venv for side in sides}:
-        python_of(venv)
+        options.budget, options.rounds = 0.05, 3
+    chosen = tuple(side for side in SIDES if not options.sides or side.name in (OURS, *options.sides))
+    CACHE.mkdir(parents=True, exist_ok=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    task_values = {"period": truth.PERIOD, "gains": truth.GAINS, "move": truth.MOVE}
-    result: dict[str, Any] = {"machine": machine(), "task": task_values}
-    result["sides"] = {side.name: {"problem": side.problem, "steps": side.steps} for side in sides}
-    result["errors"], result["speeds"] = {}, []
+    sides, missing = installed(chosen)
+    raw: dict[str, Any] = {
+        "machine": machine(),
+        "task": {"period": truth.PERIOD, "gains": truth.GAINS, "move": truth.MOVE},
+        "sides": {side.name: {"peer": side.peer, "problem": side.problem} for side in sides},
+        "missing": missing, "errors": {}, "speeds": [],
+    }  # fmt: skip
+    cores = len(os.sched_getaffinity(0))
+    if shutil.which("g++"):
+        say("peak of the machine")
+        raw["peaks"] = {threads: peaks(threads) for threads in sorted({1, cores})}
+        raw["operations"] = {n: operations(n) for n in options.segments}
+        raw["scratch"] = {n: scratch(n) for n in options.segments}
     for n in options.segments:
-        present = tuple(side for side in sides if n in side.steps)
+        present = tuple(side for side in sides if n in side.segments)
         task, file = truth.make_task(n), CACHE / f"task-{n}.npz"
-        CACHE.mkdir(parents=True, exist_ok=True)
         task.save(file)
         say(f"implicit reference trajectory, n = {n} (minutes the first time, then from {CACHE})")
-        result["errors"][str(n)] = errors(present, file, n, truth.implicit(task, CACHE))
-        for threads in sorted({1, len(os.sched_getaffinity(0))}):
-            rows = speeds(present, file, n, threads, options.lanes, options.budget, options.rounds)
-            result["speeds"] += rows
-            (options.out / "result.json").write_text(json.dumps(result, indent=1) + "\n")
-    (options.out / "table.md").write_text(markdown(result))
-    figure(result, options.out / "rates")
-    print(markdown(result))
+        found = errors(present, file, n, truth.implicit(task, CACHE))
+        raw["errors"][str(n)] = found
+        for threads in sorted({1, cores}):
+            pairs = variants(present, found)
+            raw["speeds"] += speeds(pairs, file, n, threads, options.lanes, options.budget, options.rounds)
+            (options.out / "peers.json").write_text(json.dumps(raw, indent=1) + "\n")
+    result = Result(json.loads(json.dumps(raw)))
+    text = claims_table(beside_peers(result)) + "\n" + markdown(result)
+    (options.out / "peers.md").write_text(text)
+    figure(result, options.out / "peers")
+    print(text)
     print(options.out)
 
 

@@ -31,7 +31,7 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     ),),
     "simulate": (("--set", "horizon=0.5"),),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
-    "audit": (("--set", "claims=claims.yaml", "--set", "horizon=0.1"),),
+    "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip
 """What makes a command quick; one that is not named here runs as it is."""
 
@@ -67,7 +67,6 @@ def test_every_command_that_makes_a_run_is_known() -> None:
 
 
 def test_killed_at_random_moments_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:
-    (tmp_path / "claims.yaml").write_text(f"claims: [{CLAIM}]")
     everything = [(name, *options) for name in _that_write() for options in QUICKLY.get(name, ((),))]
     typed = everything if THOROUGH else everything[:1]
     durations = {each: _duration(tmp_path, *each) for each in typed}

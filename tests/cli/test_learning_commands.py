@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +132,27 @@ def test_without_a_data_run_train_draws_what_gen_data_would(call) -> None:
     drawn, own = open_run("latest:gen-data"), open_run("latest:train")
     assert own.file("data/samples.npz").read_bytes() == drawn.file("data/samples.npz").read_bytes()
     assert "samples: 100" in own.file("config.yaml").read_text()
+
+
+def test_a_search_killed_outright_resumes_to_the_same_bytes(call, tmp_path: Path) -> None:
+    grid = "grid={depths: [1, 2], activations: [tanh, relu], widths: [8], folds: 5}"
+    search = ("train", "--search", *QUICK, "--epochs", "40", "--set", grid, "--set", "gen-data.samples=80")
+    command = [sys.executable, "-P", "-m", "wristctl", *search]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    child = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.DEVNULL)
+    while len(list(tmp_path.glob("results/*/checkpoints/grid-*.pt"))) < 3:
+        assert child.poll() is None, "it ended before it could be killed"
+        time.sleep(0.005)
+    child.kill()
+    child.wait()
+    (killed,) = list_runs(Path("results"))
+    done = len(list((killed.path / "checkpoints").glob("grid-*.pt")))
+    assert killed.state == "crashed" and 3 <= done < 20
+    code, _, _ = call(*search, "--resume", killed.id)
+    resumed = open_run("latest:train")
+    call(*search)
+    whole = open_run("latest:train")
+    assert code == 0 and resumed.id != whole.id and resumed.result_hash == whole.result_hash
 
 
 def test_rows_are_ranked_with_intervals_beside_the_paper(call, tmp_path: Path) -> None:

@@ -70,6 +70,7 @@ def test_a_repetition_is_identical_to_the_byte(wristctl: Command, data: str) -> 
 LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.4")
 ROW = "rows=[{controller: smc, gains: tuned}, {controller: feedforward, gains: default}]"
 SEARCH = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
+CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
 CHAIN = (
     ("gen-data", "--source", "plant", "--samples", "60"),
     ("simulate", "--set", "horizon=0.3"),
@@ -81,6 +82,7 @@ CHAIN = (
         "compare", *LOOP, "--network", "latest:train", "--tuned", "latest:tune", "--set", ROW,
         "--set", "references=[{kind: step}]",
     ),
+    ("audit", "--set", f"claims=[{CLAIM}]", "--set", "horizon=0.3"),
 )  # fmt: skip
 
 

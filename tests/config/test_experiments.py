@@ -27,11 +27,6 @@ SECTIONS = {field.alias or name: name for name, field in Study.model_fields.item
 COMMANDS = [key for key, name in SECTIONS.items() if name not in ("seed", "wrist")]
 
 
-def _studies() -> list[Path]:
-    """The experiments that are study files (claims.yaml is what one of them reads)."""
-    return [file for file in EXPERIMENTS if set(parse_yaml(file.read_bytes(), str(file)).data) <= set(SECTIONS)]
-
-
 def _other(value: Any) -> Any:
     match value:
         case bool():
@@ -70,7 +65,7 @@ def _with_every_kind(study: Study) -> Study:
     return study.model_copy(update={"compare": compared, "simulate": simulated})
 
 
-@pytest.mark.parametrize("file", _studies(), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
 def test_every_leaf_changes_the_fingerprint_of_the_command_that_reads_it(file: Path) -> None:
     study = _with_every_kind(load_study([file]))
@@ -131,7 +126,7 @@ def _alone(data: Mapped, path: KeyPath, more: Mapped) -> Mapped:
 def _all_mappings() -> dict[str, tuple[Mapped, KeyPath, Mapped]]:
     """The data, key path and mapping of each place in the schema at which an experiment has a mapping."""
     found: dict[str, tuple[Mapped, KeyPath, Mapped]] = {}
-    for file in _studies():
+    for file in EXPERIMENTS:
         study = _with_every_kind(load_study([file]))
         data: Mapped = {}
         for command in COMMANDS:

@@ -14,6 +14,7 @@ from wristctl.control.table import controller
 from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
+from wristctl.lanes.types import LANES
 from wristctl.wrist.allocation import allocate, reach
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments, segments
@@ -62,11 +63,11 @@ def _closed_loop(
     law, ticks = controller(name), len(reference)
     rows = [segments(plant, segments_), segments(model, 1), np.array([4.0, limit]), np.array([*gains, 0.0])]
     plant_row, model_row, limits, gain_row = (to_blocks(row[None])[0] for row in rows)
-    lanes = np.ascontiguousarray(np.repeat(reference[:, :, None], 8, axis=2))
-    memory, state = np.zeros((max(1, law.memory), 8)), np.zeros((2 * segments_, 8))
-    out = np.zeros((ticks, 3 + len(memory), 8))
+    lanes = np.ascontiguousarray(np.repeat(reference[:, :, None], LANES, axis=2))
+    memory, state = np.zeros((max(1, law.memory), LANES)), np.zeros((2 * segments_, LANES))
+    out = np.zeros((ticks, 3 + len(memory), LANES))
     _run(
-        law.compiled, plant_row, model_row, limits, gain_row, lanes, np.zeros((len(NOW), 8)), memory, state, out,
+        law.compiled, plant_row, model_row, limits, gain_row, lanes, np.zeros((len(NOW), LANES)), memory, state, out,
         period, (0,) * segments_,
     )  # fmt: skip
     return Course(out[:, 0, 0], out[:, 1, 0], out[:, 2, 0], out[:, 3:, 0])

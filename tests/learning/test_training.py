@@ -61,7 +61,7 @@ def test_losses_are_mean_squared_angles(
     assert [e.epoch for e in trained.epochs] == list(range(1, quick.epochs + 1))
 
 
-@pytest.mark.parametrize("optimiser", ["adam", "adamw", "sgd"])
+@pytest.mark.parametrize("optimiser", ["adam", "adamw", "sgd", "levenberg-marquardt"])
 def test_the_same_seed_gives_the_same_network(
     samples: Samples, split: Split, optimiser: str, quick: NetworkSettings
 ) -> None:
@@ -110,6 +110,14 @@ def test_the_number_of_processes_changes_no_byte(samples: Samples, split: Split,
     assert told == {(job, epoch) for job in range(3) for epoch in (1, 2)}
 
 
+CHANGES: tuple[dict[str, object], ...] = (
+    {},
+    {"schedule": "cosine"},
+    {"patience": 2, "learning_rate": 0.05},
+    {"optimiser": "levenberg-marquardt", "weight_decay": 1e-5},
+)
+
+
 def interrupted_at(last: int, samples: Samples, job: Job, checkpoints: Path | None = None) -> Trial:
     def stop(epoch: Epoch) -> None:
         if epoch.epoch == last:
@@ -126,7 +134,7 @@ def test_interrupted_training_keeps_its_last_whole_epoch(
     assert trial.interrupted and not whole.interrupted and same_bytes(trial, whole)
 
 
-@pytest.mark.parametrize("change", [{}, {"schedule": "cosine"}, {"patience": 2, "learning_rate": 0.05}])
+@pytest.mark.parametrize("change", CHANGES)
 def test_a_training_taken_up_from_its_checkpoint_ends_in_the_same_bytes(
     samples: Samples, split: Split, quick: NetworkSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change
 ) -> None:

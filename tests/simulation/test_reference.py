@@ -9,6 +9,8 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
+from wristctl.learning.domain import Domain
+from wristctl.learning.network import Network, Scaler
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.simulate import chain_tip
 from wristctl.wrist.kinematics import arc_tip, exact_arc
@@ -57,6 +59,16 @@ def test_impossible_references_are_refused() -> None:
         Reference(angle_deg=10.0, tip=(0.08, 0.0), inverse="exact")
     with pytest.raises(ValidationError, match="needs inverse"):
         Reference(tip=(0.08, 0.0))
+
+
+def test_the_share_of_tips_that_a_network_never_learned_is_told() -> None:
+    weight = (np.array([[0.0, 1.0]]), np.array([[1.0]]))
+    scaler = Scaler(np.zeros(2), np.ones(2)), Scaler(np.zeros(1), np.ones(1))
+    domain = Domain((-0.3, 0.3), (0.07, 0.09))
+    network = Network(weight, (np.zeros(1), np.zeros(1)), "tanh", *scaler, domain)
+    m = motion(Reference(inverse="network", duration=2.0), WRIST, 3.0, 1e-3, network.along)
+    assert m.outside == np.mean(evaluated(duration=2.0).theta_ref > 0.3) > 0.3
+    assert evaluated(inverse="exact").outside == 0.0
 
 
 def test_chain_tip_equals_the_compiled_kinematics() -> None:

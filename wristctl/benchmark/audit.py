@@ -4,57 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import ValidationError
 
 from wristctl.benchmark.paper import FACTOR
-from wristctl.config.audit import Claim, Ledger, Outcome
+from wristctl.config.audit import Claim, Outcome
 from wristctl.config.control import CompareSettings, Row
 from wristctl.config.errors import UserError
-from wristctl.config.explain import explained
 from wristctl.config.loop import LOOPS, Reference
-from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
+from wristctl.runs import Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_TO_COME = {"network": "wristctl train on experiments/table1.yaml", "hardware": "trials on the wrist"}
+TRAININGS = {"table1": "experiments/table1.yaml", "selection": "experiments/model_selection.yaml"}
+"""Evidence that a train run gives, and the experiment it is a run of."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim with what was found: the range of our values, the verdict, the reason, and the loop that shows it."""
+    """A claim with what was found: the range of our values, the verdict, the reason, and what shows it."""
 
     claim: Claim
     low: float
     high: float
     verdict: Outcome
     reason: str
-    loops: tuple[str, ...] = ()
+    shown_by: tuple[str, ...] = ()
+    """loops of a comparison, or a key of TRAININGS"""
 
 
-def read_claims(path: Path) -> tuple[Claim, ...]:
-    """The ledger; UserError where it cannot be read, is not valid, or names a claim twice."""
-    try:
-        document = parse_yaml(path.read_bytes(), str(path))
-    except OSError as error:
-        raise UserError(f"cannot read the claims: {error.strerror}", str(path), "--set claims=FILE") from error
-    origins = {key: f"{path}:{line}" for key, line in document.lines.items()}
-    try:
-        data = document.data or {}
-        ledger = Ledger.model_validate({**data, "claims": tuple(data.get("claims", ()))})
-    except ValidationError as error:
-        wrong = explained(error, origins)
-        raise UserError(wrong.what, wrong.where, f"a claim has {', '.join(Claim.model_fields)}") from error
-    ids = [claim.id for claim in ledger.claims]
-    for number, name in enumerate(ids):
-        if name in ids[:number]:
-            raise UserError(f"claim {name} stands there twice", str(path), "give each claim an id of its own")
-    return ledger.claims
+def check_trainings(claims: Sequence[Claim], trainings: Mapping[str, Run]) -> None:
+    """UserError where one of the train runs, by keys of TRAININGS, lacks a metric that a claim asks for."""
+    for claim in claims:
+        run = trainings.get(claim.evidence)
+        if run is not None and claim.metric not in run.metrics:
+            raise UserError(
+                f"claim {claim.id} needs the metric '{claim.metric}', which this run does not have",
+                str(run.path),
+                f"give --{claim.evidence} a run of `wristctl train {TRAININGS[claim.evidence]}`",
+            )
 
 
 def evidence_study(study: Study, claims: Sequence[Claim], loop: str) -> Study:
@@ -71,16 +62,18 @@ def evidence_study(study: Study, claims: Sequence[Claim], loop: str) -> Study:
     return study.model_copy(update={"compare": compared})
 
 
-def judge(claim: Claim, found: Mapping[str, pd.DataFrame]) -> Judgement:
-    """Judge one claim by the comparisons of each loop."""
+def judge(claim: Claim, found: Mapping[str, pd.DataFrame], trainings: Mapping[str, Run]) -> Judgement:
+    """Judge one claim by the comparisons of each loop and by the train runs there are, by keys of TRAININGS."""
     if claim.evidence == "text":
         assert claim.verdict is not None
         return Judgement(claim, np.nan, np.nan, claim.verdict, claim.reason)
     if claim.evidence == "settings":
         return Judgement(claim, np.nan, np.nan, "taken over", claim.reason)
-    if claim.evidence != "comparison":
-        reason = f"{claim.reason}: {_TO_COME[claim.evidence]}"
-        return Judgement(claim, np.nan, np.nan, "open", reason)
+    if claim.evidence == "hardware":
+        return Judgement(claim, np.nan, np.nan, "open", claim.reason)
+    if claim.evidence in TRAININGS:
+        run = trainings.get(claim.evidence)
+        return _by_training(claim, run) if run else _untrained(claim)
     ranges = {loop: _range(claim, table) for loop, table in found.items()}
     known = {loop: values for loop, values in ranges.items() if values is not None}
     return _by_loops(claim, known)
@@ -94,6 +87,24 @@ def _range(claim: Claim, table: pd.DataFrame) -> tuple[float, float] | None:
         return None
     values = moves[str(claim.metric)].fillna(np.inf)
     return float(values.min()), float(values.max())
+
+
+def _untrained(claim: Claim) -> Judgement:
+    how = f"needs --{claim.evidence} with a run of `wristctl train {TRAININGS[claim.evidence]}`"
+    return Judgement(claim, np.nan, np.nan, "open", how)
+
+
+def _by_training(claim: Claim, run: Run) -> Judgement:
+    """Whether the paper's value lies in the 95 % interval over the seeds, or within FACTOR of it."""
+    assert claim.value is not None
+    found = run.metrics[str(claim.metric)]
+    ours = np.nan if found["value"] is None else float(found["value"])
+    low, high = found.get("interval") or (ours, ours)
+    slack = 1.0 if claim.exact else FACTOR
+    verdict: Outcome = "reproduced" if low / slack <= claim.value <= high * slack else "not reproduced"
+    said = f"{claim.metric} is {ours:.3g}" + (f" (n = {found['n']})" if found.get("n") else "")
+    reason = "; ".join(part for part in (claim.reason, said) if part)
+    return Judgement(claim, low, high, verdict, reason, (claim.evidence,))
 
 
 def _by_loops(claim: Claim, ranges: Mapping[str, tuple[float, float]]) -> Judgement:
@@ -142,6 +153,7 @@ def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
                 "ours_high": j.high,
                 "unit": j.claim.unit,
                 "verdict": j.verdict,
+                "shown_by": ", ".join(j.shown_by),
                 "reason": j.reason,
             }
             for j in judged

@@ -21,7 +21,7 @@ from wristctl.hardware.trial.log import TrialLog
 from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.stands import open_stand
 from wristctl.hardware.trial.trials import Trial, trials_of
-from wristctl.hardware.vision.annotate import Film
+from wristctl.hardware.vision.annotate import AnnotatedVideo
 from wristctl.hardware.vision.view import FILE, View
 from wristctl.simulation.metrics import METRICS
 
@@ -54,7 +54,7 @@ def performed(session: Session) -> pd.DataFrame:
     experiment = Experiment(
         settings, study.wrist, trials, trial_log, network_of(session), tuned_of(session), calibration
     )
-    film = Film(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
+    film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
@@ -141,8 +141,8 @@ def _say_how_it_went(session: Session, experiment: Experiment, trial_log: TrialL
     sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
     log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
     text = last_second(trial_log).text()
-    run.summary(f"Stopped: {stop.reason}\n\n```\n{text}\n```")
-    log.warning("stopped: %s\n%s", stop.reason, text)
+    run.summary(f"{stop.reason}\n\n```\n{text}\n```")
+    log.warning("%s\n%s", stop.reason, text)
 
 
 def last_second(trial_log: TrialLog) -> Table:

@@ -73,6 +73,12 @@ def tuned_study(session: Session) -> Study | None:
     return load_study([run.file("config.yaml")]) if run else None
 
 
+def warn_if_outside(share: float) -> None:
+    """Warn where this share of the wanted tips lies outside what the network learned."""
+    if share > 0.0:
+        log.warning("%.3g %% of the wanted tips lie outside what the network learned: guesses", 100.0 * share)
+
+
 def warn_if_it_buckles(session: Session, loops: Iterable[Loop]) -> None:
     """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
     from wristctl.simulation.plant import plant_of

@@ -20,7 +20,7 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
 def simulate(session: Session) -> Table:
     """Simulate one closed loop and draw it."""
-    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
+    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles, warn_if_outside
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import directions, stroboscope
     from wristctl.simulation.metrics import METRICS
@@ -31,6 +31,7 @@ def simulate(session: Session) -> Table:
     warn_if_it_buckles(session, [session.settings.loop])
     with session.progress("compiling and simulating the loop"):
         done = run_simulation(session.study, network_of(session), tuned_of(session))
+    warn_if_outside(done.metrics["outside_domain"])
     course = done.trajectory
     own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
     columns = COLUMNS | own

@@ -25,6 +25,7 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
     import numpy as np
 
     from wristctl.learning.dataset import Samples, split_samples
+    from wristctl.learning.selection import grid_points
 
     settings, data, held_out = study.train, inputs.get("data"), None
     count, source = study.gen_data.samples, "samples of its own"
@@ -38,10 +39,8 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
         for name, row in networks(settings).items()
     ]
     if settings.search:
-        grid = settings.grid
-        rates, decays = max(1, len(grid.learning_rates)), max(1, len(grid.weight_decays))
-        points = len(grid.depths) * len(grid.activations) * len(grid.widths) * rates * decays
-        lines = [f"{points} networks x {grid.folds} folds, then {settings.seeds} x the chosen one"]
+        points, folds = len(grid_points(settings)), settings.grid.folds
+        lines = [f"{points} networks x {folds} folds, then {settings.seeds} x the chosen one"]
     return "\n".join(
         [
             *lines,

@@ -87,6 +87,10 @@ def write_depths(session: Session, choice: Choice) -> list[Table]:
             if depth != 3:
                 said = "C15: paired t-test over the folds against three layers, Holm's correction"
                 run.metric(f"c15_{activation}_depth_{depth}_p", beside, "", n=len(each.rmse), meaning=said)
+        if three:
+            said = f"C15: 1 where three layers of {activation} are better than every other depth at the 5 % level"
+            best = all(least[depth].mean > three.mean and corrected[depth] < LEVEL for depth in others)
+            run.metric(f"c15_{activation}_three_is_best", int(best), n=len(three.rmse), meaning=said)
     run.metric("c15_chosen_depth", choice.chosen.depth, meaning="C15: hidden layers of the chosen network")
     run.metric("c15_best_depth", choice.best.depth, meaning="C15: hidden layers of the least cross-validated error")
     heads = ("activation", "hidden layers", "multiply-adds", "RMSE [deg]", "p against 3", "than 3 layers")

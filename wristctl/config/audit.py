@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections import Counter
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from wristctl.config.section import Section, choice, quantity
 
 Outcome = Literal["reproduced", "not reproduced", "contradictory", "not specified enough", "open", "taken over"]
+
+_NEEDED = {
+    "comparison": ("value", "controller", "gains", "metric"),
+    "table1": ("value", "metric"),
+    "selection": ("value", "metric"),
+    "text": ("verdict",),
+}
 
 
 class Claim(Section):
@@ -14,8 +24,9 @@ class Claim(Section):
 
     id: str
     says: str
-    evidence: Literal["comparison", "settings", "text", "network", "hardware"]
+    evidence: Literal["comparison", "table1", "selection", "settings", "text", "hardware"]
     value: float | None = None
+    exact: bool = False
     unit: str = ""
     controller: str | None = None
     gains: str | None = None
@@ -23,15 +34,25 @@ class Claim(Section):
     verdict: Outcome | None = None
     reason: str = ""
 
-
-class Ledger(Section):
-    """The file of claims."""
-
-    claims: tuple[Claim, ...]
+    @model_validator(mode="after")
+    def _can_be_judged(self) -> Self:
+        missing = [name for name in _NEEDED.get(self.evidence, ()) if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"claim {self.id} by {self.evidence} needs {' and '.join(missing)}")
+        return self
 
 
 class AuditSettings(Section):
-    """Which claims, and over which horizon their rollouts go."""
+    """Which claims, the trainings that show some of them, and over which horizon the rollouts for others go."""
 
-    claims: str = choice("experiments/claims.yaml", "ledger of claims")
+    claims: tuple[Claim, ...] = choice((), "the ledger: claims with what decides them; experiments/claims.yaml has all")
+    table1: str | None = choice(None, "train run of experiments/table1.yaml: path, id or latest:train")
+    selection: str | None = choice(None, "train run of experiments/model_selection.yaml: path, id or latest:train")
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+
+    @model_validator(mode="after")
+    def _ids_differ(self) -> Self:
+        twice = [name for name, count in Counter(claim.id for claim in self.claims).items() if count > 1]
+        if twice:
+            raise ValueError(f"claim {twice[0]} stands there twice: give each an id of its own")
+        return self

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -57,17 +58,19 @@ PRESETS: dict[str, dict[str, Any]] = {
     "t1-leaky-relu": {"activation": "leaky-relu", "beta1": 0.92, "learning_rate": 0.001, **_PRINTED},
     "t1-tanh": {"activation": "tanh", "beta1": 0.97, "learning_rate": 0.002, **_PRINTED},
     "recommended": {
-        "activation": "silu",
-        "hidden": (64, 64, 64),
-        "learning_rate": 0.005,
-        "schedule": "cosine",
+        "activation": "tanh",
+        "hidden": (24, 12),
+        "optimiser": "levenberg-marquardt",
         "weight_decay": 0.0,
-        "batch": 50,
-        "epochs": 1000,
+        "epochs": 200,
+        "patience": 30,
     },
 }
 """T1's columns as printed (decay coupled to the gradient, raw inputs, momentum read as beta1), and a network that is
-accurate: smooth, scaled, trained long and to a vanishing rate."""
+accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its layers."""
+
+MOST_WEIGHTS = 4000
+"""Of a network trained by second order, which solves for all of them at once (2 inputs counted)."""
 
 
 class NetworkSettings(Section):
@@ -81,8 +84,10 @@ class NetworkSettings(Section):
         (200, 100, 100), "neurons of each hidden layer", "paper", min_length=1, max_length=10
     )
     activation: Activation = choice("sigmoid", "activation", "paper")
-    optimiser: Literal["adam", "adamw", "sgd"] = choice(
-        "adamw", "adam couples weight decay to the gradient (as printed, C11: collapses), adamw does not"
+    optimiser: Literal["adam", "adamw", "sgd", "levenberg-marquardt"] = choice(
+        "adamw",
+        "adam couples weight decay to the gradient (as printed, C11: collapses), adamw does not; levenberg-marquardt "
+        "takes all samples in one step of second order: for small networks, without rate, schedule, beta1 and batch",
     )
     standardise: bool = choice(
         True, "scale inputs and outputs to zero mean and unit deviation; false: raw, as printed"
@@ -102,6 +107,20 @@ class NetworkSettings(Section):
     def _fill_from_preset(cls, given: Any) -> Any:
         preset = PRESETS.get(str(given.get("preset"))) if isinstance(given, Mapping) else None
         return {**preset, **given} if preset else given
+
+    @model_validator(mode="after")
+    def _second_order_is_for_small_networks(self) -> Self:
+        self._solvable(self.hidden)
+        return self
+
+    def _solvable(self, hidden: tuple[int, ...]) -> None:
+        weights = sum((inputs + 1) * neurons for inputs, neurons in pairwise((2, *hidden, 1)))
+        if self.optimiser == "levenberg-marquardt" and weights > MOST_WEIGHTS:
+            layers = "-".join(map(str, hidden))
+            raise ValueError(
+                f"levenberg-marquardt solves for all weights at once, at most {MOST_WEIGHTS}: "
+                f"{layers} has {weights}; choose fewer neurons, or adamw"
+            )
 
 
 class Row(NetworkSettings):
@@ -123,6 +142,10 @@ class Grid(Section):
     learning_rates: tuple[Annotated[float, Field(gt=0)], ...] = choice((), "learning rates")
     weight_decays: tuple[Annotated[float, Field(ge=0)], ...] = choice((), "weight decays")
     folds: int = choice(5, "parts of the samples, each held out once", "paper", ge=2, le=20)
+
+    def layers(self) -> list[tuple[int, ...]]:
+        """Neurons of each hidden layer, for every depth and width."""
+        return [(width, *[width // 2] * (depth - 1)) for depth in self.depths for width in self.widths]
 
 
 class TrainSettings(NetworkSettings):
@@ -157,4 +180,6 @@ class TrainSettings(NetworkSettings):
             raise ValueError("each row needs a name of its own")
         if self.rows and self.search:
             raise ValueError("give rows or search, not both")
+        for hidden in self.grid.layers() if self.search else ():
+            self._solvable(hidden)
         return self

@@ -1,1 +1,1 @@
-"""Numbers that are eight rollouts wide, and the compiler settings for code that computes with them."""
+"""Numbers that are a block of rollouts wide, and the compiler settings for code that computes with them."""

@@ -1,4 +1,4 @@
-"""Numba's types of lanes: a number, a comparison, a planar vector, each eight rollouts wide, and rows of them.
+"""Numba's types of lanes: a number, a comparison, a planar vector, each a block of rollouts wide, and rows of them.
 
 A lane is an LLVM vector of doubles. Arithmetic on it is vertical, so what one rollout computes cannot depend on its
 neighbours, on the batch or on the thread count, bit for bit; of fast-math only `contract` (fused multiply-add) is on.
@@ -16,8 +16,9 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
 
-LANES = 8
-"""Rollouts of one block: one AVX-512 register, two of AVX2, four of NEON."""
+LANES = 16
+"""Rollouts of one block: two registers of AVX-512, four of AVX2, so that independent operations fill the waits of
+others. Where a product and a sum fuse may change with the width, so it is the same on every machine."""
 
 FAST = ("contract",)
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)

@@ -13,6 +13,9 @@ from wristctl.learning.metrics import angle_errors, error_map
 from wristctl.learning.training import Trial
 from wristctl.wrist.kinematics import Array, exact_angle
 
+HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
+"""Names of the places where samples were held out, by why."""
+
 MEASURES: dict[str, tuple[str, str]] = {
     "r2": ("", "coefficient of determination on the test samples"),
     "rmse_deg": ("deg", "RMSE of the angle on the test samples"),
@@ -20,6 +23,8 @@ MEASURES: dict[str, tuple[str, str]] = {
     "close_share": ("1", "share of the test samples with an error of at most 0.5 deg"),
     "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
     "workspace_max_error_deg": ("deg", "largest error on a dense grid over the whole domain"),
+    "held_out_payloads_rmse_deg": ("deg", "RMSE of the angle at payloads kept from training"),
+    "held_out_poses_rmse_deg": ("deg", "RMSE of the angle at poses kept from training"),
     "gradient_norm": ("", "norm of the training loss's gradient at the kept weights (of the scaled angle)"),
     "train_loss": ("rad^2", "mean squared error over the last epoch's batches"),
     "validation_loss": ("rad^2", "mean squared error on the validation samples"),
@@ -42,9 +47,8 @@ class Place:
 def places(samples: Samples, split: Split) -> list[Place]:
     """The test samples, by reason where they were held out, and the whole domain where its angles are known."""
     held = samples.held_out[split.test]
-    named = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
     found = [Place("test samples", samples.inputs[split.test], samples.theta[split.test])]
-    for code, name in named.items():
+    for code, name in HELD_OUT.items():
         rows = split.test[held == code]
         if 0 < len(rows) < len(split.test):
             found.append(Place(name, samples.inputs[rows], samples.theta[rows]))
@@ -69,16 +73,19 @@ def inverses(
 
 
 def measures(trial: Trial, where: Sequence[Place]) -> dict[str, float]:
-    """Every one of MEASURES, NaN for the workspace where its angles are not known."""
+    """Every one of MEASURES, NaN for places that these data do not have."""
     columns, angle = trial.network.sizes[0], compiled_network(trial.network)
-    by_place = {
+    found = {
         place.name: angle_errors(
             angle(place.inputs.reshape(-1, place.inputs.shape[-1])[:, :columns]), place.theta.ravel()
         )
         for place in where
-        if place.name in ("test samples", "whole workspace")
     }
-    test, whole = by_place["test samples"], by_place.get("whole workspace")
+    test, whole = found["test samples"], found.get("whole workspace")
+    held_out = {
+        f"{name.replace(' ', '_').replace('-', '_')}_rmse_deg": found[name].rmse_deg if name in found else math.nan
+        for name in HELD_OUT.values()
+    }
     return {
         "r2": test.r2,
         "rmse_deg": test.rmse_deg,
@@ -86,6 +93,7 @@ def measures(trial: Trial, where: Sequence[Place]) -> dict[str, float]:
         "close_share": test.close_share,
         "workspace_rmse_deg": whole.rmse_deg if whole else math.nan,
         "workspace_max_error_deg": whole.max_error_deg if whole else math.nan,
+        **held_out,
         "gradient_norm": trial.gradient_norm,
         "train_loss": trial.epochs[-1].train_loss,
         "validation_loss": trial.validation_loss,

@@ -55,12 +55,9 @@ def grid_points(settings: TrainSettings) -> list[NetworkSettings]:
     return [
         NetworkSettings.model_validate(
             base
-            | {"hidden": (width, *[width // 2] * (depth - 1)), "activation": activation}
-            | {"learning_rate": rate, "weight_decay": decay}
+            | {"hidden": hidden, "activation": activation, "learning_rate": rate, "weight_decay": decay}
         )
-        for activation, depth, width, rate, decay in product(
-            grid.activations, grid.depths, grid.widths, rates, decays
-        )
+        for activation, hidden, rate, decay in product(grid.activations, grid.layers(), rates, decays)
     ]
 
 

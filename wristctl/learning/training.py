@@ -20,13 +20,11 @@ from wristctl.config.errors import UserError
 from wristctl.config.learning import Activation, NetworkSettings
 from wristctl.learning.checkpoint import fingerprint, read_checkpoint, write_checkpoint
 from wristctl.learning.dataset import Samples, Split
+from wristctl.learning.levenberg_marquardt import LevenbergMarquardt, blocks
 from wristctl.learning.network import LEAK, Network, Scaler
 
 DTYPE = torch.float64
 """Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding."""
-
-BLOCK = 8192
-"""Samples evaluated at once where no gradient step is taken."""
 
 SAVE_EVERY = 5.0
 """Time between two checkpoints [s]."""
@@ -62,7 +60,7 @@ class Epoch:
     epoch: int
     """from 1"""
     train_loss: float
-    """mean over the epoch's batches, each before its own step"""
+    """mean over the epoch's steps, each before its own"""
     validation_loss: float
     """after the epoch"""
 
@@ -161,8 +159,10 @@ class _Problem:
             last = nn.Linear(self.settings.hidden[-1], 1, dtype=DTYPE)
             return nn.Sequential(*layers, last).to(self.device)
 
-    def optimiser(self, model: nn.Sequential) -> torch.optim.Optimizer:
+    def optimiser(self, model: nn.Sequential) -> torch.optim.Optimizer | LevenbergMarquardt:
         rate, beta1, decay = self.settings.learning_rate, self.settings.beta1, self.settings.weight_decay
+        if self.settings.optimiser == "levenberg-marquardt":
+            return LevenbergMarquardt(model, decay)
         if self.settings.optimiser == "sgd":
             return torch.optim.SGD(model.parameters(), lr=rate, momentum=beta1, weight_decay=decay)
         kind = torch.optim.AdamW if self.settings.optimiser == "adamw" else torch.optim.Adam
@@ -170,12 +170,12 @@ class _Problem:
 
     def validation_loss(self, model: nn.Sequential) -> float:
         with torch.no_grad():
-            squares = sum(float(((model(x) - y) ** 2).sum()) for x, y in _blocks(*self.validation))
+            squares = sum(float(((model(x) - y) ** 2).sum()) for x, y in blocks(*self.validation))
         return squares / len(self.validation[0]) * self.square_radians
 
     def gradient_norm(self, model: nn.Sequential) -> float:
         model.zero_grad()
-        for x, y in _blocks(*self.train):
+        for x, y in blocks(*self.train):
             loss: Tensor = ((model(x) - y) ** 2).sum() / len(self.train[0])
             loss.backward()  # type: ignore[no-untyped-call]
         return math.sqrt(sum(float((p.grad**2).sum()) for p in model.parameters() if p.grad is not None))
@@ -218,28 +218,35 @@ class _Course:
 
     def advance(self) -> None:
         """One epoch."""
+        if isinstance(self.optimiser, LevenbergMarquardt):
+            loss = self.optimiser.step(*self.problem.train)
+        else:
+            loss = self._over_batches(self.optimiser)
+        validation, epoch = self.problem.validation_loss(self.model), len(self.epochs) + 1
+        self.epochs.append(Epoch(self.problem.job.trial, epoch, loss * self.problem.square_radians, validation))
+        least = self.best_epoch == 0 or validation < self.epochs[self.best_epoch - 1].validation_loss
+        if self.settings.patience and least:
+            self.best = {name: value.clone() for name, value in self.model.state_dict().items()}
+            self.best_epoch = epoch
+
+    def _over_batches(self, optimiser: torch.optim.Optimizer) -> float:
+        """One step for each batch, in random order; the mean of their losses."""
         x, y = self.problem.train
-        settings, squares, epoch = self.settings, 0.0, len(self.epochs) + 1
+        settings, total = self.settings, 0.0
         batches = math.ceil(len(x) / settings.batch)
         order = torch.randperm(len(x), generator=self.shuffle).to(x.device)
         for batch in range(batches):
             if settings.schedule == "cosine":
-                course = ((epoch - 1) * batches + batch) / (settings.epochs * batches)
-                for group in self.optimiser.param_groups:
+                course = (len(self.epochs) * batches + batch) / (settings.epochs * batches)
+                for group in optimiser.param_groups:
                     group["lr"] = settings.learning_rate * 0.5 * (1.0 + math.cos(math.pi * course))
             rows = order[batch * settings.batch : (batch + 1) * settings.batch]
-            self.optimiser.zero_grad()
+            optimiser.zero_grad()
             loss = nn.functional.mse_loss(self.model(x[rows]), y[rows])
             loss.backward()  # type: ignore[no-untyped-call]
-            self.optimiser.step()
-            squares += loss.item() * len(rows)
-        validation = self.problem.validation_loss(self.model)
-        train = squares / len(x) * self.problem.square_radians
-        self.epochs.append(Epoch(self.problem.job.trial, epoch, train, validation))
-        least = self.best_epoch == 0 or validation < self.epochs[self.best_epoch - 1].validation_loss
-        if settings.patience and least:
-            self.best = {name: value.clone() for name, value in self.model.state_dict().items()}
-            self.best_epoch = epoch
+            optimiser.step()
+            total += loss.item() * len(rows)
+        return total / len(x)
 
     def kept(self) -> tuple[nn.Sequential, float]:
         """The model to keep and its validation loss [rad^2]."""
@@ -267,11 +274,6 @@ class _Course:
         trial = self.problem.job.trial
         self.epochs = [Epoch(trial, k, *losses) for k, losses in enumerate(state["epochs"], start=1)]
         self.best, self.best_epoch = state["best"], state["best_epoch"]
-
-
-def _blocks(x: Tensor, y: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
-    for start in range(0, len(x), BLOCK):
-        yield x[start : start + BLOCK], y[start : start + BLOCK]
 
 
 @contextmanager

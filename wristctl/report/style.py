@@ -38,7 +38,7 @@ _OTHERS = (OLIVE, FOREST, ROSE)
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
-    "stepper": "-",
+    "stepper": (0, (9, 1)),
     "exchanged": (0, (5, 1.5)),
     "printed": (0, (1.2, 1.2)),
     "initial": (0, (5, 1.5, 1.2, 1.5)),

@@ -110,7 +110,7 @@ def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str,
     made, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
     for each in axes.flat[len(names) :]:
         each.set_visible(False)
-    return made, dict(zip(names, list(axes.flat), strict=False))
+    return made, dict(zip(names, axes.ravel().tolist(), strict=False))
 
 
 def _finished(

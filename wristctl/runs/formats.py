@@ -53,7 +53,8 @@ def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
     from matplotlib import pyplot as plt
 
     nothing: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
-    with mpl.rc_context({"svg.hashsalt": stem.name}):
+    # in one piece, a line that chatters takes seconds to draw
+    with mpl.rc_context({"svg.hashsalt": stem.name, "agg.path.chunksize": 500}):
         for suffix, metadata in nothing.items():
             with replacing(stem.with_name(f"{stem.name}.{suffix}")) as temporary:
                 figure.savefig(temporary, format=suffix, metadata=metadata, dpi=dpi)

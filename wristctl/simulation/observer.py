@@ -160,25 +160,39 @@ def cameras_of(
     horizon: float,
     seeds: NDArray[np.int64],
     theta: float,
-) -> list[tuple[Watch, Observer]] | list[None]:
-    """A camera and an observer for each block of rollouts with these seeds (count,); None where sensors are ideal."""
+) -> tuple[Watch, Observer] | None:
+    """Cameras and observers of rollouts with these seeds (count,); None where sensors are ideal.
+
+    All but captures, arrivals and gain have the block as their first axis: `of_block` is one block's.
+    """
     count, blocks = len(seeds), -(-len(seeds) // LANES)
     if sensor.level == "ideal":
-        return [None] * blocks
+        return None
     taken = frames(sensor, period, horizon, seeds)
     longest = int((taken.arrivals - taken.captures).max() + np.diff(taken.captures).max(initial=1)) + 2
     fresh = observer_of(sensor, drive, wrist, period, longest, theta)
     lanes = np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
-    return [
-        (
-            Watch(
-                captures=taken.captures,
-                arrivals=taken.arrivals,
-                readings=np.ascontiguousarray(taken.readings[..., members]),
-                pictures=np.zeros((len(taken.captures), LANES)),
-                turn=np.zeros(2, np.int64),
-            ),
-            fresh._replace(**{name: getattr(fresh, name).copy() for name in ("delivered", "fused", "now", "at")}),
-        )
-        for members in lanes
-    ]
+    watch = Watch(
+        captures=taken.captures,
+        arrivals=taken.arrivals,
+        readings=np.ascontiguousarray(np.moveaxis(taken.readings[..., lanes], -2, 0)),
+        pictures=np.zeros((blocks, len(taken.captures), LANES)),
+        turn=np.zeros((blocks, 2), np.int64),
+    )
+    own = {name: np.repeat(getattr(fresh, name)[None], blocks, axis=0) for name in ("delivered", "fused", "now", "at")}
+    return watch, fresh._replace(**own)
+
+
+@compiled
+def of_block(watched: Any, block: int) -> Any:
+    """One block's camera and observer; None where there are none."""
+    if watched is None:
+        return None
+    camera, observer = watched
+    own_camera = Watch(
+        camera.captures, camera.arrivals, camera.readings[block], camera.pictures[block], camera.turn[block]
+    )
+    own_observer = Observer(
+        observer.gain, observer.delivered[block], observer.fused[block], observer.now[block], observer.at[block]
+    )
+    return own_camera, own_observer

@@ -18,7 +18,7 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.disturbances import course
-from wristctl.simulation.kernel import RECORDED, run_block
+from wristctl.simulation.kernel import RECORDED, run_blocks
 from wristctl.simulation.metrics import SUMS, summary
 from wristctl.simulation.observer import cameras_of
 from wristctl.simulation.plant import plant_of
@@ -28,7 +28,9 @@ from wristctl.wrist.segments import segments
 Array = NDArray[np.float64]
 
 _SLICE_TICKS = 200_000
-"""Control ticks between two looks at whether the user has asked to stop."""
+"""Control ticks of a block between two looks at whether the user has asked to stop."""
+_SHARES = 8
+"""Least number of pieces of work for each thread, where there are so many blocks, so that all end together."""
 
 
 @dataclass(frozen=True)
@@ -82,40 +84,47 @@ def rollout(
     fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
     goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
-    sums_at_start = np.zeros((count, len(SUMS)))
-    sums_at_start[:, SUMS.index("alive")] = 1.0
-    rows = {"gains": gains.reshape(count, -1), "goals": goal_rows, "sums": sums_at_start}
-    blocks = {name: to_blocks(values) for name, values in rows.items()}
     rest = np.zeros(n) if start is None else start
     drive, period = drive_of(loop.actuator), loop.control_period
-    motors_at_rest = np.repeat(at_rest(drive, plant_of(wrist, loop.plant), rest)[:, None], LANES, axis=1)
+    begin_with = {
+        "gains": gains.reshape(count, -1),
+        "goals": goal_rows,
+        "sums": np.array([float(name == "alive") for name in SUMS]),
+        "memory": np.zeros(max(1, controller.memory)),
+        "state": np.concatenate([rest, np.zeros(n)]),
+        "motors": at_rest(drive, plant_of(wrist, loop.plant), rest),
+    }
+    blocks = {name: to_blocks(np.broadcast_to(row, (count, row.shape[-1]))) for name, row in begin_with.items()}
+    followed = to_blocks(np.asarray(which, float)[:, None])[:, 0].astype(np.int64)
+    courses = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
     disturbed = course(loop.disturbances, motions[0].time)
-    references = _References(motions, which)
     total = len(blocks["gains"])
     streams = np.zeros(count, np.int64) if seeds is None else seeds
     cameras = cameras_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest.sum())
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
+    workers = threads or os.cpu_count() or 1
+    each = samples * ticks * loop.substeps
+    together = max(1, min(_SLICE_TICKS // each, total // (_SHARES * workers)))
     stop, done = threading.Event(), [0] * total
 
-    def run(block: int) -> None:
-        reference = references.of(block)
-        state = np.repeat(np.concatenate([rest, 0.0 * rest])[:, None], LANES, axis=1)
-        memory, now = np.zeros((max(1, controller.memory), LANES)), np.zeros((len(NOW), LANES))
-        motors = motors_at_rest.copy()
+    def run(begin: int) -> None:
+        end = min(begin + together, total)
+        now, target = np.zeros((len(NOW), LANES)), np.zeros((3, LANES))
         piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
-            run_block(
-                controller.compiled, plant, model, limits, blocks["gains"][block], blocks["goals"][block],
-                reference, now, memory, state, blocks["sums"][block], recorded[block], drive, motors,
-                cameras[block], disturbed, period, loop.substeps, ticks, first, min(first + piece, samples), (0,) * n,
+            last = min(first + piece, samples)
+            run_blocks(
+                controller.compiled, plant, model, limits, blocks["gains"], blocks["goals"], courses, followed,
+                blocks["memory"], blocks["state"], blocks["sums"], recorded, drive, blocks["motors"], cameras,
+                disturbed, now, target, period, loop.substeps, ticks, begin, end, first, last, (0,) * n,
             )  # fmt: skip
-            done[block] = min(first + piece, samples)
+            done[begin:end] = [last] * (end - begin)
 
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         try:
-            for future in [pool.submit(run, block) for block in range(total)]:
+            for future in [pool.submit(run, begin) for begin in range(0, total, together)]:
                 future.result()
                 if progress is not None:
                     progress(sum(done) / (total * samples))
@@ -128,22 +137,3 @@ def rollout(
     metrics = summary(sums, goal_rows, loop.control_period)
     return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)
 
-
-class _References:
-    """The references of each block, [sample, (angle, rate, acceleration), lane]; alike blocks share one."""
-
-    def __init__(self, motions: Sequence[Motion], which: NDArray[np.int64]) -> None:
-        courses = [np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions]
-        self._table = np.stack(courses, axis=-1)
-        lanes = to_blocks(np.asarray(which, float)[:, None]).astype(np.int64)[:, 0]
-        self._patterns, self._pattern, self._uses = np.unique(lanes, axis=0, return_inverse=True, return_counts=True)
-        self._shared: dict[int, Array] = {}
-
-    def of(self, block: int) -> Array:
-        pattern = int(self._pattern[block])
-        if pattern in self._shared:
-            return self._shared[pattern]
-        made = np.ascontiguousarray(self._table[..., self._patterns[pattern]])
-        if self._uses[pattern] > 1:
-            self._shared[pattern] = made
-        return made

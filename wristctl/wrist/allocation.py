@@ -28,9 +28,8 @@ def allocate(theta: Any, wrist: Any, torque: Any, low: Any, high: Any) -> Any:
     """Pulls of the + and the - side [N] that give the torque nearest to the wanted one, with one side at `low`."""
     plus, minus = moment_arms(theta, wrist)
     forward = torque > (plus + minus) * low
-    pull_plus = where(forward, (torque - minus * low) / plus, low)
-    pull_minus = where(forward, low, (torque - plus * low) / minus)
-    return clip(pull_plus, low, high), clip(pull_minus, low, high)
+    needed = clip((torque - where(forward, minus, plus) * low) / where(forward, plus, minus), low, high)
+    return where(forward, needed, low), where(forward, low, needed)
 
 
 @compiled

@@ -15,9 +15,9 @@ from typing import Any
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, turn
-from wristctl.lanes.rows import planes_like
+from wristctl.lanes.rows import lanes_like, planes_like
 from wristctl.wrist.arcs import chords
-from wristctl.wrist.tendons import tendon_torque
+from wristctl.wrist.tendons import tendon_torques
 
 
 @compiled
@@ -48,42 +48,40 @@ def mass_matrix(segment: Any, z: Any, dz: Any, tangent: Any, mass: Any) -> None:
 
 
 @compiled
-def residual(
-    segment: Any, omega: Any, acceleration: Any, z: Any, dz: Any, d2z: Any, tangent: Any, plus: Any, minus: Any,
-    theta: Any, r: Any,
+def bias(
+    segment: Any, theta: Any, omega: Any, z: Any, dz: Any, d2z: Any, tangent: Any, pull: Any, r: Any
 ) -> None:
-    """r of the module's equation, by Newton and Euler: forces outward to tip, torques back to base."""
+    """r at theta'' = 0, so that M theta'' + bias = r, by Newton and Euler: forces outward to tip, torques back.
+
+    `pull` holds the tendons' torque on each segment.
+    """
     force = planes_like(z)
     weight = planar(segment.gravity_x, segment.gravity_y)
     spin = 0.0 * segment.length
-    spin_rate = spin
     a = planar(spin, spin)
     for k in range(len(z)):
         w = omega[k]
-        turning = planar(-spin * spin, spin_rate) * z[k] + planar(acceleration[k], 2.0 * spin * w) * dz[k]
-        bent = turning + w * w * d2z[k]
+        bent = w * w * d2z[k] + 2.0 * spin * w * turn(dz[k]) - spin * spin * z[k]
         force[k] = segment.mass * (a + 0.5 * bent - weight)
         a = a + bent
         spin = spin + w
-        spin_rate = spin_rate + acceleration[k]
     hand = segment.hand_offset * tangent
-    beyond = segment.hand_mass * (a + planar(-spin * spin, spin_rate) * hand - weight)
+    beyond = segment.hand_mass * (a - spin * spin * hand - weight)
     torque = dot(turn(hand), beyond)
     beyond = beyond - planar(segment.force_x, segment.force_y)
     for k in range(len(z) - 1, -1, -1):
-        pull, _ = tendon_torque(theta[k], segment, plus, minus)
-        passive = segment.stiffness * theta[k] + segment.damping * omega[k] - pull
+        passive = segment.stiffness * theta[k] + segment.damping * omega[k] - pull[k]
         r[k] = torque + dot(dz[k], beyond + 0.5 * force[k]) + passive
         torque = torque + dot(turn(z[k]), beyond + 0.5 * force[k])
         beyond = beyond + force[k]
 
 
 @compiled
-def equation_of_motion(
-    segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, zero: Any, mass: Any, bias: Any
-) -> None:
-    """M and the remaining terms of E6, so that M theta'' + bias = 0; `zero` holds n zeros."""
+def equation_of_motion(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, mass: Any, r: Any) -> None:
+    """M and the remaining terms of E6, so that M theta'' + r = 0."""
     z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+    pull, slope = lanes_like(theta), lanes_like(theta)
     tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    tendon_torques(theta, segment, plus, minus, pull, slope)
     mass_matrix(segment, z, dz, tangent, mass)
-    residual(segment, omega, zero, z, dz, d2z, tangent, plus, minus, theta, bias)
+    bias(segment, theta, omega, z, dz, d2z, tangent, pull, r)

@@ -15,9 +15,10 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import chords
-from wristctl.wrist.dynamics import equation_of_motion, mass_matrix, residual
+from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
+from wristctl.wrist.tendons import tendon_torques
 
 
 @compiled
@@ -41,23 +42,22 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     per_h, per_hg = 1.0 / h, 2.0 / h
     z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
     mass, other_mass, lu, by_theta = square_like(theta), square_like(theta), square_like(theta), square_like(theta)
-    zero, a0, a = lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    a0, a, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k1, l1, k2, l2 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k3, l3, k4, l4 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
-    for i in range(n):
-        zero[i] = 0.0 * h
 
     tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    tendon_torques(theta, segment, plus, minus, pull, slope)
     mass_matrix(segment, z, dz, tangent, mass)
-    residual(segment, omega, zero, z, dz, d2z, tangent, plus, minus, theta, a0)
+    bias(segment, theta, omega, z, dz, d2z, tangent, pull, a0)
     for i in range(n):
         a0[i] = -a0[i]
         for j in range(n):
             other_mass[i, j] = mass[i, j]
     factorise(other_mass)
     solve(other_mass, a0)
-    residual_jacobians(segment, theta, omega, a0, z, dz, d2z, d3z, tangent, plus, minus, by_theta, lu)
+    residual_jacobians(segment, omega, a0, z, dz, d2z, d3z, tangent, slope, by_theta, lu)
     for i in range(n):
         for j in range(n):
             lu[i, j] = per_hg * mass[i, j] + lu[i, j] + hg * by_theta[i, j]
@@ -72,7 +72,7 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     for i in range(n):
         at[i] = theta[i] + 2.0 * k1[i]
         rate[i] = omega[i] + 2.0 * l1[i]
-    equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
+    equation_of_motion(segment, at, rate, plus, minus, other_mass, a)
     factorise(other_mass)
     solve(other_mass, a)
     for i in range(n):
@@ -83,7 +83,7 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     for i in range(n):
         at[i] = at[i] + k3[i]
         rate[i] = rate[i] + l3[i]
-    equation_of_motion(segment, at, rate, plus, minus, zero, other_mass, a)
+    equation_of_motion(segment, at, rate, plus, minus, other_mass, a)
     factorise(other_mass)
     solve(other_mass, a)
     for i in range(n):

@@ -12,15 +12,17 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, turn
 from wristctl.lanes.rows import planes_like
-from wristctl.wrist.tendons import tendon_torque
 
 
 @compiled
 def residual_jacobians(
-    segment: Any, theta: Any, omega: Any, acceleration: Any, z: Any, dz: Any, d2z: Any, d3z: Any, tangent: Any,
-    plus: Any, minus: Any, by_theta: Any, by_rate: Any,
+    segment: Any, omega: Any, acceleration: Any, z: Any, dz: Any, d2z: Any, d3z: Any, tangent: Any, slope: Any,
+    by_theta: Any, by_rate: Any,
 ) -> None:
-    """dr/d(theta) and dr/d(rate) at the given accelerations, into two n x n matrices [i, j]."""
+    """dr/d(theta) and dr/d(rate) at the given accelerations, into two n x n matrices [i, j].
+
+    `slope` holds the derivative of the tendons' torque on each segment by its angle.
+    """
     n = len(z)
     pivot, end, middle = planes_like(z), planes_like(z), planes_like(z)
     velocity, force = planes_like(z), planes_like(z)
@@ -75,10 +77,9 @@ def residual_jacobians(
             by_theta[i, j] = shifted + dot(moment, field[j]) + dot(reach, own_field[j]) + tip_i
             turned = stretch - dot(pivot[i], momentum)
             by_rate[i, j] = 2.0 * (turned + dot(moment, sweep[j]) + dot(reach, own_sweep[j]))
-        _, slope = tendon_torque(theta[j], segment, plus, minus)
         curved = dot(d2z[j], beyond + 0.5 * force[j]) - dot(turn(dz[j]), beyond)
         inertial = dot(moment_j, field[j]) + 0.5 * dot(own, own_field[j])
-        by_theta[j, j] = curved + inertial + tip_turned + segment.stiffness - slope
+        by_theta[j, j] = curved + inertial + tip_turned + segment.stiffness - slope[j]
         turned = stretch - dot(pivot[j], momentum) + dot(moment_j, sweep[j]) + 0.5 * dot(own, own_sweep[j])
         by_rate[j, j] = 2.0 * turned + segment.damping
         m0 = m0 + segment.mass

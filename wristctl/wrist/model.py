@@ -16,7 +16,7 @@ from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist import tendons
 from wristctl.wrist.arcs import chords, tip
-from wristctl.wrist.dynamics import equation_of_motion, residual
+from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import load_segments
@@ -46,17 +46,16 @@ def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         state, result = rows_of(states[block]), rows_of(out[block])
         n = len(segments)
         theta, omega = part(state, 0, segments), part(state, n, segments)
-        zero, bias, mass = lanes_like(theta), lanes_like(theta), square_like(theta)
-        for i in range(n):
-            zero[i] = 0.0 * theta[i]
-        equation_of_motion(segment, theta, omega, zero[0], zero[0], zero, mass, bias)
+        r, mass = lanes_like(theta), square_like(theta)
+        zero = 0.0 * theta[0]
+        equation_of_motion(segment, theta, omega, zero, zero, mass, r)
         position, _ = tip(theta, segment.length)
-        result[0] = dot(position, planar(1.0 + zero[0], zero[0]))
-        result[1] = dot(position, planar(zero[0], 1.0 + zero[0]))
-        angle = zero[0]
+        result[0] = dot(position, planar(1.0 + zero, zero))
+        result[1] = dot(position, planar(zero, 1.0 + zero))
+        angle = zero
         for i in range(n):
             angle = angle + theta[i]
-            result[3 + i] = bias[i] - segment.stiffness * theta[i] - segment.damping * omega[i]
+            result[3 + i] = r[i] - segment.stiffness * theta[i] - segment.damping * omega[i]
             length_plus, length_minus = tendons.lengths(theta[i], segment)
             arm_plus, arm_minus = tendons.moment_arms(theta[i], segment)
             result[3 + n + 4 * i] = length_plus
@@ -91,16 +90,17 @@ def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         theta, omega = part(state, 0, segments), part(state, n, segments)
         acceleration, pulls = part(state, 2 * n, segments), beyond(state, 3 * n)
         z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
-        by_theta, by_rate, r = square_like(theta), square_like(theta), lanes_like(theta)
+        mass, by_theta, by_rate = square_like(theta), square_like(theta), square_like(theta)
+        r, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta)
         tangent = chords(theta, segment.length, z, dz, d2z, d3z)
-        plus, minus = pulls[0], pulls[1]
-        residual(segment, omega, acceleration, z, dz, d2z, tangent, plus, minus, theta, r)
-        residual_jacobians(
-            segment, theta, omega, acceleration, z, dz, d2z, d3z, tangent, plus, minus, by_theta, by_rate
-        )
+        tendons.tendon_torques(theta, segment, pulls[0], pulls[1], pull, slope)
+        mass_matrix(segment, z, dz, tangent, mass)
+        bias(segment, theta, omega, z, dz, d2z, tangent, pull, r)
+        residual_jacobians(segment, omega, acceleration, z, dz, d2z, d3z, tangent, slope, by_theta, by_rate)
         for i in range(n):
             result[i] = r[i]
             for j in range(n):
+                result[i] = result[i] + mass[i, j] * acceleration[j]
                 result[n + n * i + j] = by_theta[i, j]
                 result[n + n * n + n * i + j] = by_rate[i, j]
 

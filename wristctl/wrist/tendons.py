@@ -32,13 +32,13 @@ def lengths(theta: Any, segment: Any) -> Any:
 
 
 @compiled
-def tendon_torque(theta: Any, segment: Any, plus: Any, minus: Any) -> Any:
-    """Torque of both sides' pulls [N] on one segment and its derivative by theta."""
-    y = (0.5 / segment.spans) * theta
-    e0, e1, e2, _ = bessel(y)
-    s = y * y
+def tendon_torques(theta: Any, segment: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
+    """Torque of both sides' pulls [N] on each segment and its derivative by that segment's theta, into two rows."""
     half_span = (0.5 / segment.spans) * segment.length
     bend, squeeze = segment.tendon_offset * (plus - minus), half_span * (plus + minus)
-    torque = bend * (e0 - s * e1) + squeeze * y * e1
-    slope = (0.5 / segment.spans) * (squeeze * (e1 - s * e2) - bend * y * e0)
-    return torque, slope
+    for k in range(len(theta)):
+        y = (0.5 / segment.spans) * theta[k]
+        e0, e1, e2, _ = bessel(y)
+        s = y * y
+        torque[k] = bend * (e0 - s * e1) + squeeze * y * e1
+        slope[k] = (0.5 / segment.spans) * (squeeze * (e1 - s * e2) - bend * y * e0)

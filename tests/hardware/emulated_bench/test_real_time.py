@@ -106,13 +106,14 @@ def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving
 def test_a_board_that_restarts_is_found_out_and_its_drives_are_off(serving: Serving) -> None:
     server, folder = serving(Fault(kind="board-reset", at=0.2))
     board = board_of(server)
-    began = time.monotonic()
-    server.begin(began, None)
+    server.begin(time.monotonic(), None)
+    due = server._rig.faults.next("board-reset", 0.0)
     with pytest.raises((Restarted, NoAnswer)):
         while True:
             board.turn((0.0, 0.0, 50.0, 50.0))
-    told = wait_for(lambda: is_released(r := read(folder / "record")) and r)
-    assert last_step(told) < began + 0.2 + AT_ONCE + 1e-3
+    wait_for(lambda: is_released(read(folder / "record")))
+    # by the board's own clock: on a busy computer it loses time against the wall's
+    assert max(at for at in server._rig.wrist.motion.last_step if at is not None) < due + AT_ONCE + 1e-3
     board.close()
 
 

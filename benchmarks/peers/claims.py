@@ -1,0 +1,107 @@
+"""What is claimed of wristctl's speed, held against the measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rates import Result
+
+_AT_EQUAL_ERROR = (
+    # peer, segments, lanes, all cores, least ratio
+    ("soromox", 4, 1024, True, 100.0),
+    ("MuJoCo", 4, 1024, True, 30.0),
+    ("MuJoCo", 1, 1024, True, 50.0),
+    ("JAX", 1, 1024, True, 2.0),
+    ("JAX", 4, 1024, True, 10.0),
+    ("soromox", 1, 1, False, 5.0),
+    ("soromox", 4, 1, False, 5.0),
+    ("MuJoCo", 1, 1, False, 5.0),
+    ("MuJoCo", 4, 1, False, 5.0),
+    ("JAX", 1, 1, False, 5.0),
+    ("JAX", 4, 1, False, 5.0),
+)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A wish, a measurement, and whether one meets the other; `holds` is None where nothing was measured."""
+
+    wanted: str
+    measured: str
+    holds: bool | None
+
+    @property
+    def verdict(self) -> str:
+        """PASS, FAIL or not measured."""
+        return {True: "PASS", False: "FAIL", None: "not measured"}[self.holds]
+
+
+def beside_peers(result: Result) -> list[Claim]:
+    """Ratios to the peers at equal or smaller error, and the share of the plain C loop."""
+    claims = []
+    cores = max(result.axis("threads"))
+    for peer, n, lanes, everywhere, least in _AT_EQUAL_ERROR:
+        if n not in result.axis("segments") or lanes not in result.axis("lanes"):
+            continue
+        threads = cores if everywhere else 1
+        where = f"n = {n}, {lanes:,} lane{'s' if lanes > 1 else ''}, {'all cores' if everywhere else 'one thread'}"
+        wanted = f"{where}: at least {least:g} times {peer} at equal or smaller error"
+        found = result.ratio(peer, n, threads, lanes)
+        if found is None:
+            claims.append(Claim(wanted, "no side of it reached the error" if _ran(result, peer, n) else "-", None))
+            continue
+        coarse = result.ratio(peer, n, threads, lanes, equal=False)
+        more = f"; {coarse[0]:,.3g} times {coarse[1]}, whatever its error" if coarse and coarse[1] != found[1] else ""
+        claims.append(Claim(wanted, f"{found[0]:,.3g} times {found[1]}{more}", found[0] >= least))
+    for n in result.axis("segments"):
+        for threads in result.axis("threads"):
+            lanes = max(result.axis("lanes"))
+            where = f"n = {n}, {lanes:,} lanes, {threads} thread{'s' if threads > 1 else ''}"
+            wanted = f"{where}: half of the plain C loop's rate"
+            share = result.ratio("C", n, threads, lanes)
+            measured = f"{100.0 * share[0]:.0f} % of {share[1]}" if share else "-"
+            claims.append(Claim(wanted, measured, share[0] >= 0.5 if share else None))
+    return claims
+
+
+def _ran(result: Result, peer: str, n: int) -> bool:
+    return any(variant.peer == peer for variant in result.variants(n))
+
+
+def of_costs(costs: dict[str, Any]) -> list[Claim]:
+    """Growth with lanes, memory, and the studies that are named."""
+    claims = []
+    for n, slope in costs["slope_by_lanes"].items():
+        first, last = (f"{costs['lanes'][n][k]['lanes']:,}" for k in (0, -1))
+        wanted = f"n = {n}: time linear in lanes from {first} to {last}, exponent within 10 %"
+        claims.append(Claim(wanted, f"{slope:.3f}", abs(slope - 1.0) <= 0.1))
+    stream = costs["stream"]
+    grown = stream["growth_mib"]
+    claims.append(Claim(
+        f"memory flat from the first to the last of {stream['batches']} batches of a stream, within 5 MiB",
+        f"{grown:+.1f} MiB; {costs['bytes_per_lane']:,.0f} bytes a lane within a batch", grown <= 5.0,
+    ))  # fmt: skip
+    minutes = stream["seconds"] * 1e6 / stream["rollouts"] / 60.0
+    claims.append(Claim(
+        "a million rollouts of 5 s, n = 1: under 10 minutes",
+        f"{minutes:.1f} minutes, from {stream['rollouts']:,} in {stream['seconds']:.1f} s", minutes < 10.0,
+    ))  # fmt: skip
+    claims.append(Claim(
+        "tune: 40 particles, 60 iterations, two scenarios of 5 s, n = 4: 10 s or less, compiled",
+        f"{costs['tune_seconds']:.1f} s", costs["tune_seconds"] <= 10.0,
+    ))  # fmt: skip
+    return claims
+
+
+def of_cold_start(rows: dict[str, Any]) -> list[Claim]:
+    """What a user waits for at first."""
+    simulate, train = rows["simulate"], rows["train"]
+    begun = train["first"].get("first_progress")
+    return [
+        Claim("first simulate, nothing compiled: under 20 s", f"{simulate['first']['whole']:.1f} s",
+              simulate["first"]["whole"] < 20.0),
+        Claim("second simulate: under 2 s", f"{simulate['again']['whole']:.1f} s", simulate["again"]["whole"] < 2.0),
+        Claim("train's first epoch, nothing compiled: within 3 s", f"{begun:.1f} s" if begun else "-",
+              begun < 3.0 if begun else None),
+    ]  # fmt: skip
