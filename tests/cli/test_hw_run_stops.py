@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,9 +21,10 @@ from wristctl.config.bench import FAULTS
 from wristctl.config.study import Study
 from wristctl.hardware.bench.bench import Bench
 from wristctl.hardware.board import Board
-from wristctl.hardware.trial import stands
+from wristctl.hardware.trial import homing, stands
 from wristctl.hardware.trial.calibration import FILE, Calibration
 from wristctl.hardware.trial.homing import Zero
+from wristctl.hardware.trial.log import TrialLog
 from wristctl.report import trial_figures
 from wristctl.runs import list_runs, start_run
 from wristctl.runs.run import Run
@@ -163,11 +165,9 @@ def test_two_faults_together_end_within_the_sooner_ones_time(hw_run: HwRun, faul
 
 def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have Ctrl-C come as this begins."""
-    from wristctl.hardware.trial import homing, log
-
     place, name = {
         "homing": (homing._Finder, "_go"),
-        "between trials": (log.TrialLog, "truth"),
+        "between trials": (TrialLog, "truth"),
         "drawing": (trial_figures, "errors"),
     }[moment]
     original = getattr(place, name)
@@ -205,22 +205,21 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def test_on_a_disk_that_is_really_full_the_motors_stop_and_the_run_is_sealed(
     hw_run: HwRun, small_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The disk fills to the last byte as the trial begins."""
+    """Another program fills it to the last byte in the middle of a trial."""
+    tick = TrialLog.tick
 
-    def fill(*_: Any) -> None:
-        with (small_disk / "ballast").open("wb", buffering=0) as ballast:
-            try:
-                while ballast.write(bytes(65536)):
+    def filling(self: TrialLog, row: dict[str, Any]) -> None:
+        tick(self, row)
+        if row["trial"] == 0 and row["time"] >= AT:
+            with suppress(OSError), (small_disk / "ballast").open("ab", buffering=0) as ballast:
+                while ballast.write(bytes(4096)):
                     pass
-            except OSError:
-                pass
 
-    begin = Bench.begin
-    monkeypatch.setattr(Bench, "begin", lambda *arguments: (begin(*arguments), fill())[0])
+    monkeypatch.setattr(TrialLog, "tick", filling)
     ended = hw_run(out=small_disk)
     assert ended.code == 5 and ended.run.state == "failed" and ended.run.problems() == []
     log, stop = ended.run.data("log"), ended.stop
     assert stop["motors_stand"] and "No space left on device" in stop["reason"]
-    assert len(log) > 0 and np.diff(log["time"], prepend=-PERIOD) == pytest.approx(PERIOD, abs=1e-4)
+    assert log["time"].iloc[-1] >= AT and np.diff(log["time"], prepend=-PERIOD) == pytest.approx(PERIOD, abs=1e-4)
     assert stop["time"] - log["time"].iloc[-1] < 2 * PERIOD
     assert ended.run.data("truth")["time"].iloc[-1] >= stop["time"] - 2e-3
