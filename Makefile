@@ -5,7 +5,8 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision clean venv
+.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
+	clean venv
 
 run: .venv/run
 	@set -e; \
@@ -38,6 +39,10 @@ firmware:
 test-firmware: .venv/dev firmware
 	$(MAKE) -C tests/firmware
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
+
+# Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
+test-identify: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/identification
 
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev

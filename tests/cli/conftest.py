@@ -39,7 +39,10 @@ def probe(call: Call, monkeypatch: pytest.MonkeyPatch) -> Command:
     def run(*arguments: str, action: str = "") -> subprocess.CompletedProcess[str]:
         with monkeypatch.context() as during:
             during.setenv("PROBE", action)
-            during.setattr(app, "COMMANDS", COMMANDS)
+            for name in list(app.COMMANDS):
+                during.delitem(app.COMMANDS, name)
+            for name, entry in COMMANDS.items():
+                during.setitem(app.COMMANDS, name, entry)
             return subprocess.CompletedProcess(arguments, *call(*arguments))
 
     return run

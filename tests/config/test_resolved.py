@@ -19,7 +19,7 @@ from wristctl.config.section import Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
 
-COMMANDS = ("gen-data", "train", "tune", "compare", "simulate", "calibrate-wrist", "hw-run")
+COMMANDS = ("gen-data", "train", "tune", "compare", "simulate", "identify", "calibrate-wrist", "hw-run")
 
 
 def _read_back(text: str) -> Study:

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, get_origin
 
 import typer
 from rich.console import Console
@@ -38,7 +38,8 @@ __all__ = ["Input", "Session", "Table", "study_command"]
 class Input:
     """An earlier run that a command reads: the leaf of a section that names it, and the kind it must be.
 
-    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked.
+    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. A leaf
+    that is a tuple names any number of runs.
     """
 
     leaf: str
@@ -98,7 +99,7 @@ def study_command(
     files. `flags` (name and help) are switches of this call that are no settings. The docstring of `work` is the help.
     """
     command = _Command(kind, work, plan, inputs)
-    named = [each.leaf for each in inputs]
+    named = [each.leaf for each in inputs if each.leaf != argument]
     first = (argument,) if argument else ()
 
     def call(**given: Any) -> None:
@@ -112,8 +113,10 @@ def study_command(
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
     texts = {leaf for leaf in shortcuts if keys[leaf].annotation in (str, str | None)}
     quoted = {*first, *named, *switches, *texts}
-    own = [(leaf, keys[leaf].description or "", leaf in switches) for leaf in (*first, *named, *shortcuts)]
-    own += [(name, text, True) for name, text in flags.items()]
+    kinds: dict[str, Any] = dict.fromkeys(switches, bool)
+    kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
+    own = [(leaf, keys[leaf].description or "", kinds.get(leaf, str)) for leaf in (*first, *named, *shortcuts)]
+    own += [(name, text, bool) for name, text in flags.items()]
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
@@ -149,13 +152,16 @@ def _execute(command: _Command, options: Options, shortcuts: Sequence[str], flag
 
 
 def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
-    runs = {}
+    runs: dict[str, Run] = {}
     for each in command.inputs:
         ref = getattr(command.section(study), each.leaf)
-        if ref is not None:
+        if isinstance(ref, tuple) and ref:
+            runs |= {f"{each.leaf}[{at}]": require(one, each.kind, out) for at, one in enumerate(ref)}
+        elif ref:
             runs[each.leaf] = _stopped(ref, each, out) if each.unfinished else require(ref, each.kind, out)
         elif not each.optional:
-            fix = f"--{each.leaf} latest:{each.kind}, or the path or id of a {each.kind} run"
+            option = "" if isinstance(ref, tuple) else f"--{each.leaf.replace('_', '-')} "
+            fix = f"{option}latest:{each.kind}, or the path or id of a {each.kind} run"
             raise UserError(f"{command.kind} needs a {each.kind} run", f"{command.kind}.{each.leaf}", fix)
     return runs
 
@@ -172,7 +178,11 @@ def _stopped(ref: str, wanted: Input, out: Path) -> Run:
 def _naming(inputs: dict[str, Run], study: Study, command: _Command, out: Path) -> Study:
     """The study with the inputs named for good: by id within `out`, else by path."""
     within = out.resolve()
-    names = {leaf: run.id if run.path.parent == within else str(run.path) for leaf, run in inputs.items()}
+    names: dict[str, Any] = {
+        role: run.id if run.path.parent == within else str(run.path) for role, run in inputs.items()
+    }
+    for leaf in dict.fromkeys(role.partition("[")[0] for role in names if role.endswith("]")):
+        names[leaf] = tuple(names.pop(role) for role in inputs if role.startswith(f"{leaf}["))
     section = command.section(study).model_copy(update=names)
     return study.model_copy(update={command.kind.replace("-", "_"): section})
 

@@ -22,9 +22,10 @@ def hw_run(session: Session) -> list[Table]:
     session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
     from wristctl.cli.hw_tables import reported
     from wristctl.cli.hw_trials import performed
+    from wristctl.cli.loops import identified
 
-    table = performed(session)
-    return reported(session, table)
+    known = identified(session, "hw-run")
+    return reported(known, performed(known, session.study.wrist))
 
 
 app = study_command(
@@ -34,6 +35,7 @@ app = study_command(
     inputs=(
         Input("calibration", kind="calibrate-wrist", optional=True),
         Input("optics", kind="calibrate-camera", optional=True),
+        Input("from_identified", kind="identify", optional=True),
         Input("tuned", kind="tune", optional=True),
         Input("network", kind="train", optional=True),
     ),

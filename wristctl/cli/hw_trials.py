@@ -14,6 +14,7 @@ from wristctl.cli.command import Session, Table
 from wristctl.cli.hw_view import trials_shown
 from wristctl.cli.loops import network_of, tuned_of
 from wristctl.cli.operator import operator
+from wristctl.config.wrist import WristParameters
 from wristctl.hardware.trial.calibration import Calibration
 from wristctl.hardware.trial.evaluation import JUDGED, evaluated
 from wristctl.hardware.trial.experiment import Experiment
@@ -43,8 +44,11 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
 }
 
 
-def performed(session: Session) -> pd.DataFrame:
-    """Do all trials, logged as they go; a row for each. What stops them is raised once everything is kept."""
+def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
+    """Do all trials, logged as they go; a row for each. What stops them is raised once everything is kept.
+
+    The controller knows the session's wrist; `bench` is the one that an emulated bench weakens.
+    """
     settings, run, study = session.settings, session.run, session.study
     cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(run.stream("order")))
@@ -59,7 +63,7 @@ def performed(session: Session) -> pd.DataFrame:
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
             ask, keep = operator(session), film.add if film else None
-            stand = open_stand(settings, study.wrist, study.seed, view_of(session), ask, keep)
+            stand = open_stand(settings, bench, study.seed, view_of(session), ask, keep)
         with trials_shown(session, trials) as shown:
             experiment.run(stand, shown)
     except BaseException as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.cli.command import Session
@@ -55,6 +56,18 @@ def network_of(session: Session) -> Inverse | None:
     if at.domain.is_empty:
         log.warning("the study's pose or hand mass lies outside what the network learned: every angle is a guess")
     return at.along
+
+
+def identified(session: Session, command: str) -> Session:
+    """The command's session with the parameters of its identify run in its study, as it is without one."""
+    from wristctl.identification.identified import with_identified
+
+    run = session.inputs.get("from_identified")
+    if run is None:
+        return session
+    text = run.file("data/identified.yaml").read_text(encoding="utf-8")
+    study = with_identified(session.study, command, text)
+    return replace(session, study=study, settings=getattr(study, command.replace("-", "_")))
 
 
 def tuned_of(session: Session) -> Gains | None:

@@ -49,13 +49,15 @@ _COMPLETED: dict[str, Callable[..., list[str]]] = {
     "controller": controllers,
     "data": run_ids,
     "calibration": run_ids,
+    "from_identified": run_ids,
     "network": run_ids,
+    "runs": run_ids,
     "tuned": run_ids,
 }
 
 
-def signature(own: Iterable[tuple[str, str, bool]], argument: str | None = None) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help, whether it is a switch).
+def signature(own: Iterable[tuple[str, str, Any]], argument: str | None = None) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own, given as (leaf, help, type).
 
     One of its own may be the `argument` that stands first, in place of study files.
     """
@@ -69,14 +71,14 @@ def signature(own: Iterable[tuple[str, str, bool]], argument: str | None = None)
             leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[(bool if switch else str) | None, _parameter(leaf, text, leaf == argument)],
+            annotation=Annotated[kind | None, _parameter(leaf, text, leaf == argument)],
         )
-        for leaf, text, switch in own
+        for leaf, text, kind in own
     ]
     return inspect.Signature([*shared, *named])
 
 
 def _parameter(leaf: str, text: str, first: bool) -> Any:
     if first:
-        return typer.Argument(metavar=leaf.upper(), help=text)
+        return typer.Argument(metavar=leaf.upper(), help=text, autocompletion=_COMPLETED.get(leaf))
     return typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf))

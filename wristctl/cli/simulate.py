@@ -20,13 +20,14 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
 def simulate(session: Session) -> Table:
     """Simulate one closed loop and draw it."""
-    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles, warn_if_outside
+    from wristctl.cli.loops import identified, network_of, tuned_of, warn_if_it_buckles, warn_if_outside
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import directions, stroboscope
     from wristctl.simulation.metrics import METRICS
     from wristctl.simulation.simulate import simulate as run_simulation
     from wristctl.simulation.trajectory import COLUMNS
 
+    session = identified(session, "simulate")
     run, wrist = session.run, session.study.wrist
     warn_if_it_buckles(session, [session.settings.loop])
     with session.progress("compiling and simulating the loop"):
@@ -63,7 +64,11 @@ app = study_command(
     "simulate",
     work=simulate,
     plan=plan,
-    inputs=(Input("network", kind="train", optional=True), Input("tuned", kind="tune", optional=True)),
+    inputs=(
+        Input("network", kind="train", optional=True),
+        Input("tuned", kind="tune", optional=True),
+        Input("from_identified", kind="identify", optional=True),
+    ),
     shortcuts=("controller", "gains"),
     examples=(
         "wristctl simulate --controller smc --gains exchanged",

@@ -38,8 +38,9 @@ def check_search(settings: TuneSettings) -> None:
 
 def tune(session: Session) -> Table:
     """Search for gains by rollouts, a whole swarm as one batch."""
-    from wristctl.cli.loops import warn_if_it_buckles
+    from wristctl.cli.loops import identified, warn_if_it_buckles
 
+    session = identified(session, "tune")
     warn_if_it_buckles(session, session.settings.loops.values())
     found = search_all(session, session.settings)
     rows = [
@@ -100,10 +101,14 @@ app = study_command(
     "tune",
     work=tune,
     plan=plan,
-    inputs=(Input("network", kind="train", optional=True),),
+    inputs=(
+        Input("network", kind="train", optional=True),
+        Input("from_identified", kind="identify", optional=True),
+    ),
     shortcuts=("candidates", "iterations"),
     examples=(
         "wristctl tune experiments/paper.yaml",
         "wristctl tune --set 'controllers=[smc, pid]' --iterations 20",
+        "wristctl tune experiments/recommended.yaml --from-identified latest:identify",
     ),
 )

@@ -61,6 +61,7 @@ class TuneSettings(Section):
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run behind references with inverse: network")
+    from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
 
 class CompareSettings(Section):
@@ -105,3 +106,4 @@ class SimulateSettings(Section):
     horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
+    from_identified: str | None = choice(None, "identify run whose parameters replace the study's")

@@ -79,9 +79,7 @@ class HwRunSettings(RigSettings):
     """The paper's experiment: directions x repetitions, with and without a push, for each row of controllers."""
 
     rows: tuple[Row, ...] = choice(
-        (Row(controller="smc-tracking", gains="stepper"), Row(controller="smc", gains="stepper")),
-        "controllers and gains: the better one and the paper's",
-        min_length=1,
+        (Row(controller="smc-tracking", gains="stepper"),), "controllers and gains", min_length=1
     )
     directions: tuple[Direction, ...] = choice(
         ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1
@@ -96,6 +94,7 @@ class HwRunSettings(RigSettings):
     control_period: float = quantity(5e-3, "s", "time between two evaluations of the law", "assumed", ge=2e-3, le=0.05)
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
+    from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames as a video, annotated")
@@ -112,8 +111,8 @@ class HwRunSettings(RigSettings):
 
     @property
     def loop(self) -> Loop:
-        """The same loop in simulation: the emulated wrist's plant, or where the wrist is real the known one."""
-        emulated = self.port is None
+        """The same loop in simulation: the emulated plant, or the known one of a real or an identified wrist."""
+        emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,
             plant=self.bench.plant if emulated else Plant(),

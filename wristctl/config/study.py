@@ -7,6 +7,7 @@ from pydantic import Field
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
 from wristctl.config.vision import CalibrateCameraSettings, TrackSettings
@@ -24,6 +25,7 @@ class Study(Section):
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
+    identify: IdentifySettings = IdentifySettings()
     calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
     track: TrackSettings = TrackSettings()

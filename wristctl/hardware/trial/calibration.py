@@ -10,9 +10,8 @@ from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.hardware.board import Board
 from wristctl.hardware.errors import BoardError
-from wristctl.hardware.messages import JOG_RATE, Flag, Target
 from wristctl.hardware.trial.halt import halt
-from wristctl.hardware.trial.homing import Patience, Zero, find_zero
+from wristctl.hardware.trial.homing import Patience, Zero, find_zero, slacken
 from wristctl.hardware.trial.prepare import prepare
 from wristctl.hardware.trial.spools import spools_of
 from wristctl.hardware.trial.stands import Stand
@@ -81,10 +80,7 @@ def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
             stand.confirm()
             prepare(board, settings)
             zero = find_zero(board, eye, spools, settings.homing, settings.plane)
-            slack = round(settings.homing.pull / spools.step)
-            one, two, four, five = (-slack * sign for sign in zero.signs)
-            board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))
-            position = board.wait_while(Flag.MOVING, timeout=5.0).position
+            position = slacken(board, spools, settings.homing, zero.signs)
         except BaseException:
             with undisturbed():
                 board.close(emergency=not halt(board, settings.safety.watchdog).verified)

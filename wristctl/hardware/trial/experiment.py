@@ -15,7 +15,7 @@ from wristctl.hardware.trial.calibration import Calibration
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.faults import HostFaults
 from wristctl.hardware.trial.halt import Halt, halt
-from wristctl.hardware.trial.homing import Patience, Zero, find_zero
+from wristctl.hardware.trial.homing import Patience, Zero, find_zero, slacken
 from wristctl.hardware.trial.log import TrialLog
 from wristctl.hardware.trial.loop import ControlLoop, Shown, Timing
 from wristctl.hardware.trial.moves import at_rest, back, motion_of
@@ -127,8 +127,11 @@ class Experiment:
             self._one(stand, loop, trial)
 
     def _loop(self, stand: Stand, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
-        """A loop at rest at zero in this plane; the first one homes the board, later ones read the marker's zero."""
+        """A loop at rest at zero in this plane; the first one homes the board, others read the slack wrist's marker."""
         settings, eye = self._settings, stand.eye()
+        if self.zero is not None:
+            slacken(board, spools_of(settings.actuator), settings.homing, self.zero.signs)
+            Patience(board).wait(settings.homing.let_go)
         marker = Patience(board).angle(eye, 4 * settings.homing.frames)
         if self.zero is None:  # the marker is seen, and nothing moves yet
             stand.confirm()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from wristctl.config.hw_run import Homing
 from wristctl.hardware.board import Board
-from wristctl.hardware.messages import AXES
+from wristctl.hardware.messages import AXES, JOG_RATE, Flag, Target
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.spools import TENDONS, Spools, on_plus_side
@@ -164,6 +164,14 @@ class _Finder:
 
     def _go(self) -> None:
         self._board.jog(list(self._start + self._signs * self._at))
+
+
+def slacken(board: Board, spools: Spools, settings: Homing, signs: Sequence[int]) -> tuple[int, ...]:
+    """Let the tendons of a homed wrist go, so that nothing holds it; where the motors then stand [steps]."""
+    reeled = -round(settings.pull / spools.step)
+    one, two, four, five = (reeled * sign for sign in signs)
+    board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))
+    return board.wait_while(Flag.MOVING, timeout=5.0).position
 
 
 def find_zero(

@@ -1,0 +1,77 @@
+"""`wristctl identify` on logged runs, and what other commands make of its result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from tests.identification.benches import KNOWN, LEVEL, SLOW, UPRIGHT, write_run
+from wristctl.config.load import load_study
+from wristctl.config.loop import Loop
+from wristctl.config.plant import Actuator
+from wristctl.config.study import Study
+from wristctl.identification.identified import identified_yaml, with_identified
+from wristctl.runs import open_run
+from wristctl.simulation.simulate import simulate
+
+SIDES = ("ulnar", "extension")
+
+
+def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Path) -> None:
+    poses = [write_run(tmp_path / "results", 0, pose, sides=SIDES) for pose in (UPRIGHT, LEVEL)]
+    code, out, err = call("identify", *(run.id for run in poses), "--set", "fix={friction: 0.1}")
+    assert code == 0, err
+    found = open_run(out.splitlines()[-1])
+    assert [each.run for each in found.manifest.inputs] == [run.id for run in poses]
+    table = found.data("parameters").set_index("parameter")
+    assert table.value["stiffness"] == pytest.approx(0.7 * KNOWN.stiffness, rel=0.1)
+    assert table.low["stiffness"] < table.value["stiffness"] < table.high["stiffness"] < KNOWN.stiffness
+    assert (table.verdict["friction"], table.value["friction"]) == ("fixed", 0.1)
+    assert found.metrics["stiffness"]["interval"] == [table.low["stiffness"], table.high["stiffness"]]
+    assert found.metrics["condition"]["value"] > 1.0 and "condition number" in out
+    pasted = load_study([found.file("data/identified.yaml")])
+    assert pasted.wrist.damping == table.value["damping"]
+    sensor = pasted.simulate.loop.sensor
+    assert sensor.frame_rate == pytest.approx(60.0, rel=1e-6) and sensor.dropped == pytest.approx(0.05, abs=0.03)
+    assert sensor.delay_frames == pytest.approx(60.0 * (0.01 + 0.03), abs=0.1)
+
+    code, out, err = call("simulate", "--from-identified", "latest:identify")
+    assert code == 0, err
+    replaced = open_run(out.splitlines()[-1])
+    assert [(each.role, each.run) for each in replaced.manifest.inputs] == [("from_identified", found.id)]
+    expected = simulate(Study(wrist=pasted.wrist))
+    assert replaced.metrics["rmse"]["value"] == expected.metrics["rmse"]
+
+
+def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_path: Path) -> None:
+    run = write_run(tmp_path / "results", 1, UPRIGHT, SLOW, sides=("ulnar",))
+    code, out, err = call("identify", run.id)
+    assert code == 3 and "not identify stiffness" in err and "add " in err and "--set 'fix={" in err
+    assert "What to add" in err and "condition number" in err and out == ""
+    failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
+    assert failed.state == "failed" and failed.manifest.exit_code == 3
+    assert set(failed.data("parameters").verdict) >= {"not identified"}
+    assert not (failed.path / "data/identified.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [((), "identify needs a hw-run run"), (("nothing",), "no such run"), (("--set", "fix={a: 1}"), "needs a hw-run")],
+)
+def test_without_logged_runs_there_is_nothing_to_identify(call: Call, arguments: tuple[str, ...], said: str) -> None:
+    code, _, err = call("identify", *arguments)
+    assert code == 2 and said in err
+
+
+def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -> None:
+    values = {"stiffness": 0.4, "damping": 0.09, "tendon_radius": 0.021, "tendon_stiffness": 9e3, "friction": 0.2}
+    text = identified_yaml(values, {"frame_rate": 30.0, "delay_frames": 1.5})
+    study = Study(simulate={"loop": Loop(actuator=Actuator(level="tendon"))})  # type: ignore[arg-type]
+    simulated = with_identified(study, "simulate", text)
+    assert (simulated.wrist.stiffness, simulated.wrist.hand_mass) == (0.4, study.wrist.hand_mass)
+    assert simulated.simulate.loop.actuator == Actuator(level="tendon", tendon_stiffness=9e3, friction=0.2)
+    tuned = with_identified(study, "tune", text).tune
+    assert {loop.sensor.delay_frames for loop in tuned.loops.values()} == {1.5}
+    assert {loop.sensor.level for loop in tuned.loops.values()} == {"ideal"}

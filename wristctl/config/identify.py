@@ -1,0 +1,29 @@
+"""Identification: which runs, what is held fixed, what is known how well, and what counts as identified."""
+
+from __future__ import annotations
+
+from wristctl.config.section import Section, choice, quantity
+
+
+class IdentifySettings(Section):
+    """Parameters of a real wrist from its spools' logged positions and its marker's angles."""
+
+    runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run")
+    fix: dict[str, float] = choice({}, "parameters held at a value instead of found, by name")
+    segments: int = choice(4, "constant-curvature segments of the model", "as simulated", ge=1, le=8)
+    step: float = quantity(1e-3, "s", "integration step", "as simulated", gt=0, le=5e-3)
+    radius_error: float = quantity(
+        0.01, "", "how well tendon_radius over pulley_radius is known: relative standard deviation", "assumed", gt=0
+    )
+    zero_error_deg: float = quantity(
+        0.1, "deg", "how well the marker's zero is known in each run and plane: standard deviation", "assumed", gt=0
+    )
+    spool_error: float = quantity(
+        2e-5, "m", "how well homing finds where each tendon is taut in each run: standard deviation", "assumed", gt=0
+    )
+    widest: float = quantity(
+        0.25, "", "half width of a 95 % interval, over the value, beyond which a parameter is not identified", gt=0
+    )
+    condition_limit: float = quantity(
+        1000.0, "", "condition number of the scaled Jacobian beyond which nothing is identified", "assumed", gt=1
+    )

@@ -1,0 +1,193 @@
+"""Nonlinear least squares of the forward model's angle against the marker's, at the times of the frames."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from wristctl.config.identify import IdentifySettings
+from wristctl.identification.forward import Candidate, angles
+from wristctl.identification.trials import Trial
+from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
+
+Array = NDArray[np.float64]
+
+_NUDGE, _NUDGE_M = 1e-4, 1e-6
+"""Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""
+_MOST = 200
+"""Evaluations of one search; 10 to 20 are usual."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Trials, the parameters to find and those that are held, each with the value at which it starts.
+
+    Beside the parameters three kinds of small errors are found, of which the size is known beforehand: the camera's
+    zero angle of each run and plane, and the zero of each spool of each run.
+    """
+
+    trials: Sequence[Trial]
+    start: Mapping[str, float]
+    settings: IdentifySettings
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """The parameters to find."""
+        return tuple(name for name in UNKNOWNS if name not in self.settings.fix)
+
+    @cached_property
+    def coordinates(self) -> dict[str, int]:
+        """Where each coordinate of the search stands: free parameters, zeros, spools."""
+        zeros = [_zero(trial) for trial in self.trials]
+        spools = [_spool(trial, tendon) for trial in self.trials for tendon in trial.tendons]
+        return {name: at for at, name in enumerate(dict.fromkeys([*self.free, *zeros, *spools]))}
+
+    def begin(self) -> Array:
+        """The coordinates at the start."""
+        x = np.zeros(len(self.coordinates))
+        for at, name in enumerate(self.free):
+            x[at] = UNKNOWNS[name].coordinate(self.start[name], self.start[name])
+        return x
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest coordinates."""
+        zeros = sum(name.startswith(_ZERO) for name in self.coordinates)
+        widest = np.repeat([0.2, 2e-3], [zeros, len(self.coordinates) - len(self.free) - zeros])
+        low, high = np.array([UNKNOWNS[name].bounds() for name in self.free]).reshape(-1, 2).T
+        return np.concatenate([low, -widest]), np.concatenate([high, widest])
+
+    def prior(self) -> Array:
+        """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
+        known = {
+            "tendon_radius": 1.0 / self.settings.radius_error,
+            _ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
+            _SPOOL: 1.0 / self.settings.spool_error,
+        }
+        return np.array([known.get(name.split(" ")[0], 0.0) for name in self.coordinates])
+
+    def values(self, x: Array) -> dict[str, float]:
+        """Every parameter at coordinates x, found or held."""
+        held = {**self.start, **self.settings.fix}
+        for name, at in zip(self.free, x, strict=False):
+            held[name] = UNKNOWNS[name].value(float(at), self.start[name])
+        return {name: held[name] for name in UNKNOWNS}
+
+    def candidate(self, trial: Trial, x: Array, **known: Any) -> Candidate:
+        """The trial's wrist and tendons at coordinates x; `known` parameters of the wrist changed."""
+        values = self.values(x)
+        own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")} | known
+        one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
+        wrist = trial.wrist.model_copy(update=own)
+        return Candidate(wrist, values["tendon_stiffness"], values["friction"], (one, two, three, four))
+
+    def simulate(self, trial: Trial, candidates: Sequence[Candidate]) -> Array:
+        """Angles (count, T) of the candidates in a trial."""
+        return angles(candidates, trial.reeled, self.settings.step, self.settings.segments)
+
+
+_ZERO, _SPOOL = "zero", "spool"
+
+
+def _zero(trial: Trial) -> str:
+    return f"{_ZERO} {trial.run} {trial.plane}"
+
+
+def _spool(trial: Trial, tendon: int) -> str:
+    return f"{_SPOOL} {trial.run} {tendon}"
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """The angles that the model expects in the frames, and their derivatives by the coordinates."""
+
+    expected: list[Array]
+    """Of each trial (F,) [rad], the camera's zero included."""
+    slopes: list[Array]
+    """Of each trial (F, coordinates)."""
+
+
+def linearise(problem: Problem, x: Array) -> Linearisation:
+    """Expected angles and their derivatives at coordinates x; the finite differences are lanes beside the angles."""
+    coordinates, delay = problem.coordinates, problem.values(x)["delay"]
+
+    def one(trial: Trial) -> tuple[Array, Array]:
+        moved = [name for name in problem.free if name in SIMULATED] + [_spool(trial, each) for each in trial.tendons]
+        nudges = [_NUDGE_M if name.startswith(_SPOOL) else _NUDGE for name in moved]
+        near = [x + nudge * (np.arange(len(x)) == coordinates[name]) for name, nudge in zip(moved, nudges, strict=True)]
+        course = problem.simulate(trial, [problem.candidate(trial, each) for each in (x, *near)])
+        expected, *others = (np.interp(trial.captured - delay, trial.time, each) for each in course)
+        slopes = np.zeros((len(expected), len(x)))
+        for name, nudge, other in zip(moved, nudges, others, strict=True):
+            slopes[:, coordinates[name]] = (other - expected) / nudge
+        if "delay" in problem.free:
+            h = problem.settings.step
+            early, late = (np.interp(trial.captured - delay + shift, trial.time, course[0]) for shift in (-h, h))
+            slopes[:, coordinates["delay"]] = (early - late) / (2.0 * h)
+        slopes[:, coordinates[_zero(trial)]] = 1.0
+        return expected + x[coordinates[_zero(trial)]], slopes
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        done = list(pool.map(one, problem.trials))
+    return Linearisation([each for each, _ in done], [each for _, each in done])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where the search ended."""
+
+    problem: Problem
+    x: Array
+    noise: float
+    """Standard deviation of the residuals [rad]."""
+    residuals: list[Array]
+    """Marker's less expected angle, of each trial (F,) [rad]."""
+    slopes: list[Array]
+    evaluations: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter, found or fixed."""
+        return self.problem.values(self.x)
+
+
+def fit(problem: Problem) -> Fit:
+    """The coordinates of least squares, with what is known beforehand counting by its own standard deviation.
+
+    Where the residuals are not of the size that they were weighed with, the search goes on from there with their own.
+    """
+    weights, evaluations = problem.prior(), 0
+    known = weights > 0.0
+    bounds = problem.bounds()
+    x = np.clip(problem.begin(), *bounds)
+    noise, weighed = np.deg2rad(0.1), np.inf
+    last: tuple[Array, Linearisation] | None = None
+
+    def at(x: Array) -> Linearisation:
+        nonlocal last, evaluations
+        if last is None or not np.array_equal(last[0], x):
+            last, evaluations = (x.copy(), linearise(problem, x)), evaluations + 1
+        return last[1]
+
+    def rows(x: Array) -> Array:
+        parts = [(e - t.angle) / weighed for e, t in zip(at(x).expected, problem.trials, strict=True)]
+        return np.concatenate([*parts, (weights * x)[known]])
+
+    def slopes(x: Array) -> Array:
+        return np.concatenate([*(each / weighed for each in at(x).slopes), np.diag(weights)[known]])
+
+    while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
+        weighed = noise
+        found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=_MOST)
+        x = found.x
+        residuals = [trial.angle - each for trial, each in zip(problem.trials, at(x).expected, strict=True)]
+        count = sum(map(len, residuals))
+        noise = float(np.sqrt(sum(float(each @ each) for each in residuals) / max(1, count - len(problem.free))))
+    return Fit(problem, x, noise, residuals, at(x).slopes, evaluations)

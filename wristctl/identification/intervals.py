@@ -1,0 +1,122 @@
+"""How well the parameters are known: covariance, intervals, correlations, condition.
+
+Neighbouring residuals may be alike (an error of the model, the camera's filter). The covariance is therefore the
+sandwich of Newey and West (Econometrica 55 (1987) 703) within each trial, with Andrews' bandwidth for a first-order
+autoregression (Econometrica 59 (1991) 817); no interval is narrower than independent frames would allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.identification.fit import Fit
+from wristctl.identification.unknowns import UNKNOWNS
+
+Array = NDArray[np.float64]
+
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a fit knows of its coordinates."""
+
+    deviation: Array
+    """Standard deviations."""
+    information: Array
+    """Inverse covariance if residuals were independent, with what was known beforehand."""
+    condition: float
+    """Condition number of the Jacobian, its columns scaled to unit length."""
+    autocorrelation: float
+    """Of neighbouring residuals."""
+    effective: float
+    """Independent frames that would tell as much as the residuals do."""
+
+    @property
+    def half_widths(self) -> Array:
+        """Half the 95 % interval of each coordinate."""
+        return NORMAL_95 * self.deviation
+
+    @property
+    def correlation(self) -> Array:
+        """Correlations of the coordinates."""
+        covariance = inverse(self.information)
+        sd = np.sqrt(np.diag(covariance))
+        found: Array = covariance / np.outer(sd, sd)
+        return found
+
+
+def knowledge(fit: Fit) -> Knowledge:
+    """Deviations, condition and autocorrelation at the end of a fit."""
+    weights = fit.problem.prior()
+    slopes = [each / fit.noise for each in fit.slopes]
+    residuals = [each / fit.noise for each in fit.residuals]
+    count = sum(map(len, residuals))
+    rho = autocorrelation(residuals)
+    lags = bandwidth(rho, count / len(residuals))
+    information = information_of(slopes, weights)
+    meat = np.diag(weights**2)
+    for slope, residual in zip(slopes, residuals, strict=True):
+        meat = meat + long_run(slope * residual[:, None], lags) * count / max(1, count - len(fit.problem.free))
+    bread = inverse(information)
+    stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
+    alike = 1.0 + 2.0 * sum((1.0 - lag / (lags + 1.0)) * rho**lag for lag in range(1, lags + 1))
+    deviation = np.sqrt(np.maximum(np.diag(bread), np.diag(bread @ meat @ bread)))
+    return Knowledge(deviation, information, condition(stacked), rho, count / max(alike, 1e-3))
+
+
+def information_of(slopes: Sequence[Array], weights: Array) -> Array:
+    """Fisher's information of residuals of unit variance with these slopes, with what is known beforehand."""
+    total: Array = np.diag(weights**2) + sum(each.T @ each for each in slopes)
+    return total
+
+
+def inverse(information: Array) -> Array:
+    """The covariance; nearly infinite, not an error, where a coordinate has no influence."""
+    scale = np.sqrt(np.diag(information)) + 1e-9
+    scaled = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    found: Array = np.linalg.inv(scaled) / np.outer(scale, scale)
+    return found
+
+
+def condition(slopes: Array) -> float:
+    """Largest over least singular value with columns scaled to unit length; infinite where one is zero."""
+    length = np.linalg.norm(slopes, axis=0)
+    if not length.all():
+        return float("inf")
+    values = np.linalg.svd(slopes / length, compute_uv=False)
+    return float(values[0] / max(values[-1], 1e-300))
+
+
+def autocorrelation(residuals: Sequence[Array]) -> float:
+    """Correlation of each residual with the next one of its trial."""
+    both = sum(float(each[:-1] @ each[1:]) for each in residuals)
+    return float(np.clip(both / sum(float(each @ each) for each in residuals), -0.97, 0.97))
+
+
+def bandwidth(rho: float, length: float) -> int:
+    """Lags to weigh in trials of this many frames, by Andrews' rule for Bartlett's kernel."""
+    alpha = 4.0 * rho**2 / ((1.0 - rho) ** 2 * (1.0 + rho) ** 2)
+    return int(min(np.ceil(1.1447 * (alpha * length) ** (1.0 / 3.0)), length / 4.0))
+
+
+def long_run(scores: Array, lags: int) -> Array:
+    """Covariance of the sum of a sequence (F, p) whose neighbours up to `lags` apart may be alike (Bartlett)."""
+    total = scores.T @ scores
+    for lag in range(1, min(lags, len(scores) - 1) + 1):
+        both = scores[lag:].T @ scores[:-lag]
+        total = total + (1.0 - lag / (lags + 1.0)) * (both + both.T)
+    found: Array = total
+    return found
+
+
+def interval(fit: Fit, known: Knowledge, name: str) -> tuple[float, float]:
+    """The 95 % interval of a free parameter in its own unit; friction's ends at 0."""
+    at = fit.problem.free.index(name)
+    half, start, unknown = known.half_widths[at], fit.problem.start[name], UNKNOWNS[name]
+    low, high = (unknown.value(fit.x[at] + side * min(half, 50.0), start) for side in (-1.0, 1.0))
+    return (max(low, 0.0) if name == "friction" else low), high

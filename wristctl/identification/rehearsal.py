@@ -1,0 +1,118 @@
+"""Rehearsals: the log that a bench would write of a wrist whose parameters are given.
+
+For judging an experiment before anyone performs it: does it tell what is to be found, and how well?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.loop import Direction, Loop, Reference
+from wristctl.config.plant import Actuator
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.identification.forward import Candidate, angles
+from wristctl.identification.trials import tendons_of
+from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
+from wristctl.lanes.types import LANES
+from wristctl.simulation.actuator import actuate, at_rest, drive_of
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.segments import load_segments, segments
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+_PERIOD, _LOGGED = 1e-3, 5
+"""Tick of the simulation [s], and how many of them lie between two rows of the log."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the bench has and its user does not know.
+
+    The marker's zero angle [deg] in the ulnar and the flexion plane, and what tendons 1, 2, 4, 5 have reeled in more
+    than their spools' counts say [m].
+    """
+
+    wrist: WristParameters
+    actuator: Actuator
+    delay: float = 0.03
+    noise_deg: float = 0.1
+    zero_deg: tuple[float, float] = (0.0, 0.0)
+    taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    frame_rate: float = 60.0
+    dropped: float = 0.05
+
+
+@compiled
+def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: float) -> None:
+    known, motor = load_segments(rows_of(model)), rows_of(motors)
+    for tick in range(commands.shape[0]):
+        command, reeled = rows_of(commands[tick]), rows_of(out[tick])
+        reeled[0], reeled[1] = actuate(drive, motor, known, command[2], command[0], command[1], h)
+
+
+def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float) -> Array:
+    """What both sides' spools have reeled in (T, 2) [m] each millisecond where feedforward follows a reference."""
+    followed, law = motion(reference, wrist, horizon, _PERIOD), controller("feedforward")
+    loop = Loop(actuator=actuator)
+    done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
+    sides = [2.0 * done.column(name, 0) for name in ("tension_plus", "tension_minus")]
+    commands = np.repeat(np.stack([*sides, followed.theta_ref], axis=1)[..., None], LANES, axis=2)
+    drive = drive_of(actuator)
+    motors = np.repeat(at_rest(drive, wrist, np.zeros(1))[:, None], LANES, axis=1)
+    out = np.empty((len(commands), 2, LANES))
+    _reel_in(drive, motors, to_blocks(segments(wrist, 1)[None])[0], np.ascontiguousarray(commands), out, _PERIOD)
+    return np.ascontiguousarray(out[..., 0])
+
+
+def rehearse(
+    wrist: WristParameters, truth: Truth, moves: Sequence[tuple[Direction, Reference]], horizon: float,
+    rng: np.random.Generator,
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:  # fmt: skip
+    """The tables log, frames and trials of moves, each from rest, by a controller that believes in `wrist`."""
+    import pandas as pd
+
+    logs, seen, kinds = [], [], []
+    for number, (direction, reference) in enumerate(moves):
+        side = DIRECTIONS[direction]
+        followed = reference if side.sign > 0 else reference.mirrored()
+        reeled = spools(in_plane(wrist, direction), followed, truth.actuator, horizon)
+        own = _own(truth, direction)
+        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, Loop().plant_segments)[0]
+        time = _PERIOD * np.arange(len(angle))
+        ticks = slice(None, None, _LOGGED)
+        steps = np.rint(reeled[ticks] / truth.actuator.step_length).astype(int)
+        columns = {"trial": number, "time": time[ticks]}
+        tendons = enumerate(tendons_of(side.plane))
+        logs.append(pd.DataFrame(columns | {f"position_{tendon}": steps[:, at // 2] for at, tendon in tendons}))
+        captured = np.arange(rng.uniform(0.0, 1.0), horizon * truth.frame_rate) / truth.frame_rate
+        theta = np.interp(captured - truth.delay, time, angle) + np.deg2rad(
+            truth.noise_deg * rng.standard_normal(len(captured)) + truth.zero_deg[side.plane == "flexion"]
+        )
+        kept = rng.random(len(captured)) >= truth.dropped
+        verdict = np.where(kept, "ok", "no tip")
+        theta = np.where(kept, theta, np.nan)
+        columns = {"trial": number, "captured": captured, "used": captured + 0.01, "theta": theta, "verdict": verdict}
+        seen.append(pd.DataFrame(columns))
+        kinds.append({"trial": number, "direction": direction, "push": 0.0})
+    return pd.concat(logs), pd.concat(seen), pd.DataFrame(kinds)
+
+
+def _own(truth: Truth, direction: Direction) -> Candidate:
+    taut = dict(zip((1, 2, 4, 5), truth.taut, strict=True))
+    one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
+    actuator = truth.actuator
+    wrist = in_plane(truth.wrist, direction)
+    return Candidate(wrist, actuator.tendon_stiffness, actuator.friction, (one, two, three, four))

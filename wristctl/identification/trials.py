@@ -1,0 +1,96 @@
+"""Trials as identification sees them: what the spools did, and what the camera saw of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.errors import UserError
+from wristctl.config.wrist import WristParameters
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+_FEWEST = 20
+"""Frames that a trial must have to be of use."""
+
+_OPPOSITE = {"ulnar": ("ulnar", "radial"), "flexion": ("flexion", "extension")}
+"""Directions of the + and the - side of each bending plane."""
+
+
+def tendons_of(plane: str) -> tuple[int, int, int, int]:
+    """The four tendons as a bending plane sees them: two of its + side, two of its - side."""
+    plus, minus = (DIRECTIONS[side].tendons for side in _OPPOSITE[plane])
+    return *plus, *minus
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One motion of a wrist in one bending plane: T instants on a grid, F frames."""
+
+    label: str
+    run: str
+    plane: str
+    wrist: WristParameters
+    """As known, gravity in the bending plane."""
+    time: Array
+    """(T,) [s]"""
+    reeled: Array
+    """What the spools have reeled in by their count, (T, 4) [m]: two tendons of the + side, two of the - side."""
+    captured: Array
+    """Time stamps of the frames, (F,) [s]."""
+    angle: Array
+    """What they show, (F,) [rad]."""
+
+    @property
+    def tendons(self) -> tuple[int, int, int, int]:
+        """The tendons in the order of `reeled`."""
+        return tendons_of(self.plane)
+
+    def faster(self, factor: float) -> Trial:
+        """The same motion in a fraction of the time, then at rest, as often seen."""
+        earlier = np.minimum(self.time[0] + factor * (self.time - self.time[0]), self.time[-1])
+        reeled = np.stack([np.interp(earlier, self.time, each) for each in self.reeled.T], axis=1)
+        return replace(self, reeled=reeled)
+
+
+def trials_of(
+    label: str, wrist: WristParameters, step_length: float, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
+    kinds: pd.DataFrame,
+) -> list[Trial]:  # fmt: skip
+    """The trials of a run's tables log, frames and trials, without a person's push, on a grid [s].
+
+    `step_length` is what one microstep reels in [m]. UserError where no trial is of use.
+    """
+    from scipy.interpolate import CubicSpline
+
+    found = []
+    for row in kinds.itertuples():
+        number, direction = int(row.trial), str(row.direction)  # type: ignore[arg-type]
+        own, seen = log[log.trial == number], frames[frames.trial == number]
+        if float(row.push) != 0.0 or len(own) < _FEWEST:  # type: ignore[arg-type]
+            continue
+        clock, captured, angle = (each.to_numpy(float) for each in (own.time, seen.captured, seen.theta))
+        time = np.arange(clock[0], clock[-1], grid)
+        usable = (seen.verdict == "ok").to_numpy() & np.isfinite(angle)
+        usable &= (captured >= time[0]) & (captured <= time[-1])
+        if usable.sum() < _FEWEST:
+            continue
+        trial = Trial(
+            f"{label}, trial {number}: {direction}", label, DIRECTIONS[direction].plane, in_plane(wrist, direction),
+            time, np.empty((len(time), 4)), captured[usable], angle[usable],
+        )  # fmt: skip
+        steps = own[[f"position_{tendon}" for tendon in trial.tendons]].to_numpy(float)
+        reeled = step_length * CubicSpline(clock, steps)(time)  # chords would cut the corners of 5 ms
+        found.append(replace(trial, reeled=reeled))
+    if not found:
+        raise UserError(
+            f"no trial without a push has {_FEWEST} usable frames", label, "name an hw-run run with trials that ended"
+        )
+    return found
