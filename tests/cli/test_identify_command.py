@@ -21,7 +21,7 @@ SIDES = ("ulnar", "extension")
 
 def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Path) -> None:
     poses = [write_run(tmp_path / "results", 0, pose, sides=SIDES) for pose in (UPRIGHT, LEVEL)]
-    code, out, err = call("identify", *(run.id for run in poses), "--set", "fix={friction: 0.1}")
+    code, out, err = call("identify", *(run.id for run in poses), "--set", "fix.friction=0.1")
     assert code == 0, err
     found = open_run(out.splitlines()[-1])
     assert [each.run for each in found.manifest.inputs] == [run.id for run in poses]
@@ -48,7 +48,7 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
 def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_path: Path) -> None:
     run = write_run(tmp_path / "results", 1, UPRIGHT, SLOW, sides=("ulnar",))
     code, out, err = call("identify", run.id)
-    assert code == 3 and "not identify stiffness" in err and "add " in err and "--set 'fix={" in err
+    assert code == 3 and "not identify stiffness" in err and "add " in err and "--set fix." in err
     assert "What to add" in err and "condition number" in err and out == ""
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
     assert failed.state == "failed" and failed.manifest.exit_code == 3
@@ -58,7 +58,7 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [((), "identify needs a hw-run run"), (("nothing",), "no such run"), (("--set", "fix={a: 1}"), "needs a hw-run")],
+    [((), "identify needs a hw-run run"), (("nothing",), "no such run"), (("--set", "fix.damping=1.0"), "needs a hw-run")],
 )
 def test_without_logged_runs_there_is_nothing_to_identify(call: Call, arguments: tuple[str, ...], said: str) -> None:
     code, _, err = call("identify", *arguments)

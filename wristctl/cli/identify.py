@@ -23,7 +23,7 @@ _ALIKE = 0.2
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
-    """Check the parameters that are held fixed and say what will be found from which trials."""
+    """Say what will be found from which trials."""
     problem = _problem(study, inputs)
     poses = len({(trial.wrist.gravity, trial.wrist.hand_mass) for trial in problem.trials})
     frames = sum(len(trial.angle) for trial in problem.trials)
@@ -69,11 +69,9 @@ def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
     """The trials of all runs, and where the search for the parameters begins: at what the first run's study says."""
     from wristctl.identification.fit import Problem
     from wristctl.identification.trials import trials_of
-    from wristctl.identification.unknowns import check_fixed
 
     settings, trials = study.identify, []
     start: dict[str, float] = {}
-    check_fixed(settings.fix)
     for run in inputs.values():
         config = run.config
         actuator = config.hw_run.actuator
@@ -182,7 +180,7 @@ app = study_command(
     argument="runs",
     examples=(
         "wristctl identify latest:hw-run",
-        "wristctl identify UPRIGHT_RUN LEVEL_RUN --set 'fix={friction: 0.1}'",
+        "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
         "wristctl tune experiments/paper.yaml --from-identified latest:identify",
     ),
 )

@@ -5,11 +5,22 @@ from __future__ import annotations
 from wristctl.config.section import Section, choice, quantity
 
 
+class Fixed(Section):
+    """Parameters held at a value instead of found; null: found."""
+
+    stiffness: float | None = quantity(None, "N m/rad", "bending stiffness of the whole wrist", gt=0)
+    damping: float | None = quantity(None, "N m s/rad", "bending damping of the whole wrist", gt=0)
+    tendon_stiffness: float | None = quantity(None, "N/m", "stiffness of one tendon", gt=0)
+    friction: float | None = quantity(None, "", "capstan friction: coefficient times bend", ge=0)
+    delay: float | None = quantity(None, "s", "how much older a picture is than its time stamp")
+    tendon_radius: float | None = quantity(None, "m", "radius of the tendons' circle, the pulley's as known", gt=0)
+
+
 class IdentifySettings(Section):
     """Parameters of a real wrist from its spools' logged positions and its marker's angles."""
 
     runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run")
-    fix: dict[str, float] = choice({}, "parameters held at a value instead of found, by name")
+    fix: Fixed = Fixed()
     segments: int = choice(4, "constant-curvature segments of the model", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "integration step", "as simulated", gt=0, le=5e-3)
     radius_error: float = quantity(
@@ -27,3 +38,8 @@ class IdentifySettings(Section):
     condition_limit: float = quantity(
         1000.0, "", "condition number of the scaled Jacobian beyond which nothing is identified", "assumed", gt=1
     )
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """What is held, by name."""
+        return self.fix.model_dump(exclude_none=True)

@@ -41,7 +41,7 @@ class Problem:
     @cached_property
     def free(self) -> tuple[str, ...]:
         """The parameters to find."""
-        return tuple(name for name in UNKNOWNS if name not in self.settings.fix)
+        return tuple(name for name in UNKNOWNS if name not in self.settings.fixed)
 
     @cached_property
     def coordinates(self) -> dict[str, int]:
@@ -75,7 +75,7 @@ class Problem:
 
     def values(self, x: Array) -> dict[str, float]:
         """Every parameter at coordinates x, found or held."""
-        held = {**self.start, **self.settings.fix}
+        held = {**self.start, **self.settings.fixed}
         for name, at in zip(self.free, x, strict=False):
             held[name] = UNKNOWNS[name].value(float(at), self.start[name])
         return {name: held[name] for name in UNKNOWNS}

@@ -141,7 +141,7 @@ def refuse(lacking: Mapping[str, float], offered: list[Addition], condition: flo
     raise UserError(
         f"these trials do not identify {told}; condition number {condition:.3g}",
         "identify",
-        f"add {add}; or hold what you know otherwise, for example --set 'fix={{{name}: {start[name]:g}}}'",
+        f"add {add}; or hold what you know otherwise, for example --set fix.{name}={start[name]:g}",
         exit_code=3,
     )
 

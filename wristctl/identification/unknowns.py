@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
-
-from wristctl.config.errors import UserError, meant
 
 
 class Unknown(NamedTuple):
@@ -52,12 +49,3 @@ UNKNOWNS = {
 
 SIMULATED = ("stiffness", "damping", "tendon_stiffness", "friction", "tendon_radius")
 """Those that the forward model holds; the delay shifts its outcome in time."""
-
-
-def check_fixed(fixed: Mapping[str, float]) -> None:
-    """UserError for a name that is no parameter, or a value that it cannot have."""
-    for name, value in fixed.items():
-        if name not in UNKNOWNS:
-            raise UserError(f"unknown parameter {name!r}", f"identify.fix.{name}", meant(name, UNKNOWNS))
-        if UNKNOWNS[name].log and value <= 0.0:
-            raise UserError(f"{name} must be positive", f"identify.fix.{name}", "give a value above 0")
