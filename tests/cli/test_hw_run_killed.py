@@ -107,7 +107,7 @@ def test_ctrl_c_on_a_terminal_reaches_every_process_and_only_one_answers(start: 
     _, said = child.communicate()
     (run,) = list_runs(tmp_path / "results")
     assert child.returncode == 130 and run.state == "interrupted" and run.problems() == [], said
-    assert "Traceback" not in said and "the motors stand" in said
+    assert "Traceback" not in said and "the motors stand" in said and "(p99)" in said and "overruns" in said
     assert not any(read(tmp_path / "record")["energised"])
 
 

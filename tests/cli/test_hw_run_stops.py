@@ -37,8 +37,8 @@ TRIAL = (
     "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.6", "--set", "back=0.2",
     "--set", "rest=0.1", "--set", "reference={duration: 0.5, angle_deg: 20.0}",
     "--set", "rows=[{controller: smc-tracking, gains: stepper}]", "--set", "bench.motors.slack=[0, 0, 0, 0]",
+    "--set", "homing.frames=1",
 )  # fmt: skip
-AT_ZERO = ("--calibration", "latest:calibrate-wrist", "--set", "positions=stored")
 RAMP = {"STOP": 1.0 / 50_000, "watchdog": 1.0 / 400_000, "reset": 0.0}
 UNANSWERED = 0.075
 """Seconds in which a command is sent three times before the host gives up."""
@@ -81,14 +81,17 @@ HwRun = Callable[..., Ended]
 
 
 @pytest.fixture(scope="module")
-def at_zero() -> Calibration:
-    """A calibration that holds for the bench at power-on without slack."""
+def at_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A calibrate-wrist run that holds for the bench at power-on without slack."""
     nonce = Board(Bench(Study().hw_run.bench, Study().wrist, 0).transport).connect().boot_nonce
-    return Calibration(Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
+    known = Calibration(Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
+    with start_run("calibrate-wrist", Study(), out=tmp_path_factory.mktemp("calibrated")) as run:
+        run.file(FILE).write_text(json.dumps(known.plain()))
+    return run.path
 
 
 @pytest.fixture
-def hw_run(call, monkeypatch: pytest.MonkeyPatch, at_zero: Calibration) -> HwRun:
+def hw_run(call, monkeypatch: pytest.MonkeyPatch, at_zero: Path) -> HwRun:
     """Performs a short hw-run, at zero from the start."""
     benches: list[Bench] = []
 
@@ -100,11 +103,10 @@ def hw_run(call, monkeypatch: pytest.MonkeyPatch, at_zero: Calibration) -> HwRun
     monkeypatch.setattr(stands, "Bench", Kept)
 
     def run(*options: str, out: Path = Path("results")) -> Ended:
-        with start_run("calibrate-wrist", Study(), out=out) as calibration:
-            calibration.file(FILE).write_text(json.dumps(at_zero.plain()))
-        code, _, err = call(*TRIAL, *AT_ZERO, "--out", str(out), *options)
+        stored = ("--calibration", str(at_zero), "--set", "positions=stored")
+        code, _, err = call(*TRIAL, *stored, "--out", str(out), *options)
         assert benches, err
-        (made,) = (each for each in list_runs(out) if each.kind == "hw-run")
+        (made,) = list_runs(out)
         return Ended(code, err, made, benches.pop())
 
     return run
@@ -179,7 +181,7 @@ def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(place, name, interrupting)
 
 
-@pytest.mark.parametrize("moment", ["homing", "between trials", "drawing"])
+@pytest.mark.parametrize("moment", ["homing", "between trials", *["drawing"] * THOROUGH])
 def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
     interrupted_at(moment, monkeypatch)
     ended = hw_run(*(("--set", "positions=find") if moment == "homing" else ()))
