@@ -127,9 +127,9 @@ def test_ctrl_c_at_20_random_moments(start: Start, tmp_path: Path) -> None:
         _, said = child.communicate()
         new = [run for run in list_runs(tmp_path / "results") if run.id not in known]
         known |= {run.id for run in new}
-        assert child.returncode in (0, 130) and "Traceback" not in said, said
-        for run in new:
-            assert run.state == ("ok" if child.returncode == 0 else "interrupted") and run.problems() == []
+        assert child.returncode in (0, 130, -signal.SIGINT) and "Traceback" not in said, said
+        for run in new:  # Python takes no signals in its last moments: the run is sealed by then
+            assert run.state in (("interrupted", "ok") if child.returncode == 130 else ("ok",)) and run.problems() == []
         stopped = [(run.path / "data" / "stop.json").exists() for run in new]
         found.append((child.returncode, *(run.state for run in new), *stopped))
         if any(stopped):
