@@ -5,7 +5,8 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-trust test-vision test-identify clean venv
+.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
+	clean venv
 
 run: .venv/run
 	@set -e; \
@@ -46,6 +47,10 @@ test-identify: .venv/dev
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/hardware/vision tests/cli/test_vision_commands.py
+
+# Faults of host, cable, board and camera, one by one and in pairs; hw-run stopped, killed and interrupted.
+test-faults: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers

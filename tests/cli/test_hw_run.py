@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
+import sys
 import tty
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -46,9 +49,25 @@ def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_seco
     assert len(run.data("log")) > 40 and "no tip" in set(run.data("frames")["verdict"])
 
 
-def test_a_dry_run_opens_no_port(call, tmp_path: Path) -> None:
-    code, out, _ = call("hw-run", "--dry-run", "--port", "/nowhere/ttyACM0")
-    assert code == 0 and "on hardware: board at /nowhere/ttyACM0" in out and not list(tmp_path.iterdir())
+@pytest.fixture
+def silent_port() -> Iterator[str]:
+    """A serial port on which nobody answers."""
+    master, client = pty.openpty()
+    tty.setraw(client)
+    yield os.ttyname(client)
+    os.close(master)
+    os.close(client)
+
+
+def test_a_dry_run_opens_neither_port_nor_camera(call, tmp_path: Path, silent_port: str) -> None:
+    opened: list[str] = []
+    sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
+    code, out, _ = call("hw-run", "--dry-run", "--port", silent_port, "--camera", "/dev/null")
+    assert code == 0 and f"on hardware: board at {silent_port}, camera /dev/null" in out
+    assert not list(tmp_path.iterdir())
+    assert silent_port not in opened and "/dev/null" not in opened
+    os.close(os.open(silent_port, os.O_RDWR | os.O_NOCTTY))
+    assert opened[-1] == silent_port  # one that had been opened would have been seen
 
 
 def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
@@ -56,7 +75,9 @@ def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
     assert code == 4 and "there is no such port" in err and "wristctl hw ports" in err
 
 
-def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
+    call, monkeypatch: pytest.MonkeyPatch, silent_port: str
+) -> None:
     from wristctl.hardware.trial import stands
 
     class Dark:
@@ -72,14 +93,10 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(call, monkeyp
             """Nothing is open."""
 
     monkeypatch.setattr(stands, "DeviceCamera", Dark)
-    master, client = pty.openpty()
-    tty.setraw(client)
-    try:
-        code, _, err = call("hw-run", "--port", os.ttyname(client), "--yes")
-    finally:
-        os.close(master)
-        os.close(client)
+    code, _, err = call("hw-run", "--port", silent_port, "--yes")
     assert code == 4 and "no answer to HELLO" in err and "check USB cable and power" in err
+    attempts = re.search(r"after (\d+) attempts", err)
+    assert attempts is not None and 0.1 * int(attempts[1]) <= 3.1  # a tenth of a second of patience with each
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -11,13 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.hardware.emulated_bench.client import WATCHDOG
 from tests.hardware.emulated_bench.conftest import TAUT
+from tests.hardware.emulated_bench.record import is_released, last_step, read, wait_for
 from wristctl.config.bench import BenchSettings, Fault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
@@ -72,28 +71,6 @@ def board_of(server: BenchServer) -> Board:
     board.enable()
     board.home()
     return board
-
-
-def wait_for(what: Callable[[], Any], patience: float = 60.0) -> Any:
-    """What it gives once that is true."""
-    until = time.monotonic() + patience
-    while not (got := what()):
-        assert time.monotonic() < until, "waited in vain"
-        time.sleep(0.02)
-    return got
-
-
-def read(record: Path) -> dict[str, Any]:
-    told: dict[str, Any] = json.loads(record.read_text()) if record.exists() else {}
-    return told
-
-
-def last_step(told: dict[str, Any]) -> float:
-    return max((at for at in told.get("last_step", ()) if at is not None), default=0.0)
-
-
-def is_released(told: dict[str, Any]) -> bool:
-    return last_step(told) > 0.0 and not any(told["energised"])
 
 
 def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:

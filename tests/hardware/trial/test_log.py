@@ -20,24 +20,23 @@ def test_rows_read_back_exactly_and_nan_is_empty(tmp_path: Path) -> None:
     assert row["captured"] == 0.1 + 0.2 and pd.isna(row["theta"])
 
 
-def test_rows_reach_the_file_while_the_trial_goes_on(tmp_path: Path) -> None:
+def test_every_row_is_in_the_file_at_once(tmp_path: Path) -> None:
     stream = Stream(tmp_path / "frames.csv", FRAMES, Disk(tmp_path))
-    for number in range(120):
+    for number in range(3):
         stream.row((0, number, 0.0, 0.0, 0.0, "ok"))
-    assert len(pd.read_csv(tmp_path / "frames.csv")) >= 100
+        assert pd.read_csv(tmp_path / "frames.csv")["number"].tolist() == list(range(number + 1))
 
 
 def test_a_full_disk_is_told_and_what_was_pending_is_written_into_the_reserve(tmp_path: Path) -> None:
     disk = Disk(tmp_path)
     stream = Stream(tmp_path / "frames.csv", FRAMES, disk)
-    for number in range(60):
-        stream.row((0, number, 0.0, 0.0, 0.0, "ok"))
+    stream.row((0, 0, 0.0, 0.0, 0.0, "ok"))
     disk.pretend_full = True
-    with pytest.raises(OSError, match="No space left"):
-        for number in range(60, 200):
+    for number in (1, 2):
+        with pytest.raises(OSError, match="No space left"):
             stream.row((0, number, 0.0, 0.0, 0.0, "ok"))
+    assert len(pd.read_csv(tmp_path / "frames.csv")) == 1
     disk.give_up_reserve()
     stream.close()
-    numbers = pd.read_csv(tmp_path / "frames.csv")["number"].tolist()
-    assert numbers == list(range(len(numbers))) and len(numbers) == 100
+    assert pd.read_csv(tmp_path / "frames.csv")["number"].tolist() == [0, 1, 2]
     assert not list(tmp_path.glob(".*"))

@@ -31,15 +31,15 @@ from wristctl.wrist.kinematics import Inverse
 
 
 class Stop:
-    """Why and how an experiment was stopped before its end."""
+    """Why, when (on the time of the trial, where one went on) and how an experiment was stopped before its end."""
 
-    def __init__(self, error: BaseException, trial: int | None, halted: Halt) -> None:
+    def __init__(self, error: BaseException, trial: int | None, time: float | None, halted: Halt) -> None:
         self.reason = f"{type(error).__name__}: {error}"
         if isinstance(error, UserError):
             self.reason = error.what
         elif isinstance(error, KeyboardInterrupt):
             self.reason = "interrupted by the operator"
-        self.trial, self.halt = trial, halted
+        self.trial, self.time, self.halt = trial, time, halted
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -51,6 +51,7 @@ class Stop:
         return {
             "reason": self.reason,
             "trial": self.trial,
+            "time": self.time,
             "motors_stand": self.halt.verified,
             "how": self.halt.how,
             "seconds": self.halt.seconds,
@@ -93,11 +94,11 @@ class Experiment:
             try:
                 self._all(stand, board, shown)
             except BaseException as error:
+                told = _of_the_log(error)
                 with undisturbed():
-                    self._stopped(stand, board, error)
-                if isinstance(error, OSError):
-                    what = f"the log cannot be written: {error.strerror}"
-                    raise SafetyStop(what, str(error.filename or "data"), "free space") from error
+                    self._stopped(stand, board, told)
+                if told is not error:
+                    raise told from error
                 raise
             with undisturbed():
                 halt(board, self._settings.safety.watchdog)
@@ -163,7 +164,6 @@ class Experiment:
         faults = HostFaults(settings.bench.faults) if stand.emulated else None
         loop.follow(followed, law, gains, trial.number, faults)
         self._trial_ended(stand, "ok")
-        self._log.flush()
         loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
 
     def _trial_ended(self, stand: Stand, outcome: str) -> None:
@@ -174,14 +174,23 @@ class Experiment:
 
     def _stopped(self, stand: Stand, board: Board, error: BaseException) -> None:
         """Stop the motors and let the board go, then note what happened."""
+        decided = board.transport.now()
         halted = halt(board, self._settings.safety.watchdog)
         if self._settings.safety.hold and halted.verified:
             board.transport.close()  # the board's watchdog ends it, and holds
         else:
             board.close(emergency=not halted.verified)
-        self.stop = Stop(error, self._under_way[0] if self._under_way else None, halted)
+        trial, start = self._under_way or (None, None)
+        self.stop = Stop(error, trial, None if start is None else decided - start, halted)
         self._log.disk.give_up_reserve()
         try:
             self._trial_ended(stand, self.stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
+
+
+def _of_the_log(error: BaseException) -> BaseException:
+    """The safety stop behind a disk that takes no more rows; any other error as it is."""
+    if isinstance(error, OSError):
+        return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), "free space")
+    return error

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+
 from wristctl.hardware.vision.camera import Camera, Frame
-from wristctl.hardware.vision.marker import Sighting, Tracker
+from wristctl.hardware.vision.marker import Sighting, Tracker, Verdict
 
 Kept = Callable[[Frame, Sighting], None]
 """Takes a frame and what was seen in it, to keep it."""
@@ -29,10 +32,14 @@ class Eye(Protocol):
 
 
 class InlineEye:
-    """Looks when asked: in virtual time, where looking takes none."""
+    """Looks when asked: in virtual time, where looking takes none.
+
+    A sensor's noise makes every picture another, so the same bytes again tell of a stuck camera, and no angle.
+    """
 
     def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
         self._camera, self._tracker, self._keep = camera, tracker, keep
+        self._before: Frame | None = None
         self.zero = 0.0
 
     def look(self) -> list[Sighting]:
@@ -41,6 +48,9 @@ class InlineEye:
         if frame is None:
             return []
         seen = self._tracker.see(frame)
+        if self._before is not None and np.array_equal(frame.image, self._before.image):
+            seen = seen._replace(theta=math.nan, verdict=Verdict.FROZEN)
+        self._before = frame
         if self._keep is not None:
             self._keep(frame, seen)
         return [seen._replace(theta=seen.theta - self.zero)]

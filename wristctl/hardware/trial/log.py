@@ -57,7 +57,6 @@ FRAMES: Columns = {
     "verdict": ("", "whether it can be used, and if not why"),
 }
 
-_PIECE = 50
 _RESERVED = 4 << 20
 
 
@@ -95,30 +94,35 @@ class Disk:
 
 
 class Stream:
-    """A CSV file that grows row by row; rows that the disk does not take are kept and tried again at the end."""
+    """A CSV file that grows row by row, so that no row is lost to a process that is killed.
+
+    Rows that the disk does not take are kept and tried again at the end.
+    """
 
     def __init__(self, path: Path, columns: Columns, disk: Disk) -> None:
         self.columns, self._disk = columns, disk
         self._file = path.open("wb", buffering=0)
         self._pending = bytearray(",".join(columns).encode() + b"\n")
-        self._rows = 0
 
     def row(self, values: Iterable[Any]) -> None:
         """Add a row, in the order of the columns. Raises OSError."""
-        self._pending += ",".join(map(_cell, values)).encode() + b"\n"
-        self._rows += 1
-        if self._rows % _PIECE == 0:
-            self.flush()
+        self.rows([values])
 
-    def flush(self) -> None:
-        """Hand over to the system what is pending. Raises OSError."""
+    def rows(self, many: Iterable[Iterable[Any]]) -> None:
+        """Add rows, in one piece. Raises OSError."""
+        for values in many:
+            self._pending += ",".join(map(_cell, values)).encode() + b"\n"
+        self._flush()
+
+    def _flush(self) -> None:
+        """Hand over to the system what is pending."""
         while self._pending:
             del self._pending[: self._disk.write(self._file.fileno(), bytes(self._pending))]
 
     def close(self) -> None:
         """Write the rest. Raises OSError."""
         try:
-            self.flush()
+            self._flush()
         finally:
             self._file.close()
 
@@ -148,13 +152,7 @@ class TrialLog:
 
     def truth(self, rows: Iterable[Iterable[Any]]) -> None:
         """What the bench knows of a trial."""
-        for row in rows:
-            self.streams["truth"].row(row)
-
-    def flush(self) -> None:
-        """Hand over to the system what is pending. Raises OSError."""
-        for each in self.streams.values():
-            each.flush()
+        self.streams["truth"].rows(rows)
 
     def close(self) -> None:
         """Write what is left, if need be into the space reserved for it. Raises OSError."""

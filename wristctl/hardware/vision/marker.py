@@ -31,6 +31,7 @@ class Verdict(StrEnum):
     BASE_MOVED = "base moved"
     SWAPPED = "swapped"
     JUMP = "jump"
+    FROZEN = "frozen"
 
 
 MEANING = {
@@ -42,6 +43,7 @@ MEANING = {
     Verdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
     Verdict.SWAPPED: "the markers have changed places",
     Verdict.JUMP: "the angle has changed faster than the motors can move the wrist",
+    Verdict.FROZEN: "the picture is the one before, byte for byte: the camera is stuck (in trials only)",
 }
 
 

@@ -1,0 +1,14 @@
+"""`wristctl ARGUMENTS`, its bench in real time leaving a record: python real_time_hw_run.py RECORD ARGUMENTS."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    from wristctl.cli.app import main
+    from wristctl.hardware.trial import stands
+
+    stands.connect = functools.partial(stands.connect, record=Path(sys.argv.pop(1)))
+    main()
