@@ -13,7 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.report.browser import CHROMIUM, DRIVER, Browser
 from wristctl.runs import list_runs, open_run
+
+KEPT = Path(__file__).parents[2] / "build" / "screenshots"
 
 HOMING = "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}"
 QUICK = (
@@ -37,6 +40,26 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     zero = json.loads(run.file("data/zero.json").read_text())
     assert zero["slack"] == pytest.approx([3e-4, 2e-4, 4e-4, 2.5e-4], abs=6e-5)
     assert {column["unit"] for column in _columns(run.path, "data/log.csv")} > {"rad", "N", "steps", "s"}
+    if CHROMIUM and DRIVER:
+        _look(run.path / "report.html")
+
+
+def _look(page: Path) -> None:
+    """A browser shows the page without an error or a request, and plays the wrist up to its 10 degrees."""
+    browser = Browser(page.parents[2] / "profile")
+    try:
+        for width in (390, 1280):
+            browser.open(page, width, False)
+            browser.run("const s = document.getElementById('instant'); s.value = s.max;"
+                        "s.dispatchEvent(new Event('input'))")
+            browser.screenshot(KEPT / f"hw-run-{width}.png")
+            assert browser.run("return document.documentElement.scrollWidth") <= width
+            shown = browser.run("return document.querySelector('#wrists > div').lastChild.textContent")
+            assert shown.endswith("wanted 10.0\N{DEGREE SIGN}")
+        assert browser.console() == [] and set(browser.requests()) == {page.as_uri()}
+        assert page.stat().st_size < 5e6
+    finally:
+        browser.close()
 
 
 def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_second(call) -> None:
