@@ -58,7 +58,12 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [((), "identify needs a hw-run run"), (("nothing",), "no such run"), (("--set", "fix.damping=1.0"), "needs a hw-run")],
+    [
+        ((), "identify needs a hw-run run"),
+        (("nothing",), "no such run"),
+        (("--set", "fix.damping=1.0"), "needs a hw-run"),
+        (("--set", "fix.dampin=1.0"), "did you mean 'damping'"),
+    ],
 )
 def test_without_logged_runs_there_is_nothing_to_identify(call: Call, arguments: tuple[str, ...], said: str) -> None:
     code, _, err = call("identify", *arguments)

@@ -81,3 +81,11 @@ def test_every_metric_states_unit_and_formula() -> None:
     found = metrics_of(PERIOD, TIME, TIME, STILL, 5.0, 0.0)
     assert set(found) == set(METRICS)
     assert all(metric.formula for metric in METRICS.values())
+
+
+def test_nothing_settles_or_overshoots_where_the_last_angle_is_where_it_began() -> None:
+    time = np.arange(5000) * 1e-3
+    swing = 0.1 * np.sin(time)
+    found = metrics_of(1e-3, swing, swing, np.full((5000, 2), 2.0), final=1e-17, rest=1.0)
+    assert all(math.isnan(found[name]) for name in ("settling", "settling_5", "overshoot", "rmse_settled"))
+    assert found["rmse"] == 0.0

@@ -55,6 +55,9 @@ SUMS = (
 GOALS = ("final", "move", "begin", "rest", "horizon")
 """What metrics need of the reference: final angle and last move [rad], when it begins and rests, horizon [s]."""
 
+_LEAST_MOVE = 1e-9
+"""Move [rad] below which there is nothing to settle on."""
+
 goals_of = rows_named(GOALS)
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
@@ -102,7 +105,7 @@ def summary(sums: Array, goals: Array, period: float) -> dict[str, Array]:
     after = np.round(ticks - of["exit_2"] / period) - 1.0
     step = goal["rest"] <= 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        rests = goal["rest"] < goal["horizon"]
+        rests = (goal["rest"] < goal["horizon"]) & (np.abs(goal["move"]) > _LEAST_MOVE)
         settled = rests & (of["exit_2"] < goal["horizon"] - 1.5 * period)
         result = {
             "rmse": np.sqrt(of["squared"] / ticks),
