@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
+from types import FrameType
 from typing import NoReturn
 
 import typer
@@ -67,7 +68,15 @@ def _wristctl(
 
 def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    asked: list[int] = []  # whoever builds a model or compiles while Ctrl-C comes may raise another error for it
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
     lost: list[type[BaseException]] = []  # a KeyboardInterrupt in a compiler's callback ends as another error
     sys.unraisablehook = lambda told: (
         lost.append(told.exc_type) if told.exc_type is KeyboardInterrupt else sys.__unraisablehook__(told)
@@ -82,7 +91,7 @@ def main() -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:
-        if lost:
+        if lost or asked:
             sys.exit(130)
         notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
         code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
