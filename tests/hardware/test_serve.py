@@ -13,7 +13,7 @@ from wristctl.hardware.emulator import Atmega2560
 from wristctl.hardware.emulator.chip import FREQUENCY
 from wristctl.hardware.emulator.serve import Line, PtyLine, TcpLine, serve
 from wristctl.hardware.errors import PortUnusable
-from wristctl.hardware.messages import BAUD, State
+from wristctl.hardware.messages import BAUD, Configure, State
 from wristctl.hardware.transport import SerialTransport
 
 
@@ -37,6 +37,7 @@ def test_a_board_answers_through_pyserial_and_starts_anew_for_the_next_client(li
         with Board(SerialTransport(line.address, BAUD)) as board:
             assert board.hello is not None
             nonces.append(board.hello.boot_nonce)
+            board.configure(Configure(watchdog=2.0))  # the machine may be busy
             board.enable()
             board.home()
             assert board.turn((1000.0, 0.0, 0.0, 0.0))[1].state == State.ENABLED
