@@ -6,6 +6,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
@@ -17,6 +20,8 @@ from wristctl.hardware.trial.homing import Patience
 from wristctl.hardware.vision.camera import DeviceCamera
 from wristctl.hardware.vision.marker import Tracker
 from wristctl.hardware.vision.view import View
+
+Array = NDArray[np.float64]
 
 _PULSE = 0.02
 
@@ -48,7 +53,7 @@ class Stand(Protocol):
     def begin(self, start: float, disturbances: Disturbances) -> None:
         """A trial's motion starts at `start` on the transport's clock."""
 
-    def truth(self, since: float) -> list[list[float]]:
+    def truth(self, since: float) -> Array:
         """Rows (time since then, segment angles, their sum, pulls) of an emulated wrist; none of a real one."""
 
     def close(self) -> None:
@@ -85,11 +90,10 @@ class EmulatedStand:
         """Disturbances and faults count from here."""
         self._bench.begin(start, disturbances)
 
-    def truth(self, since: float) -> list[list[float]]:
+    def truth(self, since: float) -> Array:
         """What the emulated wrist did since then."""
         truth = self._bench.truth(since)
-        rows = zip(truth.time - since, truth.theta, truth.theta.sum(axis=1), truth.pull, strict=True)
-        return [[float(time), *theta.tolist(), float(total), *pull.tolist()] for time, theta, total, pull in rows]
+        return np.column_stack([truth.time - since, truth.theta, truth.theta.sum(axis=1), truth.pull])
 
     def close(self) -> None:
         """End the eye and the bench."""
@@ -137,9 +141,9 @@ class RealStand:
     def begin(self, start: float, disturbances: Disturbances) -> None:
         """Nobody disturbs a real wrist but a person."""
 
-    def truth(self, since: float) -> list[list[float]]:
+    def truth(self, since: float) -> Array:
         """Nobody knows."""
-        return []
+        return np.empty((0, 0))
 
     def close(self) -> None:
         """Give back camera and port."""
