@@ -113,7 +113,7 @@ class LiveRun:
         return path
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Write figures/<name>.png and .svg and close the figure."""
+        """Write figures/<name>.png and .svg."""
         formats.write_figure(self.file(f"figures/{name}"), figure)
 
     def metric(
