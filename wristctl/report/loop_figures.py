@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wristctl.report.style import BLACK, GREY, ORANGE, PURPLE, figure, legend, legend_below, line, title
+from wristctl.report.style import BLACK, GREY, ORANGE, PURPLE, figure, legend, legend_below, line, logarithmic, title
 from wristctl.simulation.trajectory import Trajectory
 
 _SMALLEST = 1e-8
@@ -53,7 +53,7 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
         if not log and (seen := _apart(course.seen, course.theta)) is not None:
             axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **_OTHER)
     if log:
-        axes.set_yscale("log")
+        logarithmic(axes.yaxis)
     else:
         axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
         size = max(float(np.abs(course.theta_ref).max()) for course in trajectories)

@@ -21,6 +21,7 @@ from wristctl.report.style import (
     figure,
     legend_below,
     line,
+    logarithmic,
     title,
 )
 
@@ -91,7 +92,7 @@ def lateness(late: Array, period: float) -> Figure:
     """How many ticks began how late [ms]."""
     made, ((axes,),) = figure(height=2.6)
     axes.hist(1e3 * late, bins=np.linspace(0.0, 1e3 * max(period, float(late.max())), 60).tolist(), color=BLUE)
-    axes.set_yscale("log")
+    logarithmic(axes.yaxis)
     axes.set(xlabel="from due to begun [ms]", ylabel="ticks")
     return made
 
