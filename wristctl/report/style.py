@@ -37,6 +37,8 @@ _CONTROLLERS = {
     "feedforward": GREY,
 }
 _OTHERS = (OLIVE, FOREST, ROSE)
+WANTED: dict[str, Any] = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9, "label": "desired"}
+"""Line style of the desired angle: a band behind the lines."""
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
@@ -93,7 +95,7 @@ class PowersOfTen(LogFormatterSciNotation):
 
 def logarithmic(axis: Axis) -> None:
     """Give an axis a logarithmic scale in powers of ten."""
-    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
     axis.set_major_formatter(PowersOfTen())
     axis.set_minor_formatter(PowersOfTen())
 

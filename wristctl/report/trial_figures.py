@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from wristctl.report.style import (
     BLACK,
     BLUE,
-    GREY,
     LIGHT,
     ORANGE,
     PURPLE,
+    WANTED,
     figure,
     legend_below,
     line,
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 """In the paper's order."""
 
-_BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
 _SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
 _SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
 
@@ -60,10 +59,9 @@ def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure
     made, panels = _panels(courses)
     for course in courses:
         panel = panels[course.direction]
-        if course.simulated is not None and course.repetition == 0:
-            _simulated(panel, course, course.simulated[1])
+        _draw_simulated(panel, course, 1)
         panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
-        panel.plot(course.time, np.degrees(course.theta_desired), label="desired", **_BAND)
+        panel.plot(course.time, np.degrees(course.theta_desired), **WANTED)
     return _finished(made, panels, courses, heading, "bending angle [deg]")
 
 
@@ -72,8 +70,7 @@ def errors(courses: Sequence[Course], heading: str = "") -> Figure:
     made, panels = _panels(courses, sharey=True)
     for course in courses:
         panel = panels[course.direction]
-        if course.simulated is not None and course.repetition == 0:
-            _simulated(panel, course, course.simulated[2])
+        _draw_simulated(panel, course, 2)
         panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
         panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     return _finished(made, panels, courses, heading, "error [deg]")
@@ -97,11 +94,11 @@ def lateness(late: Array, period: float) -> Figure:
     return made
 
 
-def _simulated(panel: Axes, course: Course, angle: Array) -> None:
-    assert course.simulated is not None
-    colour = line(course.label)["color"]
-    label = f"{course.label}, simulated"
-    panel.plot(course.simulated[0], np.degrees(angle), color=colour, label=label, **_SIMULATED)
+def _draw_simulated(panel: Axes, course: Course, which: Literal[1, 2]) -> None:
+    """Angle (1) or error (2) in simulation, beside the first repetition alone."""
+    if course.simulated is not None and course.repetition == 0:
+        own: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
+        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | _SIMULATED)
 
 
 def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
