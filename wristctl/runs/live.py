@@ -66,9 +66,9 @@ class LiveRun:
         self._volatile: set[str] = set()
         self._summary: list[str] = []
         self._began = time.perf_counter(), time.process_time()
-        self._journal = Journal(path)
-        self.event, self.console = self._journal.event, self._journal.console
         self._write_manifest()
+        self._journal = Journal(path)  # last: it listens until the run ends, and a run that cannot begin never does
+        self.event, self.console = self._journal.event, self._journal.console
         self.event("start", kind=manifest.kind)
 
     def stream(self, name: str) -> tuple[int, int]:
