@@ -90,7 +90,7 @@ def lateness(late: Array, period: float) -> Figure:
     made, ((axes,),) = figure(height=2.6)
     axes.hist(1e3 * late, bins=np.linspace(0.0, 1e3 * max(period, float(late.max())), 60).tolist(), color=BLUE)
     logarithmic(axes.yaxis)
-    axes.set(xlabel="from due to begun [ms]", ylabel="ticks")
+    axes.set(xlabel="from due to begun [ms]", ylabel="ticks [1]")
     return made
 
 
@@ -121,6 +121,7 @@ def _finished(
             panel.axvspan(start, end, color=LIGHT, zorder=0.5, label="push")
     for panel in list(panels.values())[-2:]:
         panel.set_xlabel("time [s]")
+        panel.tick_params(labelbottom=True)  # of three panels the second has an empty place below it
     made.suptitle(heading, fontsize=10.0)
     made.supylabel(ylabel, fontsize=10.0)
     legend_below(made)
