@@ -23,7 +23,6 @@ from wristctl.hardware.bench.bench import Bench
 from wristctl.hardware.board import Board
 from wristctl.hardware.trial import homing, stands
 from wristctl.hardware.trial.calibration import FILE, Calibration
-from wristctl.hardware.trial.experiment import Experiment
 from wristctl.hardware.trial.homing import Zero
 from wristctl.hardware.trial.log import TrialLog
 from wristctl.report import trial_figures
@@ -170,7 +169,7 @@ def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have Ctrl-C come as this begins."""
     place, name = {
         "homing": (homing._Finder, "_go"),
-        "between trials": (Experiment, "_trial_ended"),
+        "between trials": (TrialLog, "truth"),
         "drawing": (trial_figures, "errors"),
     }[moment]
     original = getattr(place, name)
