@@ -25,6 +25,7 @@ from wristctl.hardware.trial.trials import Trial, trials_of
 from wristctl.hardware.vision.annotate import AnnotatedVideo
 from wristctl.hardware.vision.view import FILE, View
 from wristctl.simulation.metrics import METRICS
+from wristctl.wrist.directions import ACTIVE
 
 log = logging.getLogger(__name__)
 
@@ -153,14 +154,14 @@ def last_second(trial_log: TrialLog) -> Table:
     """The last second of ticks, every tenth of it."""
     rows = list(trial_log.last)
     shown = rows[:: -max(1, len(rows) // 10)][::-1]
-    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in (1, 2, 4, 5)), "state")
+    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in ACTIVE), "state")
     cells = [
         (
             round(row["time"], 3),
             round(float(np.degrees(row["theta"])), 2),
             round(float(np.degrees(row["theta_ref"])), 2),
             str(row["verdict"]) or "-",
-            *(round(row[f"tension_{k}"], 2) for k in (1, 2, 4, 5)),
+            *(round(row[f"tension_{k}"], 2) for k in ACTIVE),
             row["state"],
         )
         for row in shown

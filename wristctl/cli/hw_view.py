@@ -14,8 +14,8 @@ from rich.table import Table as Grid
 
 from wristctl.cli.command import Session
 from wristctl.hardware.trial.loop import Shown
-from wristctl.hardware.trial.spools import TENDONS
 from wristctl.hardware.trial.trials import Trial
+from wristctl.wrist.directions import ACTIVE
 
 _PICTURES = 8.0
 """Panels a second."""
@@ -40,7 +40,7 @@ class _Panel:
         angle, wanted = math.degrees(row["theta"]), math.degrees(row["theta_ref"])
         grid.add_row("angle", f"{angle:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", f"{row['load']:+.3f} N m")
         for name, unit in (("tension", "N"), ("sent", "steps/s")):
-            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in TENDONS)
+            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in ACTIVE)
             grid.add_row(name, *values, unit)
         grid.add_row("board", row["state"], "marker", str(row["verdict"]) or "-", "late", f"{1e3 * row['late']:.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.trial.spools import TENDONS
+from wristctl.wrist.directions import ACTIVE
 
 Columns = Mapping[str, tuple[str, str]]
 """Name -> unit and meaning."""
 
 
 def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
-    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in TENDONS}
+    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in ACTIVE}
 
 
 LOG: Columns = {
@@ -180,7 +180,7 @@ def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
     return {
         f"{name}_{tendon}": value
         for name, four in values.items()
-        for tendon, value in zip(TENDONS, four.tolist(), strict=True)
+        for tendon, value in zip(ACTIVE, four.tolist(), strict=True)
     }
 
 
