@@ -139,9 +139,8 @@ class Experiment:
             self.zero = self._home(board, eye, plane)
             marker = self.zero.marker
         eye.zero = marker
-        toward = "ulnar" if plane == "ulnar" else "flexion"
         loop = ControlLoop(
-            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, self.timing, self._log, shown,
+            board, eye, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log, shown,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
