@@ -23,7 +23,7 @@ from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.stands import open_stand
 from wristctl.hardware.trial.trials import Trial, trials_of
 from wristctl.hardware.vision.annotate import AnnotatedVideo
-from wristctl.hardware.vision.view import FILE, View
+from wristctl.hardware.vision.view import View
 from wristctl.simulation.metrics import METRICS
 from wristctl.wrist.directions import ACTIVE
 
@@ -63,8 +63,8 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            ask, keep = operator(session), film.add if film else None
-            stand = open_stand(settings, bench, study.seed, view_of(session), ask, keep)
+            view, keep = View.of(session.inputs.get("optics")), film.add if film else None
+            stand = open_stand(settings, bench, study.seed, view, operator(session), keep)
         with trials_shown(session, trials) as shown:
             experiment.run(stand, shown)
     except BaseException as error:
@@ -82,12 +82,6 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     if stopped is not None:
         raise stopped
     return table
-
-
-def view_of(session: Session) -> View:
-    """How the camera sees the plane: by its calibration run, else square."""
-    run = session.inputs.get("optics")
-    return View.load(run.file(FILE)) if run else View()
 
 
 def _judged(session: Session, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
