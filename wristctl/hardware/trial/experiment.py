@@ -25,7 +25,7 @@ from wristctl.hardware.trial.spools import Paths, spools_of
 from wristctl.hardware.trial.stands import Stand
 from wristctl.hardware.trial.steering import Steering
 from wristctl.hardware.trial.trials import Trial
-from wristctl.runs.interrupt import undisturbed
+from wristctl.interrupt import undisturbed
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
