@@ -18,7 +18,8 @@ from typing import Any, get_origin
 import typer
 from rich.console import Console
 
-from wristctl.cli.options import Options, signature
+from wristctl.cli.completion import controllers, run_ids
+from wristctl.cli.options import Options, Own, signature
 from wristctl.cli.progress import PLAIN, Done, listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
@@ -115,8 +116,12 @@ def study_command(
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    own = [(leaf, keys[leaf].description or "", kinds.get(leaf, str)) for leaf in (*first, *named, *shortcuts)]
-    own += [(name, text, bool) for name, text in flags.items()]
+    completed = {"controller": controllers} | {each.leaf: run_ids for each in inputs}
+    own = [
+        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf))
+        for leaf in (*first, *named, *shortcuts)
+    ]
+    own += [Own(name, text, bool) for name, text in flags.items()]
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
