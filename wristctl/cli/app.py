@@ -42,7 +42,7 @@ wristctl gen-data experiments/quick.yaml
 
 wristctl train experiments/quick.yaml --data latest:gen-data
 
-wristctl tune experiments/quick.yaml --set controllers=\[smc,pid]
+wristctl tune experiments/quick.yaml --set 'controllers=\[smc,pid]'
 
 wristctl compare experiments/quick.yaml --network latest:train --tuned latest:tune
 

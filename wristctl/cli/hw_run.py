@@ -43,7 +43,7 @@ app = study_command(
     flags={"yes": "Ask nobody before the motors of real hardware move."},
     examples=(
         "wristctl hw-run",
-        "wristctl hw-run --set directions=\\[ulnar] --set push.force=0",
+        "wristctl hw-run --set 'directions=\\[ulnar]' --set push.force=0",
         "wristctl hw-run --dry-run --port /dev/ttyACM0",
         "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
     ),
