@@ -96,6 +96,7 @@ def test_a_dry_run_opens_neither_port_nor_camera(call, tmp_path: Path, silent_po
 def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
     code, _, err = call("hw-run", "--port", "/nowhere/ttyACM0", "--yes")
     assert code == 4 and "there is no such port" in err and "wristctl hw ports" in err
+    assert "ticks" not in err and "nan" not in err
 
 
 def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
@@ -136,6 +137,12 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
 def test_what_the_user_got_wrong_is_one_line_before_anything_moves(call, arguments: tuple[str, ...], said: str) -> None:
     code, _, err = call("hw-run", *arguments)
     assert code == 2 and said in err and "Traceback" not in err
+
+
+def test_a_controller_that_is_none_is_told_by_its_row_before_there_is_a_run(call) -> None:
+    rows = "rows=[{controller: smc-tracking, gains: stepper}, {controller: smcc}]"
+    code, _, err = call("hw-run", "--set", rows)
+    assert code == 2 and f"--set {rows}: hw-run.rows.1.controller" in err and not Path("results").exists()
 
 
 def _columns(run: Path, name: str) -> list[dict[str, str]]:

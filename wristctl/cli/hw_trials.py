@@ -123,7 +123,7 @@ def _say_how_it_went(session: Session, experiment: Experiment, trial_log: TrialL
     run.metric("overruns", timing.overruns, better="lower", meaning="ticks skipped because one before took too long")
     for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
         run.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning="from due to begun, of a tick")
-    if settings.real_time or settings.port is not None:
+    if timing.late and (settings.real_time or settings.port is not None):
         late, median, most = (f"{1e3 * timing.jitter(share):.2f} ms" for share in (0.99, 0.5, 1.0))
         told = (
             f"{len(timing.late)} ticks of {1e3 * timing.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
