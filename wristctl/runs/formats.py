@@ -53,6 +53,9 @@ def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
     from matplotlib import pyplot as plt
 
     nothing: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
+        figure.set_layout_engine(None)  # else each file lays it out again, and draws it once in vain
     # in one piece, a line that chatters takes seconds to draw
     with mpl.rc_context({"svg.hashsalt": stem.name, "agg.path.chunksize": 500}):
         for suffix, metadata in nothing.items():
