@@ -11,6 +11,8 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from tests.report.browser import CHROMIUM, DRIVER, Browser
@@ -27,7 +29,7 @@ QUICK = (
 
 
 def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call) -> None:
-    code, out, err = call(*QUICK)
+    code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
     assert code == 0 and err.splitlines()[0].startswith("all emulated, in virtual time")
     assert "paper: pushed, flexion" in out and "0.157" in out and run.problems() == []
@@ -40,8 +42,23 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     zero = json.loads(run.file("data/zero.json").read_text())
     assert zero["slack"] == pytest.approx([3e-4, 2e-4, 4e-4, 2.5e-4], abs=6e-5)
     assert {column["unit"] for column in _columns(run.path, "data/log.csv")} > {"rad", "N", "steps", "s"}
+    _watch(run.file("data/video.avi"), len(run.data("frames")))
     if CHROMIUM and DRIVER:
         _look(run.path / "report.html")
+
+
+def _watch(video: Path, in_trial: int) -> None:
+    """Every frame is annotated; in the trial the tip's marker, outlined in green, goes aside and back."""
+    film = cv2.VideoCapture(str(video))
+    assert film.get(cv2.CAP_PROP_FPS) == 60.0
+    aside = []
+    while (read := film.read())[0]:
+        blue, green, red = np.moveaxis(read[1].astype(int), -1, 0)
+        assert read[1][:20, :60].mean() > 150  # clock and angle on white
+        aside.append(np.nonzero((green > red + 60) & (green > blue))[1].mean())
+    assert len(aside) > in_trial > 25
+    trial, home = aside[-in_trial - 20 :], np.median(aside[:20])
+    assert max(trial) - home > 15.0 and abs(aside[-1] - home) < 3.0
 
 
 def _look(page: Path) -> None:
