@@ -16,11 +16,10 @@ from types import MappingProxyType
 from typing import Any, get_origin
 
 import typer
-from rich.console import Console
 
 from wristctl.cli.completion import controllers, run_ids
 from wristctl.cli.options import Options, Own, signature
-from wristctl.cli.progress import PLAIN, Done, listening, progress
+from wristctl.cli.progress import PLAIN, Done, Terminal, listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
 from wristctl.config.explain import located
@@ -57,7 +56,7 @@ class Session:
     settings: Any
     inputs: dict[str, Run]
     run: LiveRun
-    console: Console
+    console: Terminal
     quiet: bool
     flags: frozenset[str] = frozenset()
     """Of the command's flags those that were given."""
