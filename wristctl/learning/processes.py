@@ -47,11 +47,6 @@ def train_all(
     return trials
 
 
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _over_processes(
     samples: Samples, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
 ) -> list[Trial]:
