@@ -17,10 +17,10 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
+from wristctl.interrupt import interrupts, undisturbed
 from wristctl.runs.code import code_state
 from wristctl.runs.environment import environment_state
 from wristctl.runs.files import replacing, sha256_of, write_text
-from wristctl.runs.interrupt import interrupts, undisturbed
 from wristctl.runs.journal import now
 from wristctl.runs.live import LiveRun, Page
 from wristctl.runs.lock import RunLock
