@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
-BLACK, GREY, LIGHT = "#000000", "#7F7F7F", "#D9D9D9"
+BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 """Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
@@ -37,8 +37,8 @@ _CONTROLLERS = {
     "feedforward": GREY,
 }
 _OTHERS = (OLIVE, FOREST, ROSE)
-WANTED: dict[str, Any] = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9, "label": "desired"}
-"""Line style of the desired angle: a band behind the lines."""
+WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
+"""Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own."""
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
@@ -89,7 +89,7 @@ class PowersOfTen(LogFormatterSciNotation):
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula: str = super().__call__(x, pos)
         plain = formula.replace(r"$\mathdefault{", "").replace(r"\times", "\u00d7").replace("}$", "").rstrip("}")
-        base, _, power = plain.partition("^{")
+        base, _, power = plain.removesuffix("\u00d710^{0").partition("^{")
         return base + power.translate(_RAISED)
 
 
