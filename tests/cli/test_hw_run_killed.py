@@ -39,12 +39,12 @@ Start = Callable[..., subprocess.Popen[str]]
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
-    """Starts hw-run in a process, and a process group, of its own; its bench leaves `record`."""
+    """Starts hw-run in a process, and a process group, of its own; in real time its bench leaves `record`."""
     started = []
 
     def begin(*options: str) -> subprocess.Popen[str]:
-        script = Path(__file__).with_name("real_time_hw_run.py")
-        argv = [sys.executable, script, tmp_path / "record", *TRIAL, *options]
+        recording = [Path(__file__).with_name("real_time_hw_run.py"), tmp_path / "record"]
+        argv = [sys.executable, *(recording if "--real-time" in options else ["-m", "wristctl"]), *TRIAL, *options]
         child = subprocess.Popen(
             argv, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE,
             stdout=subprocess.PIPE, text=True, start_new_session=True,
