@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.identification.fit import Fit
+from wristctl.identification.fit import Fit, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 Array = NDArray[np.float64]
@@ -66,7 +66,23 @@ def knowledge(fit: Fit) -> Knowledge:
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
     alike = 1.0 + 2.0 * sum((1.0 - lag / (lags + 1.0)) * rho**lag for lag in range(1, lags + 1))
     deviation = np.sqrt(np.maximum(np.diag(bread), np.diag(bread @ meat @ bread)))
+    deviation = _with_clocks(fit.problem, deviation)
     return Knowledge(deviation, information, condition(stacked), rho, count / max(alike, 1e-3))
+
+
+def promised(problem: Problem, slopes: Sequence[Array]) -> Array:
+    """Half the 95 % interval of each coordinate that frames with these slopes, in standard deviations, would leave."""
+    bread = inverse(information_of(slopes, problem.prior()))
+    return NORMAL_95 * _with_clocks(problem, np.sqrt(np.diag(bread)))
+
+
+def _with_clocks(problem: Problem, deviation: Array) -> Array:
+    """An error of the clocks is a delay, and nothing in the trials tells the two apart."""
+    wider = deviation.copy()
+    if "delay" in problem.free:
+        at = problem.coordinates["delay"]
+        wider[at] = np.hypot(wider[at], problem.settings.clock_error)
+    return wider
 
 
 def information_of(slopes: Sequence[Array], weights: Array) -> Array:
