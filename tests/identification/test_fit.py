@@ -13,7 +13,15 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
 from wristctl.identification.fit import Fit, fit, linearise
 from wristctl.identification.forward import Candidate, angles
-from wristctl.identification.intervals import autocorrelation, bandwidth, condition, interval, knowledge, long_run
+from wristctl.identification.intervals import (
+    autocorrelation,
+    bandwidth,
+    condition,
+    inflation,
+    interval,
+    knowledge,
+    long_run,
+)
 from wristctl.identification.rehearsal import spools
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -119,6 +127,20 @@ def test_residuals_that_are_alike_widen_what_they_tell_of_a_mean() -> None:
         lags = bandwidth(autocorrelation([noise]), len(noise))
         ratios.append(float(long_run(noise[:, None], lags)[0, 0] / (noise @ noise)))
     assert np.mean(ratios) == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.15)
+
+
+def test_a_small_error_that_lasts_is_seen_behind_the_noise_of_single_frames() -> None:
+    """Its share of the variance is counted as often as it stays: here 5 %, dying away by 1/e in 20 frames."""
+    rng, stays, share = np.random.default_rng(0), np.exp(-1.0 / 20.0), 0.05
+    found = []
+    for _ in range(300):
+        lasting = np.sqrt(share * (1.0 - stays**2)) * rng.standard_normal(1000)
+        lasting[0] /= np.sqrt(1.0 - stays**2)
+        for at in range(1, len(lasting)):
+            lasting[at] += stays * lasting[at - 1]
+        found.append(inflation([lasting + np.sqrt(1.0 - share) * rng.standard_normal(1000)], 30))
+    lags = np.arange(1, 31)
+    assert np.mean(found) == pytest.approx(1.0 + 2.0 * share * ((1.0 - lags / 31.0) * stays**lags).sum(), rel=0.05)
 
 
 def test_a_picture_shows_the_mean_of_its_exposure() -> None:
