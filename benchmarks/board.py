@@ -12,7 +12,7 @@ from wristctl.hardware.emulator import Atmega2560
 from wristctl.hardware.emulator.chip import FREQUENCY
 from wristctl.hardware.emulator.virtual import VirtualTransport
 from wristctl.hardware.messages import BAUD, Command
-from wristctl.hardware.transport import SerialTransport
+from wristctl.hardware.transport import SerialTransport, Transport
 
 COUNT, PERIOD, CYCLES = 1000, 0.005, 2000
 
@@ -49,17 +49,11 @@ def speed(rates: tuple[float, float, float, float]) -> float:
     return (wire.chip.cycles - cycles) / FREQUENCY / (time.process_time() - began)
 
 
-def main() -> None:
-    began = time.perf_counter()
-    Atmega2560()
-    print(f"first chip ready after {time.perf_counter() - began:.1f} s")
-    command = [sys.executable, "-c", "from wristctl.cli.app import main; main()", "hw", "emulate", "-q"]
-    serving = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert serving.stdout is not None
-    port = serving.stdout.readline().strip()
+def answers(*wires: tuple[str, Transport]) -> None:
+    """Print round trips and the command-status loop over each wire."""
     print(f"\nround trips at {BAUD} baud, {COUNT} each")
     print(f"{'':24} {'command':8} {'median ms':>10} {'p99 ms':>10} {'worst ms':>10}")
-    for where, wire in (("virtual time", VirtualTransport()), ("pty, real time", SerialTransport(port, BAUD))):
+    for where, wire in wires:
         with Board(wire) as board:
             for command in (Command.PING, Command.STATUS):
                 show(where, round_trips(board, command, COUNT))
@@ -67,8 +61,20 @@ def main() -> None:
             board.home()
             missed, longest = loop(board)
             print(f"{where:24} 200 Hz command-status loop: {missed} of {CYCLES} missed, longest {1e3 * longest:.2f} ms")
-    serving.terminate()
-    serving.wait()
+
+
+def main() -> None:
+    began = time.perf_counter()
+    Atmega2560()
+    print(f"first chip ready after {time.perf_counter() - began:.1f} s")
+    command = [sys.executable, "-c", "from wristctl.cli.app import main; main()", "hw", "emulate", "-q"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as serving:
+        try:
+            assert serving.stdout is not None
+            port = serving.stdout.readline().strip()
+            answers(("virtual time", VirtualTransport()), ("pty, real time", SerialTransport(port, BAUD)))
+        finally:
+            serving.terminate()
     print("\nvirtual seconds a processor second")
     for what, rates in (
         ("drives on, at rest", (0.0, 0.0, 0.0, 0.0)),

@@ -14,7 +14,7 @@ import wristctl
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "cli", "report", "benchmark", "tuning", "learning", "identification", "hardware", "simulation", "control", "wrist",
-    "lanes", "runs", "config",
+    "lanes", "runs", "config", "interrupt",
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from claims import Claim, beside_peers, of_cold_start, of_costs
 from picture import figure
-from rates import Result, Variant
+from rates import Result
 from report import claims_table, markdown
 from table import OURS
 
@@ -78,7 +78,7 @@ def roofline(result: Result) -> str:
     cost = peak["multiply_add"] / peak["divide"]
     notes = []
     for n in result.axis("segments"):
-        counts, fastest = raw["operations"][str(n)], result.rate(Variant(OURS, OURS, 1, 0.0, True), n, 1, 1024)
+        counts, fastest = raw["operations"][str(n)], result.own_rate(n, 1, 1024)
         if fastest:
             dividing = counts["/"] / peak["divide"] * fastest / raw["task"]["period"]
             notes.append(f"{100.0 * dividing:.0f} % of the time at n = {n}")

@@ -12,8 +12,8 @@ from running import Failed, Running
 from say import say
 from table import Side
 
-FEWEST_TICKS, LONGEST = 20, 1.5
-"""A run has no fewer ticks, so that what it costs beside them does not count, unless it took longer than this [s]."""
+LONGEST = 1.5
+"""A run is the whole horizon, as users run it, or as much of it as a side does in this time [s]."""
 
 
 def speeds(
@@ -55,14 +55,12 @@ def speeds(
 
 
 def _plan(running: Running, lanes: int, budget: float) -> tuple[float, int, int]:
-    """Seconds to prepare, and the ticks and repeats of a run that fills the budget [s]."""
+    """Seconds to prepare, and the ticks and repeats of a run, together the budget [s] at least."""
     whole = round(truth.HORIZON / truth.PERIOD)
     first = running.ask(lanes, 2)
     prepare = first["prepare"]
-    each = min(first["seconds"], running.ask(lanes, 2)["seconds"]) / 2
-    fewest = max(2, min(FEWEST_TICKS, int(LONGEST / each)))
-    ticks = int(np.clip(budget / each, fewest, whole))
-    if each * ticks < 2.0 * LONGEST:  # a longer run says more about its ticks
-        each = running.ask(lanes, ticks)["seconds"] / ticks
-        ticks = int(np.clip(budget / each, fewest, whole))
-    return prepare, ticks, max(1, round(budget / (each * ticks)))
+    ticks, seconds = 2, min(first["seconds"], running.ask(lanes, 2)["seconds"])
+    while ticks < whole and seconds < LONGEST / 2.0:  # what a run costs beside its ticks shows in a short one
+        ticks = int(np.clip(ticks * LONGEST / seconds, ticks, min(whole, 10 * ticks)))
+        seconds = running.ask(lanes, ticks)["seconds"]
+    return prepare, ticks, max(1, round(budget / seconds))

@@ -53,9 +53,13 @@ class Result:
         rows = [row for row in rows if row["lanes"] <= lanes]
         return max(rows, key=lambda row: row["lanes"])["rate"] if rows else None
 
+    def own_rate(self, segments: int, threads: int, lanes: int) -> float | None:
+        """wristctl's rate, with one step a tick."""
+        return self.rate(Variant(OURS, OURS, 1, 0.0, True), segments, threads, lanes)
+
     def ratio(self, peer: str, segments: int, threads: int, lanes: int, equal: bool = True) -> tuple[float, str] | None:
         """wristctl's rate over the fastest of a peer's variants at equal error (else of all), and which that is."""
-        ours = self.rate(Variant(OURS, OURS, 1, 0.0, True), segments, threads, lanes)
+        ours = self.own_rate(segments, threads, lanes)
         rates = {
             variant.name: rate
             for variant in self.variants(segments)

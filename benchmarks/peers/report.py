@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from claims import Claim
-from rates import Result, Variant
-from table import OURS
+from rates import Result
 
 
 def number(value: float | None) -> str:
@@ -17,7 +16,6 @@ def number(value: float | None) -> str:
 def markdown(result: Result) -> str:
     """A table for each number of segments and of threads: steps, error, rates and wristctl's ratio to each side."""
     parts = []
-    ours = Variant(OURS, OURS, 1, 0.0, True)
     for n in result.axis("segments"):
         for threads in result.axis("threads"):
             lanes = [count for count in result.axis("lanes") if count > 1 or threads == 1]
@@ -27,7 +25,7 @@ def markdown(result: Result) -> str:
             parts.append("| " + " | ".join(columns) + " |\n|" + "---|" * len(columns))
             for variant in result.variants(n):
                 rates = [result.rate(variant, n, threads, count) for count in lanes]
-                best = [result.rate(ours, n, threads, count) for count in lanes]
+                best = [result.own_rate(n, threads, count) for count in lanes]
                 ratios = [number(a / b) if a and b else "-" for a, b in zip(best, rates, strict=True)]
                 error = f"{variant.error:.1e}" + ("" if variant.equal else " (larger)")
                 cells = [variant.side, str(variant.steps), error, *map(number, rates), " / ".join(ratios)]

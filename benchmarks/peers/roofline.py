@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from compile_c import compiled
 from equations import Segment, pulls
 from rodas3 import step
-from venvs import CACHE, HERE
+from venvs import CACHE
 
 METRICS = {"+": 15, "*": 7}
 """Additions and products of the C loop's gather(), which the equations for arrays leave out."""
@@ -97,10 +97,7 @@ def scratch(segments: int) -> int:
 
 def peaks(threads: int) -> dict[str, float]:
     """Operations per second of that many threads: fused multiply-adds count two, divisions one."""
-    built, source = CACHE / "peak.so", HERE / "c" / "peak.cpp"
-    flags = ("-O3", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC")
-    subprocess.run(["g++", *flags, str(source), "-o", str(built)], check=True)
-    library = ctypes.CDLL(str(built))
+    library = compiled("peak.cpp", CACHE)
     found = {}
     for name, each, rounds in (("multiply_add", 2, 4_000_000), ("divide", 1, 400_000)):
         run = getattr(library, name)

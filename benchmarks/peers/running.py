@@ -34,7 +34,7 @@ class Running:
             **{name: str(threads) for name in names},
             "PYTHONPATH": str(ROOT) if side.venv is None else "",
             "PEERS_CACHE": str(CACHE),
-            "C_LANES": str(side.width or 8),
+            **({} if side.width is None else {"C_LANES": str(side.width)}),
             "JAX_PLATFORMS": "cpu",
             "JAX_COMPILATION_CACHE_DIR": str(CACHE / f"xla-{threads}"),  # what is compiled depends on the cores seen
             "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",

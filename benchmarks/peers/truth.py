@@ -13,6 +13,7 @@ from task import Task
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import motion
+from wristctl.wrist.allocation import TENDONS_PER_SIDE
 from wristctl.wrist.model import linearised, terms
 from wristctl.wrist.segments import segments
 
@@ -28,7 +29,7 @@ def make_task(n: int) -> Task:
     wrist = WristParameters()
     course = motion(Reference(duration=MOVE), wrist, HORIZON, PERIOD)
     reference = np.stack([course.theta_ref, course.rate_ref, course.acceleration_ref], axis=1)
-    limits = 2.0 * wrist.pretension, 2.0 * wrist.tension_limit
+    limits = TENDONS_PER_SIDE * wrist.pretension, TENDONS_PER_SIDE * wrist.tension_limit
     return Task(n, PERIOD, *limits, segments(wrist, n), segments(wrist, 1), np.array(GAINS), reference, MOVE)
 
 
@@ -40,7 +41,9 @@ def implicit(task: Task, cache: Path) -> np.ndarray:
     file = cache / f"implicit-{key}.npy"
     if not file.exists():
         cache.mkdir(parents=True, exist_ok=True)
-        np.save(file, _solve(task))
+        part = file.with_suffix(".part.npy")
+        np.save(part, _solve(task))
+        part.replace(file)
     return np.asarray(np.load(file))
 
 

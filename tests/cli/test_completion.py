@@ -55,7 +55,8 @@ def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
     (run,) = [path.name for path in (folder / "results").iterdir() if path.is_dir()]
     assert _completed(folder, "runs show ") == [run, "latest:gen-data"]
     assert _completed(folder, f"runs diff x {run[:5]}") == [run]
-    assert _completed(folder, "train --data lat") == ["latest:gen-data"]
+    for typed in ("train --data", "audit --table1", "hw-run --optics", "identify"):
+        assert _completed(folder, f"{typed} lat") == ["latest:gen-data"]
 
 
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
-from wristctl.cli.app import COMMANDS
+import pytest
+from typer.main import get_command
+
+from wristctl.cli.app import COMMANDS, app, main
+from wristctl.cli.hw_calibrate import COMMANDS as CALIBRATIONS
+from wristctl.config.strict_yaml import parse_yaml
 
 ROOT = Path(__file__).parents[2]
 HEAVY = ("torch", "scipy", "pandas", "matplotlib", "cv2", "numba", "numpy", "llvmlite")
@@ -48,4 +56,33 @@ def test_wristctl_alone_shows_help_with_examples() -> None:
     for name in COMMANDS:
         assert f" {name} " in done.stdout
     assert "wristctl gen-data experiments/quick.yaml" in done.stdout
-    assert "--set controllers=[smc,pid]" in done.stdout
+    assert "--set 'controllers=[smc,pid]'" in done.stdout
+
+
+TAKEN_FOR_GRANTED = (
+    r"no such run - \w*RUN in ",
+    r"no such video - ",
+    r"no [a-z-]+ run that ended ok - latest:[a-z-]+ in ",
+)
+
+
+def test_every_example_runs_as_written_but_for_what_it_takes_for_granted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Earlier runs and recordings; and a study file that it names says something of its command."""
+    monkeypatch.chdir(ROOT)
+    modules = {entry[0] for entry in (*COMMANDS.values(), *CALIBRATIONS.values())}
+    pages = [get_command(importlib.import_module(module).app).epilog for module in modules]
+    examples = [line for page in (*pages, app.info.epilog) for line in (page or "").split("\n") if "wristctl " in line]
+    assert len(examples) > 30
+    for example in examples:
+        _, *typed = shlex.split(example.replace("\\[", "["))
+        if typed[0] == "runs":
+            continue
+        monkeypatch.setattr(sys, "argv", ["wristctl", *typed, "--dry-run", "--out", str(tmp_path)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr().err
+        assert ended.value.code == 0 or any(re.search(other, said) for other in TAKEN_FOR_GRANTED), f"{example}: {said}"
+        for file in (word for word in typed if word.endswith(".yaml")):
+            assert typed[0] in parse_yaml(Path(file).read_bytes(), file).data, example

@@ -11,6 +11,8 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from tests.report.browser import CHROMIUM, DRIVER, Browser
@@ -27,7 +29,7 @@ QUICK = (
 
 
 def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call) -> None:
-    code, out, err = call(*QUICK)
+    code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
     assert code == 0 and err.splitlines()[0].startswith("all emulated, in virtual time")
     assert "paper: pushed, flexion" in out and "0.157" in out and run.problems() == []
@@ -40,8 +42,23 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     zero = json.loads(run.file("data/zero.json").read_text())
     assert zero["slack"] == pytest.approx([3e-4, 2e-4, 4e-4, 2.5e-4], abs=6e-5)
     assert {column["unit"] for column in _columns(run.path, "data/log.csv")} > {"rad", "N", "steps", "s"}
+    _watch(run.file("data/video.avi"), len(run.data("frames")))
     if CHROMIUM and DRIVER:
         _look(run.path / "report.html")
+
+
+def _watch(video: Path, in_trial: int) -> None:
+    """Every frame is annotated; in the trial the tip's marker, outlined in green, goes aside and back."""
+    film = cv2.VideoCapture(str(video))
+    assert film.get(cv2.CAP_PROP_FPS) == 60.0
+    aside = []
+    while (read := film.read())[0]:
+        blue, green, red = np.moveaxis(read[1].astype(int), -1, 0)
+        assert read[1][:20, :60].mean() > 150  # clock and angle on white
+        aside.append(np.nonzero((green > red + 60) & (green > blue))[1].mean())
+    assert len(aside) > in_trial > 25
+    trial, home = aside[-in_trial - 20 :], np.median(aside[:20])
+    assert max(trial) - home > 15.0 and abs(aside[-1] - home) < 3.0
 
 
 def _look(page: Path) -> None:
@@ -96,6 +113,7 @@ def test_a_dry_run_opens_neither_port_nor_camera(call, tmp_path: Path, silent_po
 def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
     code, _, err = call("hw-run", "--port", "/nowhere/ttyACM0", "--yes")
     assert code == 4 and "there is no such port" in err and "wristctl hw ports" in err
+    assert "ticks" not in err and "nan" not in err
 
 
 def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
@@ -136,6 +154,12 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
 def test_what_the_user_got_wrong_is_one_line_before_anything_moves(call, arguments: tuple[str, ...], said: str) -> None:
     code, _, err = call("hw-run", *arguments)
     assert code == 2 and said in err and "Traceback" not in err
+
+
+def test_a_controller_that_is_none_is_told_by_its_row_before_there_is_a_run(call) -> None:
+    rows = "rows=[{controller: smc-tracking, gains: stepper}, {controller: smcc}]"
+    code, _, err = call("hw-run", "--set", rows)
+    assert code == 2 and f"--set {rows}: hw-run.rows.1.controller" in err and not Path("results").exists()
 
 
 def _columns(run: Path, name: str) -> list[dict[str, str]]:

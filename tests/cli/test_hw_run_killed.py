@@ -47,7 +47,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
         argv = [sys.executable, script, tmp_path / "record", *TRIAL, *options]
         child = subprocess.Popen(
             argv, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE,
-            stdout=subprocess.DEVNULL, text=True, start_new_session=True,
+            stdout=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip
         started.append(child)
         return child
@@ -55,9 +55,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
     yield begin
     for child in started:
         child.kill()
-        child.wait()
-        assert child.stderr is not None
-        child.stderr.close()
+        child.communicate()
 
 
 def wait_for_motion(child: subprocess.Popen[str], folder: Path) -> None:

@@ -7,8 +7,7 @@ import json
 import os
 import re
 import signal
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,6 @@ from wristctl.hardware.bench.bench import Bench
 from wristctl.hardware.board import Board
 from wristctl.hardware.trial import homing, stands
 from wristctl.hardware.trial.calibration import FILE, Calibration
-from wristctl.hardware.trial.experiment import Experiment
 from wristctl.hardware.trial.homing import Zero
 from wristctl.hardware.trial.log import TrialLog
 from wristctl.report import trial_figures
@@ -170,7 +168,7 @@ def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have Ctrl-C come as this begins."""
     place, name = {
         "homing": (homing._Finder, "_go"),
-        "between trials": (Experiment, "_trial_ended"),
+        "between trials": (TrialLog, "truth"),
         "drawing": (trial_figures, "errors"),
     }[moment]
     original = getattr(place, name)
@@ -193,33 +191,21 @@ def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: p
         assert ended.stop["motors_stand"] and ended.stop["reason"] == STATED["Ctrl-C"].says
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 12 MB."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", str(disk)], capture_output=True)
-    if mounted.returncode != 0:
-        pytest.skip("mounting a tmpfs needs root")
-    yield disk
-    subprocess.run(["umount", str(disk)], check=True)
-
-
 def test_on_a_disk_that_is_really_full_the_motors_stop_and_the_run_is_sealed(
-    hw_run: HwRun, small_disk: Path, monkeypatch: pytest.MonkeyPatch
+    hw_run: HwRun, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another program fills it to the last byte in the middle of a trial."""
-    tick = TrialLog.tick
+    tick, disk = TrialLog.tick, small_disk(12)
 
     def filling(self: TrialLog, row: dict[str, Any]) -> None:
         tick(self, row)
         if row["trial"] == 0 and row["time"] >= AT:
-            with suppress(OSError), (small_disk / "ballast").open("ab", buffering=0) as ballast:
+            with suppress(OSError), (disk / "ballast").open("ab", buffering=0) as ballast:
                 while ballast.write(bytes(4096)):
                     pass
 
     monkeypatch.setattr(TrialLog, "tick", filling)
-    ended = hw_run(out=small_disk)
+    ended = hw_run(out=disk)
     assert ended.code == 5 and ended.run.state == "failed" and ended.run.problems() == []
     log, stop = ended.run.data("log"), ended.stop
     assert stop["motors_stand"] and "No space left on device" in stop["reason"]

@@ -84,6 +84,12 @@ def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) ->
         ("epochs", "an override is key=value"),
         ("hidden=[1,", "not valid YAML"),
         ("epochs=__import__('os').getpid()", "should be a valid integer"),
+        (
+            "hw-run.rows.0.gain=x",
+            "'rows' is a list, and given as a whole: '0' is no key of it - --set hw-run.rows.0.gain=x: hw-run.rows - "
+            "fix: hw-run.rows=[{controller: ..., gains: ...}]; for 'gain' did you mean 'gains'?",
+        ),
+        ("wrist.gravity.0=1", "--set wrist.gravity.0=1: wrist.gravity - fix: wrist.gravity=[...]"),
     ],
 )
 def test_errors_in_overrides_name_the_override(override: str, said: str) -> None:

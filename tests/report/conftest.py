@@ -13,13 +13,20 @@ from wristctl.benchmark.compare import Result
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
+from wristctl.hardware.vision.marker import Sighting, Verdict
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.loop_figures import angles, errors, tensions
+from wristctl.report.track_figures import angle
+from wristctl.report.trial_figures import DIRECTIONS, desired_and_obtained, lateness
+from wristctl.report.trial_figures import Course as Trial
+from wristctl.report.trial_figures import errors as trial_errors
+from wristctl.report.trial_figures import tensions as trial_tensions
 from wristctl.report.tuning_figures import convergence, gain_history
 from wristctl.report.wrist_drawing import directions, stroboscope
-from wristctl.simulation.simulate import Simulation, chain_tip
+from wristctl.simulation.simulate import Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.tuning.search import Search
+from wristctl.wrist.kinematics import chain_tip
 
 WRIST = WristParameters()
 REFERENCES = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
@@ -72,6 +79,26 @@ def search(name: str = "smc", count: int = 3) -> Search:
     return Search(name, gains, float(values.min()), values.size, values, 10.0**exponent)
 
 
+def trials() -> list[Trial]:
+    """Two repetitions in three directions, with a simulation, one of them pushed."""
+    one = course("smc/exchanged")
+    simulated = one.time, 0.9 * one.theta, 0.1 * one.theta
+    common = one.time, one.theta, one.theta_ref, one.theta_desired, one.tension, simulated
+    pushes = {"flexion": (2.0, 2.5)}
+    return [Trial(each, one.label, k, *common, pushes.get(each)) for each in DIRECTIONS[:3] for k in range(2)]
+
+
+def sightings() -> list[Sighting]:
+    """A marker that swings, hidden now and then and blurred once."""
+    kinds = {7: Verdict.NO_BASE, 8: Verdict.NO_BASE, 20: Verdict.NO_TIP}
+    found = [(kinds.get(k, Verdict.OK), 0.02 * k) for k in range(50)]
+    corners = np.zeros((2, 4, 2))
+    return [
+        Sighting(time, k, np.sin(time) if verdict is Verdict.OK else np.nan, verdict, corners)
+        for k, (verdict, time) in enumerate(found)
+    ]
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "angles": lambda: angles([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "Loop default"),
     "errors": lambda: errors([course("smc/printed"), course("smc/tuned", 0.1)], "SMC"),
@@ -85,10 +112,15 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
     "gain history of pid": lambda: gain_history(search("pid"), PID.gains),
+    "trials, angles": lambda: desired_and_obtained(trials(), "Trials"),
+    "trials, errors": lambda: trial_errors(trials(), "Trials"),
+    "trials, tensions": lambda: trial_tensions(trials(), "Trials"),
+    "lateness": lambda: lateness(np.random.default_rng(0).exponential(2e-4, 2000), 5e-3),
+    "tracked angle": lambda: angle(sightings()),
     "directions": lambda: directions(WRIST),
     "stroboscope": lambda: stroboscope(course("smc/tuned"), WRIST),
 }
-"""Every figure of the report but those of learning."""
+"""Every figure of the report but those of learning, of a camera's calibration and of an identification."""
 
 
 @pytest.fixture(params=FIGURES, scope="module")

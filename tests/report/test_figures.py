@@ -23,7 +23,8 @@ def tick_labels(axis: Axis) -> list[Text]:
     ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
     room = 1e-9 * (high - low)
     seen = [tick for tick in ticks if low - room <= tick.get_loc() <= high + room and tick.get_visible()]
-    return [tick.label1 for tick in seen if tick.label1.get_visible() and tick.label1.get_text()]
+    labels = [label for tick in seen for label in (tick.label1, tick.label2)]  # the second on a colour bar
+    return [label for label in labels if label.get_visible() and label.get_text()]
 
 
 def texts(figure: Figure) -> list[Text]:
@@ -47,6 +48,12 @@ def test_every_axis_of_numbers_has_a_label_with_its_unit(drawn: Figure) -> None:
             if tick_labels(axis) and not isinstance(axis.get_major_locator(), FixedLocator):
                 label = axis.label.get_text() or shared[axis.axis_name]
                 assert label == "iteration" or "[" in label, f"{axis.axis_name} axis: {label!r}"
+
+
+def test_an_axis_with_a_label_has_its_numbers(drawn: Figure) -> None:
+    for axes in drawn.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            assert tick_labels(axis) or not axis.label.get_text(), axis.label.get_text()
 
 
 def test_no_text_is_cut(drawn: Figure) -> None:

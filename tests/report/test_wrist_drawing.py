@@ -10,9 +10,9 @@ import pytest
 
 from wristctl.config.wrist import WristParameters
 from wristctl.report.wrist_drawing import directions, stroboscope
-from wristctl.simulation.simulate import chain_tip
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS
+from wristctl.wrist.kinematics import chain_tip
 from wristctl.wrist.shape import backbone, beside, discs
 
 WRIST = WristParameters()

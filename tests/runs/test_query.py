@@ -48,8 +48,13 @@ def test_a_condition_that_cannot_be_meant_is_an_error(make: Make, results: Path,
     make()
     with pytest.raises(UserError, match=said):
         select(entries(results), where=[condition])
+
+
+@pytest.mark.parametrize("age", ["yesterday", "2", "1.2.3h", ".d", "99999999w"])
+def test_an_age_that_cannot_be_meant_is_an_error(make: Make, results: Path, age: str) -> None:
+    make()
     with pytest.raises(UserError, match="not an age"):
-        select(entries(results), newer="yesterday")
+        select(entries(results), newer=age)
 
 
 def test_the_index_changes_no_answer_and_may_be_lost_or_damaged(make: Make, results: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from wristctl.benchmark.compare import compare
 from wristctl.config.load import load_study
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.directions import DIRECTIONS, TENDONS, in_plane
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, in_plane, tendons_of
 
 SETTINGS = (
     "rows=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8", "loops={default: {}}",
@@ -46,3 +46,10 @@ def test_each_plane_sees_its_own_gravity() -> None:
 def test_tendons_that_pull_lie_on_the_side_of_the_bend(each) -> None:
     axis = 0 if each.plane == "ulnar" else 1
     assert all(TENDONS[number][axis] == each.sign for number in each.tendons)
+
+
+def test_each_plane_has_the_four_tendons_off_the_centre_on_their_sides() -> None:
+    assert ACTIVE == (1, 2, 4, 5)
+    for plane, axis in (("ulnar", 0), ("flexion", 1)):
+        assert sorted(tendons_of(plane)) == list(ACTIVE)
+        assert [TENDONS[tendon][axis] for tendon in tendons_of(plane)] == [1, 1, -1, -1]

@@ -51,9 +51,7 @@ def reference_name(reference: Reference) -> str:
         return f"tip path {reference.duration:g} s {' '.join(_millimetres(tip) for tip in reference.tips)}"
     if reference.kind == "multi-step":
         return f"steps {reference.duration:g} s {' '.join(f'{angle:g}' for angle in reference.angles_deg)} deg"
-    target = f"{30.0 if reference.angle_deg is None else reference.angle_deg:g} deg"
-    if reference.tip is not None:
-        target = f"tip {_millimetres(reference.tip)} mm"
+    target = f"{reference.end_deg:g} deg" if reference.tip is None else f"tip {_millimetres(reference.tip)} mm"
     how = {"step": "step", "sine": f"sine {reference.frequency:g} Hz"}
     return f"{how.get(reference.kind, f'minimum jerk {reference.duration:g} s')} {target}"
 
@@ -68,17 +66,13 @@ def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> No
         for name, loop in compared.loops.items():
             same_loop = loop == tuned.loops[scenario.loop]
             for reference in compared.references:
-                if same_loop and _same_course(reference, scenario.reference):
+                if same_loop and reference_name(reference) == reference_name(scenario.reference):
                     raise UserError(
                         f"the gains were tuned on a scenario that they would be judged on: "
                         f"{reference_name(reference)} on loop {name}",
                         where="compare.references",
                         fix="tune on other references, or judge on others",
                     )
-
-
-def _same_course(a: Reference, b: Reference) -> bool:
-    return reference_name(a) == reference_name(b)
 
 
 def compare(

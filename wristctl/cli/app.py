@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import signal
+import gc
 import sys
 import traceback
-from types import FrameType
 from typing import NoReturn
 
 import typer
@@ -14,6 +13,7 @@ from typer.main import get_command
 from wristctl import __version__
 from wristctl.cli.on_call import on_call
 from wristctl.config.errors import UserError
+from wristctl.interrupt import interrupts
 
 _REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
 
@@ -43,7 +43,7 @@ wristctl gen-data experiments/quick.yaml
 
 wristctl train experiments/quick.yaml --data latest:gen-data
 
-wristctl tune experiments/quick.yaml --set controllers=\[smc,pid]
+wristctl tune experiments/quick.yaml --set 'controllers=\[smc,pid]'
 
 wristctl compare experiments/quick.yaml --network latest:train --tuned latest:tune
 
@@ -68,34 +68,23 @@ def _wristctl(
 
 def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
-    asked: list[int] = []  # whoever builds a model or compiles while Ctrl-C comes may raise another error for it
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        asked.append(number)
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, interrupt)
-    lost: list[type[BaseException]] = []  # a KeyboardInterrupt in a compiler's callback ends as another error
-    sys.unraisablehook = lambda told: (
-        lost.append(told.exc_type) if told.exc_type is KeyboardInterrupt else sys.__unraisablehook__(told)
-    )
-    try:
-        code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
-    except UserError as error:
-        code = _failed(str(error), error, error.exit_code)
-    except typer.TyperException as error:
-        command = getattr(getattr(error, "ctx", None), "command_path", "wristctl")
-        code = _failed(f"{error.format_message()} - fix: {command} --help", error, error.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        code = 130
-    except Exception as error:
-        if lost or asked:
-            sys.exit(130)
-        notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
-        code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
-    sys.exit(code)
+    gc.set_threshold(100_000, 50, 100)  # imports make many objects and no cycles: looking for them costs 0.15 s
+    sys.unraisablehook = lambda told: None if told.exc_type is KeyboardInterrupt else sys.__unraisablehook__(told)
+    with interrupts() as seen:
+        try:
+            code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
+        except UserError as error:
+            code = _failed(str(error), error, error.exit_code)
+        except typer.TyperException as error:
+            command = getattr(getattr(error, "ctx", None), "command_path", "wristctl")
+            code = _failed(f"{error.format_message()} - fix: {command} --help", error, error.exit_code)
+        except (KeyboardInterrupt, typer.Abort):
+            code = 130
+        except Exception as error:
+            notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
+            what = f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}"
+            code = 130 if seen.asked else _failed(what, error, 1)
+        sys.exit(code)
 
 
 def _failed(message: str, error: BaseException, code: int) -> int:

@@ -26,15 +26,16 @@ def calibrate_wrist(session: Session) -> Table:
     session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
     import numpy as np
 
-    from wristctl.cli.hw_trials import view_of
     from wristctl.cli.operator import operator
     from wristctl.hardware.trial.calibration import FILE, calibrated
-    from wristctl.hardware.trial.spools import TENDONS
     from wristctl.hardware.trial.stands import open_stand
+    from wristctl.hardware.vision.view import View
+    from wristctl.wrist.directions import ACTIVE
 
     run, settings, study = session.run, session.settings, session.study
+    view = View.of(session.inputs.get("optics"))
     with session.progress("opening board and camera"):
-        stand = open_stand(settings, study.wrist, study.seed, view_of(session), operator(session))
+        stand = open_stand(settings, study.wrist, study.seed, view, operator(session))
     with session.progress("homing"):
         found = calibrated(stand, settings)
     run.file(FILE).write_text(json.dumps(found.plain(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
@@ -42,7 +43,7 @@ def calibrate_wrist(session: Session) -> Table:
     run.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
     by_model = settings.actuator.step_length / study.wrist.tendon_offset
     rows = []
-    for axis, tendon in enumerate(TENDONS):
+    for axis, tendon in enumerate(ACTIVE):
         slope, slack = zero.steps_per_radian[axis], zero.slack[axis]
         run.metric(f"steps_per_radian_{tendon}", slope, "1/rad", meaning=f"tendon {tendon}, near the straight wrist")
         run.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")

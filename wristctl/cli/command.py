@@ -16,10 +16,10 @@ from types import MappingProxyType
 from typing import Any, get_origin
 
 import typer
-from rich.console import Console
 
-from wristctl.cli.options import Options, signature
-from wristctl.cli.progress import PLAIN, Done, listening, progress
+from wristctl.cli.completion import controllers, run_ids
+from wristctl.cli.options import Options, Own, signature
+from wristctl.cli.progress import PLAIN, Done, Terminal, listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
 from wristctl.config.explain import located
@@ -56,7 +56,7 @@ class Session:
     settings: Any
     inputs: dict[str, Run]
     run: LiveRun
-    console: Console
+    console: Terminal
     quiet: bool
     flags: frozenset[str] = frozenset()
     """Of the command's flags those that were given."""
@@ -115,8 +115,12 @@ def study_command(
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    own = [(leaf, keys[leaf].description or "", kinds.get(leaf, str)) for leaf in (*first, *named, *shortcuts)]
-    own += [(name, text, bool) for name, text in flags.items()]
+    completed = {"controller": controllers} | {each.leaf: run_ids for each in inputs}
+    own = [
+        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf))
+        for leaf in (*first, *named, *shortcuts)
+    ]
+    own += [Own(name, text, bool) for name, text in flags.items()]
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None

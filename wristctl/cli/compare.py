@@ -81,7 +81,6 @@ def _draw(session: Session, results: list[Result]) -> None:
     from wristctl.benchmark.paper import T2
     from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
     from wristctl.report.loop_figures import errors
-    from wristctl.report.wrist_drawing import directions
 
     run, settings = session.run, session.settings
     loops = list(settings.loops)
@@ -106,7 +105,6 @@ def _draw(session: Session, results: list[Result]) -> None:
                 heading = f"{name}, loop {loop}, {shown[0].reference}"
                 run.figure(f"error-{name}-{loop}", errors(courses, heading))
                 run.figure(f"error-log-{name}-{loop}", errors(courses, heading, log=True))
-    run.figure("directions", directions(session.study.wrist))
 
 
 def _units() -> dict[str, str]:

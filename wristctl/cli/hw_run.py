@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from wristctl.cli.command import Input, Session, Table, study_command
 from wristctl.cli.stands_on import stands_on
+from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.runs import Run
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
-    """What would be done; opens nothing."""
+    """Check controllers and gains and say what would be done; opens nothing."""
+    from wristctl.cli.loops import check_row
+
     settings = study.hw_run
+    for number, row in enumerate(settings.rows):
+        with under(f"hw-run.rows.{number}"):
+            check_row(row)
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest
@@ -43,7 +49,7 @@ app = study_command(
     flags={"yes": "Ask nobody before the motors of real hardware move."},
     examples=(
         "wristctl hw-run",
-        "wristctl hw-run --set directions=\\[ulnar] --set push.force=0",
+        "wristctl hw-run --set 'directions=\\[ulnar]' --set push.force=0",
         "wristctl hw-run --dry-run --port /dev/ttyACM0",
         "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
     ),

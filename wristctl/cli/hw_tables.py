@@ -15,7 +15,7 @@ from wristctl.hardware.trial.trials import Trial
 from wristctl.hardware.trial.twin import twin
 from wristctl.report import trial_figures
 from wristctl.simulation.simulate import Simulation
-from wristctl.wrist.directions import DIRECTIONS, TENDONS
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 
 Twins = dict[int, Simulation]
 """The simulation of each trial, by its number."""
@@ -123,5 +123,5 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
 def _sides(course: pd.DataFrame, direction: str) -> Any:
     """Commanded tension (T, 2) of one tendon of the direction's side and of one of the other."""
     pulling = DIRECTIONS[direction].tendons
-    holding = next(tendon for tendon in TENDONS if tendon not in (3, *pulling))
+    holding = next(tendon for tendon in ACTIVE if tendon not in pulling)
     return course[[f"tension_{pulling[0]}", f"tension_{holding}"]].to_numpy(float)

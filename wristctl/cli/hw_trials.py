@@ -23,8 +23,9 @@ from wristctl.hardware.trial.safety import SafetyStop
 from wristctl.hardware.trial.stands import open_stand
 from wristctl.hardware.trial.trials import Trial, trials_of
 from wristctl.hardware.vision.annotate import AnnotatedVideo
-from wristctl.hardware.vision.view import FILE, View
+from wristctl.hardware.vision.view import View
 from wristctl.simulation.metrics import METRICS
+from wristctl.wrist.directions import ACTIVE
 
 log = logging.getLogger(__name__)
 
@@ -62,8 +63,8 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            ask, keep = operator(session), film.add if film else None
-            stand = open_stand(settings, bench, study.seed, view_of(session), ask, keep)
+            view, keep = View.of(session.inputs.get("optics")), film.add if film else None
+            stand = open_stand(settings, bench, study.seed, view, operator(session), keep)
         with trials_shown(session, trials) as shown:
             experiment.run(stand, shown)
     except BaseException as error:
@@ -81,12 +82,6 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     if stopped is not None:
         raise stopped
     return table
-
-
-def view_of(session: Session) -> View:
-    """How the camera sees the plane: by its calibration run, else square."""
-    run = session.inputs.get("optics")
-    return View.load(run.file(FILE)) if run else View()
 
 
 def _judged(session: Session, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
@@ -128,7 +123,7 @@ def _say_how_it_went(session: Session, experiment: Experiment, trial_log: TrialL
     run.metric("overruns", timing.overruns, better="lower", meaning="ticks skipped because one before took too long")
     for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
         run.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning="from due to begun, of a tick")
-    if settings.real_time or settings.port is not None:
+    if timing.late and (settings.real_time or settings.port is not None):
         late, median, most = (f"{1e3 * timing.jitter(share):.2f} ms" for share in (0.99, 0.5, 1.0))
         told = (
             f"{len(timing.late)} ticks of {1e3 * timing.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
@@ -153,14 +148,14 @@ def last_second(trial_log: TrialLog) -> Table:
     """The last second of ticks, every tenth of it."""
     rows = list(trial_log.last)
     shown = rows[:: -max(1, len(rows) // 10)][::-1]
-    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in (1, 2, 4, 5)), "state")
+    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in ACTIVE), "state")
     cells = [
         (
             round(row["time"], 3),
             round(float(np.degrees(row["theta"])), 2),
             round(float(np.degrees(row["theta_ref"])), 2),
             str(row["verdict"]) or "-",
-            *(round(row[f"tension_{k}"], 2) for k in (1, 2, 4, 5)),
+            *(round(row[f"tension_{k}"], 2) for k in ACTIVE),
             row["state"],
         )
         for row in shown

@@ -14,8 +14,8 @@ from rich.table import Table as Grid
 
 from wristctl.cli.command import Session
 from wristctl.hardware.trial.loop import Shown
-from wristctl.hardware.trial.spools import TENDONS
 from wristctl.hardware.trial.trials import Trial
+from wristctl.wrist.directions import ACTIVE
 
 _PICTURES = 8.0
 """Panels a second."""
@@ -25,29 +25,30 @@ class _Panel:
     """The newest tick, drawn when asked."""
 
     def __init__(self, trials: Sequence[Trial]) -> None:
-        self._trials, self._row, self._done = trials, dict[str, Any](), 0
+        self._trials, self._row = trials, dict[str, Any]()
+        self._begun, self._verdict = 0, "-"
 
     def take(self, row: dict[str, Any]) -> None:
-        self._row = row
+        self._row, self._begun = row, max(self._begun, row["trial"] + 1)
+        self._verdict = str(row["verdict"]) or self._verdict  # most ticks have no new frame
 
     def __rich__(self) -> Panel:
         row = self._row
         if not row:
             return Panel("homing: each motor reels in until its tendon bends the wrist", title="hw-run")
         number = row["trial"]
-        self._done = max(self._done, number)
         grid = Grid.grid(padding=(0, 2))
         angle, wanted = math.degrees(row["theta"]), math.degrees(row["theta_ref"])
         grid.add_row("angle", f"{angle:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", f"{row['load']:+.3f} N m")
         for name, unit in (("tension", "N"), ("sent", "steps/s")):
-            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in TENDONS)
+            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in ACTIVE)
             grid.add_row(name, *values, unit)
-        grid.add_row("board", row["state"], "marker", str(row["verdict"]) or "-", "late", f"{1e3 * row['late']:.2f} ms")
+        grid.add_row("board", row["state"], "marker", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")
         title = "between trials" if number < 0 else told(self._trials[number], len(self._trials))
         whole = Grid.grid()
         whole.add_row(grid)
-        whole.add_row(ProgressBar(total=len(self._trials), completed=self._done, width=60))
+        whole.add_row(ProgressBar(total=len(self._trials), completed=self._begun - (number >= 0), width=60))
         return Panel(whole, title=title)
 
 

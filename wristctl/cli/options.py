@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from wristctl.cli.completion import controllers, run_ids, study_files
+from wristctl.cli.completion import study_files
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,19 +45,19 @@ class Options:
     debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False
 
 
-_COMPLETED: dict[str, Callable[..., list[str]]] = {
-    "controller": controllers,
-    "data": run_ids,
-    "calibration": run_ids,
-    "from_identified": run_ids,
-    "network": run_ids,
-    "runs": run_ids,
-    "tuned": run_ids,
-}
+class Own(NamedTuple):
+    """An option of one command."""
+
+    leaf: str
+    help: str
+    kind: Any
+    """Its type."""
+    completed: Callable[..., list[str]] | None = None
+    """What the shell completes it with."""
 
 
-def signature(own: Iterable[tuple[str, str, Any]], argument: str | None = None) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own, given as (leaf, help, type).
+def signature(own: Iterable[Own], argument: str | None = None) -> inspect.Signature:
+    """The parameters of a command: the shared ones, then its own.
 
     One of its own may be the `argument` that stands first, in place of study files.
     """
@@ -68,17 +68,17 @@ def signature(own: Iterable[tuple[str, str, Any]], argument: str | None = None) 
     ]
     named = [
         inspect.Parameter(
-            leaf,
+            each.leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[kind | None, _parameter(leaf, text, leaf == argument)],
+            annotation=Annotated[each.kind | None, _parameter(each, each.leaf == argument)],
         )
-        for leaf, text, kind in own
+        for each in own
     ]
     return inspect.Signature([*shared, *named])
 
 
-def _parameter(leaf: str, text: str, first: bool) -> Any:
+def _parameter(own: Own, first: bool) -> Any:
     if first:
-        return typer.Argument(metavar=leaf.upper(), help=text, autocompletion=_COMPLETED.get(leaf))
-    return typer.Option(f"--{leaf.replace('_', '-')}", help=text, autocompletion=_COMPLETED.get(leaf))
+        return typer.Argument(metavar=own.leaf.upper(), help=own.help, autocompletion=own.completed)
+    return typer.Option(f"--{own.leaf.replace('_', '-')}", help=own.help, autocompletion=own.completed)

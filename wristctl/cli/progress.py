@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rich.console import Console
+from rich.live import Live
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -33,6 +34,34 @@ PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
 _LINE_EVERY, _EVENT_EVERY = 10.0, 1.0
 
 
+class Terminal(Console):
+    """stderr. What is drawn there live gives way while a person is asked something."""
+
+    _live_now: Live | None = None
+
+    def set_live(self, live: Live) -> Any:
+        """Something begins to be drawn."""
+        self._live_now = live
+        return super().set_live(live)
+
+    def clear_live(self) -> None:
+        """It ends."""
+        self._live_now = None
+        super().clear_live()
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Within the block nothing is drawn live: it would hide a question, and what is typed in answer."""
+        live = self._live_now
+        if live is not None:
+            live.stop()
+        try:
+            yield
+        finally:
+            if live is not None:
+                live.start()
+
+
 class Messages(logging.Handler):
     """wristctl's log messages on stderr, above a live progress line where there is one."""
 
@@ -47,9 +76,9 @@ class Messages(logging.Handler):
 
 
 @contextmanager
-def listening(quiet: bool, verbose: bool) -> Iterator[Console]:
+def listening(quiet: bool, verbose: bool) -> Iterator[Terminal]:
     """Within the block wristctl's messages go to stderr: warnings only if quiet, details too if verbose."""
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     handler, logger = Messages(console), logging.getLogger("wristctl")
     logger.addHandler(handler)
     logger.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)

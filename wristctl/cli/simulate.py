@@ -22,7 +22,7 @@ def simulate(session: Session) -> Table:
     """Simulate one closed loop and draw it."""
     from wristctl.cli.loops import identified, network_of, tuned_of, warn_if_it_buckles, warn_if_outside
     from wristctl.report.loop_figures import angles, errors, tensions
-    from wristctl.report.wrist_drawing import directions, stroboscope
+    from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.metrics import METRICS
     from wristctl.simulation.simulate import simulate as run_simulation
     from wristctl.simulation.trajectory import COLUMNS
@@ -55,7 +55,6 @@ def simulate(session: Session) -> Table:
         run.figure("error", errors([course]))
         run.figure("tensions", tensions(course))
         run.figure("motion", stroboscope(course, wrist))
-        run.figure("directions", directions(wrist))
     title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if done.failed else "")
     return Table(title, ("metric", "value", "unit", "meaning"), rows)
 

@@ -60,11 +60,13 @@ def track(session: Session) -> list[Table]:
     import cv2
 
     from wristctl.hardware.vision.marker import MEANING, Verdict
+    from wristctl.hardware.vision.view import View
     from wristctl.report.track_figures import angle, frames
 
     cv2.setNumThreads(1)
     run, settings = session.run, session.settings
-    sightings, pictures = _see(session)
+    view = View.of(session.inputs.get("calibration"))
+    sightings, pictures = _see(session, view)
     run.table("data/track.csv", _frame(sightings), _UNITS, _MEANING)
     digest = {"name": settings.video, "sha256": _digest(Path(settings.video)), "frames": len(sightings)}
     run.file("data/recording.json").write_text(json.dumps(digest, indent=2) + "\n", encoding="utf-8")
@@ -84,7 +86,7 @@ def track(session: Session) -> list[Table]:
     run.metric("theta_min", min(thetas), "deg", n=usable, meaning="least angle")
     run.metric("theta_max", max(thetas), "deg", n=usable, meaning="greatest angle")
     run.metric("noise", noise, "deg", "lower", usable, meaning="deviation from steady motion")
-    skew = _askew(session, sightings)
+    skew = _askew(view, sightings)
     run.metric("askew", skew, "deg", "lower", usable, meaning="largest error, by the base's marker that is no square")
     if skew > _ASKEW:
         fix = "calibrate the camera where it stands now, and name that run with --calibration"
@@ -104,14 +106,14 @@ def track(session: Session) -> list[Table]:
     return [Table(Path(settings.video).name, ("what", "value"), rows), Table("Frames by verdict", columns, why)]
 
 
-def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
+def _see(session: Session, view: View) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
     """What each frame tells, and annotated pictures of some."""
     from wristctl.hardware.vision.annotate import AnnotatedVideo, Picked
     from wristctl.hardware.vision.camera import open_recording
     from wristctl.hardware.vision.marker import Tracker, Verdict
 
     settings = session.settings
-    tracker = Tracker(settings.markers, _view(session), settings.gates)
+    tracker = Tracker(settings.markers, view, settings.gates)
     recording = open_recording(settings.video, settings.frame_rate)
     video = session.run.file("data/annotated.avi")
     film = AnnotatedVideo(video, recording.frame_rate) if settings.annotate else None
@@ -134,21 +136,14 @@ def _see(session: Session) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
     return sightings, picked.pictures()
 
 
-def _view(session: Session) -> View:
-    from wristctl.hardware.vision.view import FILE, View
-
-    earlier = session.inputs.get("calibration")
-    return View() if earlier is None else View.load(earlier.file(FILE))
-
-
-def _askew(session: Session, sightings: Sequence[Sighting]) -> float:
+def _askew(view: View, sightings: Sequence[Sighting]) -> float:
     """How far off [deg] an angle may be, by how square the base's marker looks in the calibrated view on average."""
     import numpy as np
 
     from wristctl.hardware.vision.detector import askew
 
     seen = np.array([each.corners[0] for each in sightings if math.isfinite(each.theta)])
-    return math.degrees(askew(_view(session).rectify(np.nanmean(seen, axis=0))))
+    return math.degrees(askew(view.rectify(np.nanmean(seen, axis=0))))
 
 
 def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:

@@ -137,7 +137,8 @@ def _done(session: Session, what: str, samples: Samples, jobs: list[Job]) -> lis
     import numpy as np
     import torch
 
-    from wristctl.learning.processes import cores, train_all
+    from wristctl.lanes.cores import cores
+    from wristctl.learning.processes import train_all
     from wristctl.learning.training import Epoch
 
     settings, run = session.settings, session.run

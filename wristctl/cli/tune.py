@@ -109,6 +109,6 @@ app = study_command(
     examples=(
         "wristctl tune experiments/paper.yaml",
         "wristctl tune --set 'controllers=[smc, pid]' --iterations 20",
-        "wristctl tune experiments/recommended.yaml --from-identified latest:identify",
+        "wristctl tune experiments/paper.yaml --from-identified latest:identify",
     ),
 )

@@ -46,6 +46,9 @@ def _what(detail: Any) -> str:
     value = value if len(value) <= 60 else f"{value[:57]}..."
     if detail["type"] in ("model_type", "dict_type"):
         return f"{value} should be a group of keys and values"
+    if _as_keys(detail):
+        key = next(iter(detail["input"]))
+        return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
     message: str = detail["msg"]
     return message.replace("Input", value, 1) if message.startswith("Input") else f"{value}: {message}"
 
@@ -56,9 +59,21 @@ def _fix(detail: Any) -> str:
         return meant(str(path[-1]), keys_of(field_at(path[:-1])[0]))
     if detail["type"] == "literal_error":
         return meant(str(detail["input"]), re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
+    if _as_keys(detail):
+        known = keys_of(field_at((*path, 0))[0])
+        items = "{" + ", ".join(f"{key}: ..." for key in known) + "}" if known else "..."
+        below = [key for value in detail["input"].values() if isinstance(value, dict) for key in value]
+        unknown = next((key for key in below if known and key not in known), None)
+        whole = f"{'.'.join(map(str, path))}=[{items}]"
+        return f"{whole}; for {unknown!r} {meant(unknown, known)}" if unknown else whole
     _, field = field_at(path)
     if field is None or not field.description or detail["type"] == "value_error":
         return ""
     unit, default = unit_of(field), repr(field.default)
     expected = f"{field.description} [{unit}]" if unit else field.description
     return f"{expected}, default {default}" if len(default) <= 40 and field.default is not None else expected
+
+
+def _as_keys(detail: Any) -> bool:
+    """Whether keys were given where a list stands: `rows.0.gains=...`."""
+    return detail["type"] == "tuple_type" and isinstance(detail["input"], dict) and bool(detail["input"])

@@ -97,7 +97,7 @@ class HwRunSettings(RigSettings):
     from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
-    video: bool = choice(False, "keep the frames as a video, annotated")
+    video: bool = choice(False, "keep the frames that were looked at as a video, with clock and marker angle")
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

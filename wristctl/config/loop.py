@@ -53,11 +53,16 @@ class Reference(Section):
         "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
     )
 
+    @property
+    def end_deg(self) -> float:
+        """The wanted angle at the end [deg], where it is no tip."""
+        return 30.0 if self.angle_deg is None else self.angle_deg
+
     def mirrored(self) -> Reference:
         """The same motion to the other side."""
         return self.model_copy(
             update={
-                "angle_deg": -(30.0 if self.angle_deg is None else self.angle_deg) if self.tip is None else None,
+                "angle_deg": -self.end_deg if self.tip is None else None,
                 "tip": None if self.tip is None else (self.tip[0], -self.tip[1]),
                 "angles_deg": tuple(-angle for angle in self.angles_deg),
                 "tips": tuple((x, -y) for x, y in self.tips),

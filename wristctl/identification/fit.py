@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.identification.forward import Candidate, angles
 from wristctl.identification.trials import Trial
 from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
+from wristctl.lanes.cores import cores
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         slopes[:, coordinates[_zero(trial)]] = 1.0
         return expected + x[coordinates[_zero(trial)]], slopes
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         done = list(pool.map(one, problem.trials))
     return Linearisation([each for each, _ in done], [each for _, each in done])
 

@@ -17,7 +17,6 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import Candidate, angles
-from wristctl.identification.trials import tendons_of
 from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
@@ -25,7 +24,7 @@ from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 
 if TYPE_CHECKING:
@@ -113,7 +112,7 @@ def rehearse(
 
 
 def _own(truth: Truth, direction: Direction) -> Candidate:
-    taut = dict(zip((1, 2, 4, 5), truth.taut, strict=True))
+    taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
     actuator = truth.actuator
     wrist = in_plane(truth.wrist, direction)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.directions import DIRECTIONS, in_plane, tendons_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,15 +22,6 @@ _FEWEST = 20
 
 _INSTANTS = 5
 """Instants of an exposure whose mean stands for it."""
-
-_OPPOSITE = {"ulnar": ("ulnar", "radial"), "flexion": ("flexion", "extension")}
-"""Directions of the + and the - side of each bending plane."""
-
-
-def tendons_of(plane: str) -> tuple[int, int, int, int]:
-    """The four tendons as a bending plane sees them: two of its + side, two of its - side."""
-    plus, minus = (DIRECTIONS[side].tendons for side in _OPPOSITE[plane])
-    return *plus, *minus
 
 
 @dataclass(frozen=True)

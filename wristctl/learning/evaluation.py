@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from wristctl.learning import metrics
 from wristctl.learning.baseline import Polynomial
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
 from wristctl.learning.inference import compiled_network
@@ -17,10 +18,7 @@ HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
 """Names of the places where samples were held out, by why."""
 
 MEASURES: dict[str, tuple[str, str]] = {
-    "r2": ("", "coefficient of determination on the test samples"),
-    "rmse_deg": ("deg", "RMSE of the angle on the test samples"),
-    "max_error_deg": ("deg", "largest error on the test samples"),
-    "close_share": ("1", "share of the test samples with an error of at most 0.5 deg"),
+    **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in metrics.MEASURES.items()},
     "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
     "workspace_max_error_deg": ("deg", "largest error on a dense grid over the whole domain"),
     "held_out_payloads_rmse_deg": ("deg", "RMSE of the angle at payloads kept from training"),
@@ -87,10 +85,7 @@ def measures(trial: Trial, where: Sequence[Place]) -> dict[str, float]:
         for name in HELD_OUT.values()
     }
     return {
-        "r2": test.r2,
-        "rmse_deg": test.rmse_deg,
-        "max_error_deg": test.max_error_deg,
-        "close_share": test.close_share,
+        **vars(test),
         "workspace_rmse_deg": whole.rmse_deg if whole else math.nan,
         "workspace_max_error_deg": whole.max_error_deg if whole else math.nan,
         **held_out,

@@ -16,11 +16,11 @@ from wristctl.config.learning import Activation
 from wristctl.config.section import Section
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
+from wristctl.runs.files import replacing
 from wristctl.wrist.kinematics import Array
 
 ENTRY = "wristctl"
 """The one entry of the file's metadata: of several, safetensors writes the order at random."""
-
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -85,7 +85,8 @@ def save_network(network: Network, path: Path, training: dict[str, object]) -> N
     tensors = {}
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         tensors[f"{layer}.weight"], tensors[f"{layer}.bias"] = np.ascontiguousarray(weight), bias
-    path.write_bytes(save(tensors, {ENTRY: header.model_dump_json()}))
+    with replacing(path) as temporary:
+        temporary.write_bytes(save(tensors, {ENTRY: header.model_dump_json()}))
 
 
 def load_network(path: Path) -> Network:

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ def train_all(
     trials: list[Trial] = []
     for number, job in enumerate(jobs):
         try:
-            trial = train_one(samples, job, device, checkpoints, lambda epoch, number=number: report(number, epoch))  # type: ignore[misc]
+            trial = train_one(samples, job, device, checkpoints, partial(report, number))
         except KeyboardInterrupt:
             if not trials:
                 raise
@@ -45,11 +46,6 @@ def train_all(
         if trial.interrupted:
             break
     return trials
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _over_processes(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wristctl.hardware.vision.camera import Image
 from wristctl.hardware.vision.charuco import BoardView, Calibration
 from wristctl.hardware.vision.view import View
-from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, title
+from wristctl.report.style import BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title
 
 _PARTS, _FINE = 12, 60
 _SEEN: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
@@ -58,7 +58,7 @@ def lens(view: View) -> Figure:
     axes.grid(False)
     axes.invert_yaxis()
     title(axes, "a square grid of the picture, undistorted")
-    made.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9.0)
+    legend_below(made)
     return made
 
 
@@ -82,5 +82,4 @@ def plane(picture: Image, seen: BoardView, view: View) -> Figure:
     for axes in (before, after):
         axes.grid(False)
         axes.spines[:].set_color(LIGHT)
-        axes.tick_params(colors=BLACK)
     return made

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wristctl.benchmark.compare import Result
 from wristctl.benchmark.paper import T2
 from wristctl.report.loop_figures import draw_desired, within_half_a_move
-from wristctl.report.style import GREY, WIDTH, colour, figure, line, title, undress
+from wristctl.report.style import GREY, WIDTH, PowersOfTen, colour, figure, line, logarithmic, title, undress
 
 Array = NDArray[np.float64]
 Across = Literal["reference", "loop"]
@@ -80,7 +80,8 @@ def rmse_map(results: Sequence[Result], heading: str = "", across: Across = "ref
     ours.set_xticks(range(len(columns)), [fill(name, 10) for name in columns])
     paper.set_xticks([0], ["the paper's\nT2"])
     title(ours, heading)
-    bar = made.colorbar(image, ax=[ours, paper], pad=0.02, label="RMSE [rad]")
+    bar = made.colorbar(image, ax=[ours, paper], pad=0.02, label="RMSE [rad]", format=PowersOfTen())
+    bar.minorformatter = PowersOfTen()
     bar.ax.tick_params(labelsize=9.0)
     return made
 
@@ -99,7 +100,7 @@ def chattering_bars(results: Sequence[Result], heading: str = "") -> Figure:
         hatch = {"hatch": _FAILED, "edgecolor": "w"} if failed else {}
         axes.barh(at, np.median(values), height=0.6, color=colour(own[0].controller), **hatch)
         axes.plot(values, np.full(len(values), at), "o", color="w", markeredgecolor="k", markersize=4.0)
-    axes.set_xscale("log")
+    logarithmic(axes.xaxis)
     axes.set_yticks(range(len(rows)), rows)
     axes.invert_yaxis()
     axes.grid(False, axis="y")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from wristctl.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend
+from wristctl.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend, logarithmic, title
 from wristctl.wrist.kinematics import Array
 
 ANGLES, ERRORS = "PuOr", "cividis"
@@ -53,7 +53,7 @@ def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
             style = {"label": label, "zorder": 3} if bold else {"linewidth": 0.8, "alpha": 0.35}
             axes.plot(rows["epoch"], rmse, color=colour, **style)
     if curves["trial"].nunique() > 1:
-        axes.set_title(f"trial {kept} was kept; faint: trials that were not", loc="left")
+        title(axes, f"trial {kept} was kept; faint: trials that were not")
     axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]", yscale="log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter("{x:g}")
@@ -115,13 +115,15 @@ def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
         )  # fmt: skip
     at = grid.iloc[chosen]
     axes.plot(at["multiply_adds"], at["rmse_deg"], "o", color=BLACK, fillstyle="none", markersize=12, label="chosen")
-    axes.set(xlabel="multiply-adds of one angle", ylabel="cross-validated RMSE [deg]", xscale="log", yscale="log")
-    axes.set_title("mean over the folds with its standard error", loc="left")
+    logarithmic(axes.xaxis)
+    logarithmic(axes.yaxis)
+    axes.set(xlabel="multiply-adds of one angle", ylabel="cross-validated RMSE [deg]")
+    title(axes, "mean over the folds with its standard error")
     legend(axes, loc="best")
     return made
 
 
-def _workspace(across: ArrayLike, up: ArrayLike, title: str) -> tuple[Figure, Axes]:
+def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, Axes]:
     """A figure as tall as a map of these positions [mm] needs at equal scales."""
     low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
     width, height = high - low
@@ -129,7 +131,7 @@ def _workspace(across: ArrayLike, up: ArrayLike, title: str) -> tuple[Figure, Ax
     edge = 0.04 * width
     axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
-    axes.set_title(title, loc="left")
+    title(axes, heading)
     return made, axes
 
 

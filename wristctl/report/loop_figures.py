@@ -10,14 +10,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wristctl.report.style import BLACK, GREY, ORANGE, PURPLE, figure, legend, legend_below, line, title
+from wristctl.report.style import (
+    BLACK,
+    GREY,
+    ORANGE,
+    PURPLE,
+    WANTED,
+    figure,
+    legend,
+    legend_below,
+    line,
+    logarithmic,
+    title,
+)
 from wristctl.simulation.trajectory import Trajectory
 
 _SMALLEST = 1e-8
 """Errors below this [rad] are not shown on a logarithmic axis."""
 _LAST = 20
 """Samples in the close-up of tensions."""
-_BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
 _OTHER: Any = {"color": BLACK, "linewidth": 0.7}
 _DOTS: Any = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
 
@@ -53,7 +64,7 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
         if not log and (seen := _apart(course.seen, course.theta)) is not None:
             axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **_OTHER)
     if log:
-        axes.set_yscale("log")
+        logarithmic(axes.yaxis)
     else:
         axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
         size = max(float(np.abs(course.theta_ref).max()) for course in trajectories)
@@ -114,7 +125,7 @@ def label(trajectory: Trajectory) -> str:
 def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     """Draw the desired angle [deg] as a band behind the lines, and each other reference dotted."""
     wanted = trajectories[0].theta_desired
-    axes.plot(trajectories[0].time, np.degrees(wanted), label="desired", **_BAND)
+    axes.plot(trajectories[0].time, np.degrees(wanted), **WANTED)
     drawn = [wanted]
     for course in trajectories:
         if not any(np.allclose(course.theta_ref, other, atol=1e-6) for other in drawn):

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
-BLACK, GREY, LIGHT = "#000000", "#7F7F7F", "#D9D9D9"
+BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 """Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
@@ -35,6 +37,8 @@ _CONTROLLERS = {
     "feedforward": GREY,
 }
 _OTHERS = (OLIVE, FOREST, ROSE)
+WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
+"""Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own."""
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
@@ -44,6 +48,7 @@ _DASHES: dict[str, Any] = {
     "initial": (0, (5, 1.5, 1.2, 1.5)),
 }
 _OTHER_DASHES = (0, (8, 1.5, 1.2, 1.5, 1.2, 1.5))
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.4}
 
 
@@ -76,6 +81,23 @@ def undress(axes: Axes) -> None:
     axes.grid(False)
     axes.spines[:].set_visible(False)
     axes.tick_params(which="both", length=0.0)
+
+
+class PowersOfTen(LogFormatterSciNotation):
+    """Powers of ten such as 10⁻³ as plain text: to parse them as formulas takes longer than to draw all the rest."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula: str = super().__call__(x, pos)
+        plain = formula.replace(r"$\mathdefault{", "").replace(r"\times", "\u00d7").replace("}$", "").rstrip("}")
+        base, _, power = plain.removesuffix("\u00d710^{0").partition("^{")
+        return base + power.translate(_RAISED)
+
+
+def logarithmic(axis: Axis) -> None:
+    """Give an axis a logarithmic scale in powers of ten."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
+    axis.set_major_formatter(PowersOfTen())
+    axis.set_minor_formatter(PowersOfTen())
 
 
 def title(axes: Axes, text: str) -> None:

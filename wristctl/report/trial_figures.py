@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from wristctl.report.style import (
     BLACK,
     BLUE,
-    GREY,
     LIGHT,
     ORANGE,
     PURPLE,
+    WANTED,
     figure,
     legend_below,
     line,
+    logarithmic,
     title,
 )
 
@@ -29,7 +30,6 @@ Array = NDArray[np.float64]
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 """In the paper's order."""
 
-_BAND: Any = {"color": GREY, "linewidth": 5.0, "alpha": 0.35, "zorder": 1.9}
 _SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
 _SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
 
@@ -59,10 +59,9 @@ def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure
     made, panels = _panels(courses)
     for course in courses:
         panel = panels[course.direction]
-        if course.simulated is not None and course.repetition == 0:
-            _simulated(panel, course, course.simulated[1])
+        _draw_simulated(panel, course, 1)
         panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
-        panel.plot(course.time, np.degrees(course.theta_desired), label="desired", **_BAND)
+        panel.plot(course.time, np.degrees(course.theta_desired), **WANTED)
     return _finished(made, panels, courses, heading, "bending angle [deg]")
 
 
@@ -71,8 +70,7 @@ def errors(courses: Sequence[Course], heading: str = "") -> Figure:
     made, panels = _panels(courses, sharey=True)
     for course in courses:
         panel = panels[course.direction]
-        if course.simulated is not None and course.repetition == 0:
-            _simulated(panel, course, course.simulated[2])
+        _draw_simulated(panel, course, 2)
         panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
         panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     return _finished(made, panels, courses, heading, "error [deg]")
@@ -91,16 +89,16 @@ def lateness(late: Array, period: float) -> Figure:
     """How many ticks began how late [ms]."""
     made, ((axes,),) = figure(height=2.6)
     axes.hist(1e3 * late, bins=np.linspace(0.0, 1e3 * max(period, float(late.max())), 60).tolist(), color=BLUE)
-    axes.set_yscale("log")
-    axes.set(xlabel="from due to begun [ms]", ylabel="ticks")
+    logarithmic(axes.yaxis)
+    axes.set(xlabel="from due to begun [ms]", ylabel="ticks [1]")
     return made
 
 
-def _simulated(panel: Axes, course: Course, angle: Array) -> None:
-    assert course.simulated is not None
-    colour = line(course.label)["color"]
-    label = f"{course.label}, simulated"
-    panel.plot(course.simulated[0], np.degrees(angle), color=colour, label=label, **_SIMULATED)
+def _draw_simulated(panel: Axes, course: Course, which: Literal[1, 2]) -> None:
+    """Angle (1) or error (2) in simulation, beside the first repetition alone."""
+    if course.simulated is not None and course.repetition == 0:
+        own: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
+        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | _SIMULATED)
 
 
 def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
@@ -123,6 +121,7 @@ def _finished(
             panel.axvspan(start, end, color=LIGHT, zorder=0.5, label="push")
     for panel in list(panels.values())[-2:]:
         panel.set_xlabel("time [s]")
+        panel.tick_params(labelbottom=True)  # of three panels the second has an empty place below it
     made.suptitle(heading, fontsize=10.0)
     made.supylabel(ylabel, fontsize=10.0)
     legend_below(made)

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from wristctl.control.law import Gain
-from wristctl.report.style import BLACK, colour, figure, legend_below, title
+from wristctl.report.style import BLACK, colour, figure, legend_below, logarithmic, title
 from wristctl.tuning.search import Search
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ def convergence(searches: Sequence[Search]) -> Figure:
     for search in searches:
         median, label = np.median(search.values, axis=1), f"{search.controller}, median of the swarm"
         axes.plot(_iterations(search), median, ":", color=colour(search.controller), linewidth=1.0, label=label)
-    axes.set_yscale("log")
+    logarithmic(axes.yaxis)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set(xlabel="iteration", ylabel="objective [1]")
     legend_below(made, 2)
@@ -45,7 +45,8 @@ def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
         panel.fill_between(iterations, low, high, color=own, alpha=0.2, linewidth=0.0, label="10-90 % of the swarm")
         panel.plot(iterations, median, color=own, linewidth=1.0, linestyle=":", label="median of the swarm")
         panel.step(iterations, best[:, at], color=BLACK, where="post", label="best so far")
-        panel.set(yscale="log", ylim=(gain.low / 1.5, gain.high * 1.5), ylabel=f"{name} [{gain.unit or '1'}]")
+        logarithmic(panel.yaxis)
+        panel.set(ylim=(gain.low / 1.5, gain.high * 1.5), ylabel=f"{name} [{gain.unit or '1'}]")
     axes[-1, 0].xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[-1, 0].set_xlabel("iteration")
     title(axes[0, 0], f"Gains of {search.controller} in their search boxes")

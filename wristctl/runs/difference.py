@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wristctl.config.strict_yaml import parse_yaml
-from wristctl.runs.manifest import CONFIG
+from wristctl.runs.manifest import CONFIG, PACKAGES, SOURCES
 from wristctl.runs.run import Run
 
 _FACTS = ("python", "os", "machine", "cpu", "cores")
@@ -71,7 +71,7 @@ def _code(a: Run, b: Run) -> list[Change]:
         code = run.manifest.code
         commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
         facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
-    files = changes(*(_listing(run.path / "code.txt", "  ", 1) for run in (a, b)))
+    files = changes(*(_listing(run.path / SOURCES, "  ", 1) for run in (a, b)))
     return [*changes(*facts), *(Change(each.name, _short(each.before), _short(each.after)) for each in files)]
 
 
@@ -81,7 +81,7 @@ def _environment(a: Run, b: Run) -> list[Change]:
         for run in (a, b)
     ]
     packages = [
-        run.manifest.environment.packages | _listing(run.path / "environment.txt", "==", 0) for run in (a, b)
+        run.manifest.environment.packages | _listing(run.path / PACKAGES, "==", 0) for run in (a, b)
     ]
     return changes(*facts) + changes(*packages)
 

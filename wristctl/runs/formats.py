@@ -48,14 +48,16 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
-    """A figure as PNG and SVG without date or program version; closes it."""
+    """A figure made without pyplot as PNG and SVG, without date or program version; its layout stays as it is then."""
     import matplotlib as mpl
-    from matplotlib import pyplot as plt
 
+    if layout := figure.get_layout_engine():  # once: savefig would lay out, and draw in vain, for each format
+        figure.set_dpi(dpi)
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     nothing: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
     # in one piece, a line that chatters takes seconds to draw
     with mpl.rc_context({"svg.hashsalt": stem.name, "agg.path.chunksize": 500}):
         for suffix, metadata in nothing.items():
             with replacing(stem.with_name(f"{stem.name}.{suffix}")) as temporary:
                 figure.savefig(temporary, format=suffix, metadata=metadata, dpi=dpi)
-    plt.close(figure)

@@ -109,7 +109,7 @@ def _read_index(results: Path) -> dict[str, Any]:
 
 
 def _write_index(results: Path, runs: dict[str, Any]) -> None:
-    """Replace the index; a folder that cannot be written does without."""
+    """Replace the index; a folder that cannot be written does without. Several may list at once: each its own file."""
     text = json.dumps({"schema": _SCHEMA, "fields": list(Entry.__dataclass_fields__), "runs": runs})
     with suppress(OSError):
         descriptor, temporary = tempfile.mkstemp(prefix=".index", dir=results)

@@ -11,6 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from wristctl.runs.manifest import CONSOLE, EVENTS
+
 
 def now() -> str:
     """The time in UTC, ISO 8601 to the microsecond."""
@@ -38,8 +40,8 @@ class Journal(logging.Handler):
 
     def __init__(self, directory: Path) -> None:
         super().__init__()
-        self._events = (directory / "events.jsonl").open("a", encoding="utf-8", newline="\n")
-        self._console = (directory / "console.log").open("a", encoding="utf-8", newline="\n")
+        self._events = (directory / EVENTS).open("a", encoding="utf-8", newline="\n")
+        self._console = (directory / CONSOLE).open("a", encoding="utf-8", newline="\n")
         self._writing = threading.RLock()
         logging.getLogger("wristctl").addHandler(self)
 

@@ -16,9 +16,15 @@ from wristctl.runs.files import files_below, replacing, sha256_of, sha256_of_lis
 from wristctl.runs.journal import Journal, now, plain
 from wristctl.runs.manifest import (
     CONFIG,
+    CONSOLE,
+    EVENTS,
     MANIFEST,
     METRICS,
+    PACKAGES,
+    PATCH,
+    README,
     REPORT,
+    SOURCES,
     SUMS,
     Column,
     Error,
@@ -39,18 +45,7 @@ Page = Callable[[Path, Manifest], str]
 _RESERVE, _RESERVED = ".reserve", 512 * 1024
 """Space kept from the start, so that a run on a full disk can still say that it failed."""
 _RESULTS = ("data", "models", "figures")
-_RECORDS = {
-    MANIFEST,
-    SUMS,
-    CONFIG,
-    "events.jsonl",
-    "console.log",
-    "environment.txt",
-    "code.patch",
-    "code.txt",
-    "README.md",
-    REPORT,
-}
+_RECORDS = {MANIFEST, SUMS, CONFIG, EVENTS, CONSOLE, PACKAGES, PATCH, SOURCES, README, REPORT}
 
 
 def stream(seed: int, name: str) -> tuple[int, int]:
@@ -71,9 +66,9 @@ class LiveRun:
         self._volatile: set[str] = set()
         self._summary: list[str] = []
         self._began = time.perf_counter(), time.process_time()
-        self._journal = Journal(path)
-        self.event, self.console = self._journal.event, self._journal.console
         self._write_manifest()
+        self._journal = Journal(path)  # last: it listens until the run ends, and a run that cannot begin never does
+        self.event, self.console = self._journal.event, self._journal.console
         self.event("start", kind=manifest.kind)
 
     def stream(self, name: str) -> tuple[int, int]:
@@ -113,7 +108,7 @@ class LiveRun:
         return path
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Write figures/<name>.png and .svg and close the figure."""
+        """Write figures/<name>.png and .svg."""
         formats.write_figure(self.file(f"figures/{name}"), figure)
 
     def metric(
@@ -164,7 +159,7 @@ class LiveRun:
         manifest.timing.max_rss_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
         self._write_report(manifest)
         self._journal.close()
-        write_text(self.path / "README.md", readme(manifest, "\n\n".join(self._summary)))
+        write_text(self.path / README, readme(manifest, "\n\n".join(self._summary)))
         self._write_manifest()
         reserve.unlink(missing_ok=True)
         known = {each.path: each.sha256 for each in manifest.outputs}

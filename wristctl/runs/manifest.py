@@ -7,6 +7,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
+README, EVENTS, CONSOLE = "README.md", "events.jsonl", "console.log"
+SOURCES, PATCH, PACKAGES = "code.txt", "code.patch", "environment.txt"
 TABLES = "tables.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
 

@@ -59,8 +59,12 @@ def select(
 def in_order(found: Sequence[Entry], by: str) -> list[Entry]:
     """Sorted by a field or metric; runs that have none come last."""
     _known(by, found, f"--sort {by}")
-    have = [each for each in found if each.value(by) not in (None, "")]
-    return sorted(have, key=lambda each: each.value(by)) + [each for each in found if each not in have]
+
+    def place(each: Entry) -> tuple[bool, Any]:
+        value = each.value(by)
+        return (True, "") if value in (None, "") else (False, value)
+
+    return sorted(found, key=place)
 
 
 def _known(name: str, found: Sequence[Entry], where: str) -> None:
@@ -81,11 +85,14 @@ def _condition(text: str) -> tuple[str, Any, float]:
 
 
 def _before(age: str, option: str) -> str:
-    found = re.fullmatch(r"([0-9.]+)([smhdw])", age)
-    if not found:
-        raise UserError("not an age", f"{option} {age}", "a number with s, m, h, d or w: 12h, 2d")
-    instant = datetime.now(UTC) - timedelta(seconds=float(found[1]) * _SECONDS[found[2]])
-    return instant.isoformat(timespec="microseconds")
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)([smhdw])", age, re.ASCII)
+    try:
+        if found:
+            instant = datetime.now(UTC) - timedelta(seconds=float(found[1]) * _SECONDS[found[2]])
+            return instant.isoformat(timespec="microseconds")
+    except OverflowError:  # before the calendar begins
+        pass
+    raise UserError("not an age", f"{option} {age}", "a number with s, m, h, d or w: 12h, 2d")
 
 
 def _number(value: Any) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from wristctl.runs.manifest import Manifest, command_of
+from wristctl.runs.manifest import CONFIG, MANIFEST, PACKAGES, PATCH, SUMS, Manifest, command_of
 
 
 def readme(manifest: Manifest, summary: str) -> str:
@@ -33,10 +33,10 @@ def readme(manifest: Manifest, summary: str) -> str:
         "",
         f"- again, with a verdict on each file: `wristctl runs replay {manifest.id}`",
         "- again as a new run, from the folder above: "
-        f"`wristctl {command_of(manifest.kind)} --config {manifest.id}/config.yaml`",
+        f"`wristctl {command_of(manifest.kind)} --config {manifest.id}/{CONFIG}`",
         f"- result hash: `{manifest.result_sha256}`",
-        "- unchanged since: `sha256sum -c SHA256SUMS`",
-        "- code, machine, hashes: `run.json`; packages: `environment.txt`"
-        + "; uncommitted changes: `code.patch`" * bool(manifest.code.dirty),
+        f"- unchanged since: `sha256sum -c {SUMS}`",
+        f"- code, machine, hashes: `{MANIFEST}`; packages: `{PACKAGES}`"
+        + f"; uncommitted changes: `{PATCH}`" * bool(manifest.code.dirty),
     ]
     return "\n".join(lines) + "\n"

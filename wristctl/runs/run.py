@@ -46,7 +46,7 @@ class Run:
         try:
             return Manifest.model_validate_json(file.read_bytes())
         except OSError as error:
-            raise UserError("not a run directory: it has no run.json", str(self.path), _FIX) from error
+            raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), _FIX) from error
         except ValidationError as error:
             raise UserError("not a manifest of a wristctl run", str(file), _FIX) from error
 
@@ -67,7 +67,7 @@ class Run:
             return "broken"
         return "crashed" if state == "running" or not (self.path / SUMS).is_file() else state
 
-    @property
+    @cached_property
     def config(self) -> Study:
         """The resolved study it ran."""
         return load_study([self.path / CONFIG])

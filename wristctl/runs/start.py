@@ -17,14 +17,14 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
+from wristctl.interrupt import interrupts, undisturbed
 from wristctl.runs.code import code_state
 from wristctl.runs.environment import environment_state
 from wristctl.runs.files import replacing, sha256_of, write_text
-from wristctl.runs.interrupt import interrupts, undisturbed
 from wristctl.runs.journal import now
 from wristctl.runs.live import LiveRun, Page
 from wristctl.runs.lock import RunLock
-from wristctl.runs.manifest import CONFIG, Code, Environment, Error, Input, Manifest, Timing
+from wristctl.runs.manifest import CONFIG, PACKAGES, PATCH, SOURCES, Code, Environment, Error, Input, Manifest, Timing
 from wristctl.runs.run import Run
 
 
@@ -116,12 +116,12 @@ def _begin(
     code, patch, sources = code_state()
     environment, packages = environment_state()
     write_text(path / CONFIG, resolved_yaml(study, kind))
-    write_text(path / "environment.txt", packages)
-    write_text(path / "code.txt", sources)
+    write_text(path / PACKAGES, packages)
+    write_text(path / SOURCES, sources)
     if patch:
-        with replacing(path / "code.patch") as temporary:
+        with replacing(path / PATCH) as temporary:
             temporary.write_bytes(patch)
-        code.patch_sha256 = sha256_of(path / "code.patch")
+        code.patch_sha256 = sha256_of(path / PATCH)
     read = [
         Input(
             role=each.role,

@@ -96,7 +96,7 @@ def _targets(reference: Reference, wrist: WristParameters) -> list[tuple[float, 
         return [_angle_target(angle, "reference.angles_deg", wrist) for angle in reference.angles_deg]
     if reference.tip is not None:
         return [_tip_target(reference.tip, "reference.tip", wrist)]
-    return [_angle_target(30.0 if reference.angle_deg is None else reference.angle_deg, "reference.angle_deg", wrist)]
+    return [_angle_target(reference.end_deg, "reference.angle_deg", wrist)]
 
 
 def _angle_target(degrees: float, where: str, wrist: WristParameters) -> tuple[float, float]:

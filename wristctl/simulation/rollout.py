@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +14,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.cores import cores
 from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.disturbances import course
@@ -102,7 +102,7 @@ def rollout(
     streams = np.zeros(count, np.int64) if seeds is None else seeds
     cameras = cameras_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest.sum())
     recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
-    workers = threads or os.cpu_count() or 1
+    workers = threads or cores()
     each = samples * ticks * loop.substeps
     together = max(1, min(_SLICE_TICKS // each, total // (_SHARES * workers)))
     stop, done = threading.Event(), [0] * total
@@ -122,10 +122,10 @@ def rollout(
             )  # fmt: skip
             done[begin:end] = [last] * (end - begin)
 
+    pieces = range(0, total, together)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for future in [pool.submit(run, begin) for begin in range(0, total, together)]:
-                future.result()
+            for _ in pool.map(run, pieces) if min(workers, len(pieces)) > 1 else map(run, pieces):
                 if progress is not None:
                     progress(sum(done) / (total * samples))
         except BaseException:

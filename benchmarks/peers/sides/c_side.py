@@ -1,20 +1,17 @@
-"""The plain loop in C, compiled for this machine, 16 lanes side by side or the width that C_LANES says."""
+"""The plain loop in C, compiled for this machine, with as many lanes side by side as C_LANES says."""
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import os
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from compile_c import compiled
 from equations import SERIES2, SERIES3
 from task import Task
 
-SOURCES = Path(__file__).resolve().parents[1] / "c"
-FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC", "-pthread")
 SUMS = 19
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 _ARRAYS = ("reference", "gains", "state", "sums", "record")
@@ -33,21 +30,14 @@ class _Work(ctypes.Structure):
 
 
 def _library(segments: int, width: int) -> ctypes.CDLL:
-    """Compile, or take what was compiled from the same sources."""
     series = [f"-DSERIES{k}=" + ",".join(map(repr, s)) for k, s in ((2, SERIES2), (3, SERIES3))]
-    options = [*FLAGS, f"-DSEGMENTS={segments}", f"-DLANES={width}", *series]
-    text = "".join(path.read_text() for path in sorted(SOURCES.iterdir())) + " ".join(options)
-    folder = Path(os.environ["PEERS_CACHE"]) / "c"
-    folder.mkdir(parents=True, exist_ok=True)
-    built = folder / f"loop-{hashlib.sha256(text.encode()).hexdigest()[:16]}.so"
-    if not built.exists():
-        subprocess.run(["g++", *options, str(SOURCES / "loop.cpp"), "-o", str(built)], check=True)
-    return ctypes.CDLL(str(built))
+    options = (f"-DSEGMENTS={segments}", f"-DLANES={width}", *series)
+    return compiled("loop.cpp", Path(os.environ["PEERS_CACHE"]), options)
 
 
 def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int], np.ndarray]:
     """One lane runs in a build one lane wide."""
-    library = _library(task.segments, 1 if lanes == 1 else int(os.environ.get("C_LANES", "16")))
+    library = _library(task.segments, 1 if lanes == 1 else int(os.environ["C_LANES"]))
     final = float(task.reference[-1, 0])
 
     def run(ticks: int) -> np.ndarray:

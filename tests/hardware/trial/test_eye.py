@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import threading
 
 import numpy as np
+import pytest
 
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.trial.eye import InlineEye
+from wristctl.hardware.trial.eye import InlineEye, ThreadedEye
 from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.marker import Tracker, Verdict
+from wristctl.hardware.vision.marker import Sighting, Tracker, Verdict
 from wristctl.hardware.vision.scene import Scene
 from wristctl.hardware.vision.view import View
 
@@ -38,3 +40,24 @@ def test_the_same_bytes_again_are_no_angle_and_another_picture_of_the_same_wrist
     assert [each.verdict for each in seen] == [Verdict.OK, Verdict.FROZEN, Verdict.OK, Verdict.FROZEN]
     assert [math.isnan(each.theta) for each in seen] == [False, True, False, True]
     assert eye.look() == []
+
+
+@pytest.mark.parametrize("kind", [InlineEye, ThreadedEye])
+def test_what_is_kept_of_a_frame_is_what_the_loop_is_told(kind: type[InlineEye | ThreadedEye]) -> None:
+    """The angle from zero, not from wherever the markers were glued on."""
+    scene, kept, done = Scene(SceneSettings(), WristParameters()), [], threading.Event()
+
+    def keep(frame: Frame, seen: Sighting) -> None:
+        kept.append(seen)
+        done.set()
+
+    camera = Shown([])
+    eye = kind(camera, Tracker(Markers(), View(), Gates()), keep)
+    eye.zero = 0.1
+    camera._frames.append(Frame(scene.render(np.full((1, 4), 0.05), np.random.default_rng(0)), 0.0, 0))
+    told = eye.look()
+    assert done.wait(30.0)
+    told = told or eye.look()
+    eye.close()
+    assert [each.theta for each in kept] == [each.theta for each in told]
+    assert told[0].theta == pytest.approx(0.1, abs=0.01)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.hardware.trial.log import FRAMES, Disk, Stream
+from wristctl.hardware.trial.log import FRAMES, LOG, Disk, Stream, TrialLog, truth_columns
 
 
 def test_rows_read_back_exactly_and_nan_is_empty(tmp_path: Path) -> None:
@@ -40,3 +41,18 @@ def test_a_full_disk_is_told_and_what_was_pending_is_written_into_the_reserve(tm
     stream.close()
     assert pd.read_csv(tmp_path / "frames.csv")["number"].tolist() == [0, 1, 2]
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_trials_truth_is_written_a_little_with_each_tick_and_whole_at_the_end(tmp_path: Path) -> None:
+    """So that no tick waits for it, and a process that is killed loses no earlier trial's."""
+    log = TrialLog(tmp_path, 2, 5e-3)
+    truth = np.random.default_rng(1).random((1000, len(truth_columns(2)) - 1))
+    log.truth(3, truth)
+    sizes = []
+    for _ in range(10):
+        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": -1})
+        sizes.append(len(pd.read_csv(tmp_path / "truth.csv")))
+    assert sizes[0] > 5 and max(np.diff(sizes)) < 100 and sizes[-1] < 1000
+    log.close()
+    table = pd.read_csv(tmp_path / "truth.csv")
+    assert set(table["trial"]) == {3} and np.array_equal(table.iloc[:, 1:].to_numpy(), truth)

@@ -37,6 +37,7 @@ def test_a_wrist_within_its_limits_goes_on() -> None:
         ({"position": np.array([0.0, -0.0201 / SPOOLS.step, 0.0, 0.0])}, "a spool 20.1 mm from zero"),
         ({"state": State.DISABLED}, "the board is DISABLED"),
         ({"late": 0.051}, "51 ms late"),
+        ({"late": 2.0, "age": 2.1, "state": State.FAULT}, "2000 ms late"),
     ],
 )
 def test_each_limit_stops_by_itself(change: dict[str, Any], said: str) -> None:

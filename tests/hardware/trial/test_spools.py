@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.trial.spools import TENDONS, Paths, on_plus_side, spools_of
+from wristctl.hardware.trial.spools import Paths, on_plus_side, spools_of
+from wristctl.wrist.directions import ACTIVE
 
 WRIST, ACTUATOR = WristParameters(), Actuator(level="tendon")
 SPOOLS = spools_of(ACTUATOR)
@@ -45,7 +46,7 @@ def test_the_change_of_the_taut_length_is_its_derivative() -> None:
 
 def test_each_direction_is_pulled_by_the_papers_two_tendons() -> None:
     for plane, tendons in (("ulnar", {4, 5}), ("flexion", {2, 5})):
-        assert {tendon for tendon, on in zip(TENDONS, on_plus_side(plane), strict=True) if on} == tendons
+        assert {tendon for tendon, on in zip(ACTIVE, on_plus_side(plane), strict=True) if on} == tendons
 
 
 def test_torque_at_the_pulley_is_tension_times_radius() -> None:

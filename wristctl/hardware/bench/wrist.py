@@ -17,18 +17,13 @@ from wristctl.lanes.blocks import to_blocks
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.plant import plant_of
-from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.segments import segments
 
 Array = NDArray[np.float64]
 
-TENDONS = (1, 2, 4, 5)
-"""The tendon on each axis of the board."""
-
 _KEPT = 60_000
 """Periods that are remembered at least."""
-
-_PLANES = {"ulnar": ("ulnar", "radial"), "flexion": ("flexion", "extension")}
 
 
 class Truth(NamedTuple):
@@ -135,8 +130,7 @@ class BenchWrist:
         self._plane = DIRECTIONS[direction].plane
         plant = plant_of(in_plane(self._wrist, direction), self._settings.plant)
         self._plant = to_blocks(segments(plant, self._n)[None])[0]
-        pulling = (tendon for name in _PLANES[self._plane] for tendon in DIRECTIONS[name].tendons)
-        self._sides = np.array([TENDONS.index(tendon) for tendon in pulling])
+        self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
 
     def _make_room(self, count: int) -> None:
         if self._rows + count > len(self._record):

@@ -15,8 +15,8 @@ from wristctl.hardware.trial.homing import Patience, Zero, find_zero, slacken
 from wristctl.hardware.trial.prepare import prepare
 from wristctl.hardware.trial.spools import spools_of
 from wristctl.hardware.trial.stands import Stand
+from wristctl.interrupt import undisturbed
 from wristctl.runs import Run
-from wristctl.runs.interrupt import undisturbed
 
 FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
 

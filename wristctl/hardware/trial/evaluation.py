@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.plant import Push
-from wristctl.hardware.trial.spools import TENDONS, on_plus_side
+from wristctl.hardware.trial.spools import on_plus_side
 from wristctl.hardware.trial.trials import Trial, push_seen, recovery
 from wristctl.simulation.metrics import METRICS, metrics_of
 from wristctl.simulation.reference import Motion
+from wristctl.wrist.directions import ACTIVE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +43,7 @@ def evaluated(
     if not len(time) or time[-1] < followed.horizon - 1.5 * period:
         return found
     grid = followed.time
-    tensions = course[[f"tension_{tendon}" for tendon in TENDONS]].to_numpy(float)
+    tensions = course[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
     plus = on_plus_side(trial.plane)
     sides = np.stack([tensions[:, plus].mean(axis=1), tensions[:, ~plus].mean(axis=1)], axis=1)
     tension = np.stack([np.interp(grid, time, side) for side in sides.T], axis=1)

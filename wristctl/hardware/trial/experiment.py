@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
@@ -28,7 +25,7 @@ from wristctl.hardware.trial.spools import Paths, spools_of
 from wristctl.hardware.trial.stands import Stand
 from wristctl.hardware.trial.steering import Steering
 from wristctl.hardware.trial.trials import Trial
-from wristctl.runs.interrupt import undisturbed
+from wristctl.interrupt import undisturbed
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -84,7 +81,6 @@ class Experiment:
         self.stop: Stop | None = None
         self.zero: Zero | None = None
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
-        self._truths: dict[int, NDArray[np.float64]] = {}
 
     def run(self, stand: Stand, shown: Shown | None = None) -> None:
         """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
@@ -107,10 +103,6 @@ class Experiment:
             with undisturbed():
                 halt(board, self._settings.safety.watchdog)
                 board.close()
-                try:
-                    self._write_truths()
-                except OSError as error:
-                    raise _of_the_log(error) from error
         finally:
             stand.close()
 
@@ -147,9 +139,8 @@ class Experiment:
             self.zero = self._home(board, eye, plane)
             marker = self.zero.marker
         eye.zero = marker
-        toward = "ulnar" if plane == "ulnar" else "flexion"
         loop = ControlLoop(
-            board, eye, settings, in_plane(self._wrist, toward), plane, self.zero.signs, self.timing, self._log, shown,
+            board, eye, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log, shown,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
@@ -178,12 +169,7 @@ class Experiment:
         if self._under_way is not None:
             number, start = self._under_way
             self.outcomes[number], self._under_way = outcome, None
-            self._truths[number] = stand.truth(start)
-
-    def _write_truths(self) -> None:
-        """Once the motors stand: thousands of rows take longer than a tick may be late."""
-        for number, rows in self._truths.items():
-            self._log.truth([number, *row] for row in rows.tolist())
+            self._log.truth(number, stand.truth(start))
 
     def _stopped(self, stand: Stand, board: Board, error: BaseException) -> None:
         """Stop the motors and let the board go, then note what happened."""
@@ -198,7 +184,6 @@ class Experiment:
         self._log.disk.give_up_reserve()
         try:
             self._trial_ended(stand, self.stop.reason)
-            self._write_truths()
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
 

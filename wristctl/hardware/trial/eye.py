@@ -39,7 +39,8 @@ class InlineEye:
 
     def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
         self._camera, self._tracker, self._keep = camera, tracker, keep
-        self._before: Frame | None = None
+        self.frame: Frame | None = None
+        """The newest."""
         self.zero = 0.0
 
     def look(self) -> list[Sighting]:
@@ -48,22 +49,25 @@ class InlineEye:
         if frame is None:
             return []
         seen = self._tracker.see(frame)
-        if self._before is not None and np.array_equal(frame.image, self._before.image):
+        if self.frame is not None and np.array_equal(frame.image, self.frame.image):
             seen = seen._replace(theta=math.nan, verdict=Verdict.FROZEN)
-        self._before = frame
+        self.frame, seen = frame, seen._replace(theta=seen.theta - self.zero)
         if self._keep is not None:
             self._keep(frame, seen)
-        return [seen._replace(theta=seen.theta - self.zero)]
+        return [seen]
 
     def close(self) -> None:
         """Nothing goes on between looks."""
 
 
 class ThreadedEye:
-    """Looks in a thread of its own, so that the loop waits neither for the camera nor for the tracker."""
+    """Looks in a thread of its own, so that the loop waits neither for the camera nor for the tracker.
+
+    A frame is kept once the loop can have its angle: drawing and encoding it takes milliseconds.
+    """
 
     def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
-        self._inner = InlineEye(camera, tracker, keep)
+        self._inner, self._keep = InlineEye(camera, tracker), keep
         self.zero = 0.0
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None
@@ -90,6 +94,8 @@ class ThreadedEye:
             while not self._stop.is_set():
                 if found := self._inner.look():
                     self._seen.extend(found)
+                    if self._keep is not None and self._inner.frame is not None:
+                        self._keep(self._inner.frame, found[0]._replace(theta=found[0].theta - self.zero))
                 else:
                     time.sleep(1e-3)
         except BaseException as error:  # handed to the loop, which stops the motors

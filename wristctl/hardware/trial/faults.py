@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from wristctl.config.bench import Fault
+from wristctl.hardware.bench.faults import Faults
 from wristctl.hardware.trial.steering import Answer
 
 
@@ -13,19 +14,15 @@ class HostFaults:
     """Those of the bench's faults that happen in the control loop; times count from the trial's motion."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
-        self._faults = tuple(faults)
+        self._faults = Faults(faults)
+        self._faults.begin(0.0)
 
     def answer(self, answer: Answer, time: float) -> Answer:
         """The law's answer; NaN under model-nan. Raises ArithmeticError under controller-exception."""
-        if self._on("controller-exception", time):
+        if self._faults.on("controller-exception", time):
             raise ArithmeticError("injected fault")
-        return answer._replace(torque_wanted=math.nan) if self._on("model-nan", time) else answer
+        return answer._replace(torque_wanted=math.nan) if self._faults.on("model-nan", time) else answer
 
     def disk(self, time: float) -> bool:
         """Whether the disk is full."""
-        return self._on("disk-full", time)
-
-    def _on(self, kind: str, time: float) -> bool:
-        return any(
-            fault.kind == kind and 0.0 <= time - fault.at < (fault.duration or math.inf) for fault in self._faults
-        )
+        return self._faults.on("disk-full", time)

@@ -22,7 +22,8 @@ from wristctl.hardware.board import Board
 from wristctl.hardware.messages import AXES, JOG_RATE, Flag, Target
 from wristctl.hardware.trial.eye import Eye
 from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.spools import TENDONS, Spools, on_plus_side
+from wristctl.hardware.trial.spools import Spools, on_plus_side
+from wristctl.wrist.directions import ACTIVE
 
 Array = NDArray[np.float64]
 
@@ -108,7 +109,7 @@ class _Finder:
                     return reeled
             self._let_go(axis, 0)
         slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
-        what = f"axis {axis} (tendon {TENDONS[axis]}) does not bend the wrist within {slack:g} mm"
+        what = f"axis {axis} (tendon {ACTIVE[axis]}) does not bend the wrist within {slack:g} mm"
         raise SafetyStop(what, "homing", f"{fix}; or raise homing.slack")
 
     def slacken(self) -> None:
@@ -127,10 +128,10 @@ class _Finder:
                 bends.append(bend)
         self._let_go(axis, -2 * self._pull)
         if len(reeled) < 3:
-            raise SafetyStop(f"tendon {TENDONS[axis]} pulls differently each time", "homing", "see whether it slips")
+            raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, bends, 1)
         if (slope > 0.0) != bool(self._plus[axis]):
-            what = f"axis {axis} bends the wrist to the other side than tendon {TENDONS[axis]} should"
+            what = f"axis {axis} bends the wrist to the other side than tendon {ACTIVE[axis]} should"
             raise SafetyStop(what, "homing", "check which tendon is on which motor, and markers.positive")
         return float(-offset / slope), float(1.0 / abs(slope))
 
@@ -187,6 +188,6 @@ def find_zero(
     taut, slopes = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
     senses = finder.settle(taut)
     slack = tuple(spools.step * each for each in taut)
-    for each in zip(TENDONS, senses, slack, slopes, strict=True):
+    for each in zip(ACTIVE, senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", each[0], each[1], 1e3 * each[2], each[3])
     return Zero(senses, slopes, finder.straight, slack)

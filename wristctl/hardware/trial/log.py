@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.trial.spools import TENDONS
+from wristctl.wrist.directions import ACTIVE
 
 Columns = Mapping[str, tuple[str, str]]
 """Name -> unit and meaning."""
 
 
 def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
-    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in TENDONS}
+    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in ACTIVE}
 
 
 LOG: Columns = {
@@ -59,6 +59,8 @@ FRAMES: Columns = {
 }
 
 _RESERVED = 4 << 20
+_AT_ONCE = 40
+"""Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by."""
 
 
 def truth_columns(segments: int) -> Columns:
@@ -141,24 +143,36 @@ class TrialLog:
             self.streams["truth"] = Stream(folder / "truth.csv", truth_columns(segments), self.disk)
         self.last: deque[dict[str, Any]] = deque(maxlen=round(1.0 / period))
         """The last second of ticks."""
+        self._truth: deque[tuple[int, NDArray[np.float64]]] = deque()
 
     def tick(self, row: Mapping[str, Any]) -> None:
-        """One control tick; in between.csv where it belongs to no trial."""
+        """One control tick; in between.csv where it belongs to no trial. Some of the truth that waits goes with it."""
         self.last.append(dict(row))
         self.streams["between" if row["trial"] < 0 else "log"].row(row[name] for name in LOG)
+        self._write_truth(_AT_ONCE)
 
     def frame(self, *values: Any) -> None:
         """One frame of a trial."""
         self.streams["frames"].row(values)
 
-    def truth(self, rows: Iterable[Iterable[Any]]) -> None:
-        """What the bench knows of a trial."""
-        self.streams["truth"].rows(rows)
+    def truth(self, trial: int, rows: NDArray[np.float64]) -> None:
+        """What the bench knows of a trial, by the columns after the first; the ticks to come write it, or the end does.
+
+        Thousands of rows in one piece would take longer than a tick may be late.
+        """
+        self._truth.extend((trial, row) for row in rows)
+
+    def _write_truth(self, most: int) -> None:
+        if self._truth:
+            some = [self._truth.popleft() for _ in range(min(most, len(self._truth)))]
+            self.streams["truth"].rows([trial, *row.tolist()] for trial, row in some)
 
     def close(self) -> None:
         """Write what is left, if need be into the space reserved for it. Raises OSError."""
         self.disk.give_up_reserve()
-        for each in self.streams.values():
+        for name, each in self.streams.items():
+            if name == "truth":  # the last, and the largest
+                self._write_truth(len(self._truth))
             each.close()
 
 
@@ -167,7 +181,7 @@ def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
     return {
         f"{name}_{tendon}": value
         for name, four in values.items()
-        for tendon, value in zip(TENDONS, four.tolist(), strict=True)
+        for tendon, value in zip(ACTIVE, four.tolist(), strict=True)
     }
 
 

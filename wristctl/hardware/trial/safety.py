@@ -48,8 +48,11 @@ class Monitor:
         self._limits, self._spools = limits, spools
 
     def see(self, seen: Seen) -> None:
-        """Judge what was measured."""
+        """Judge what was measured. A late tick comes first: what it sees is late as well."""
         limits, angle = self._limits, seen.estimate.theta
+        if seen.late > limits.late:
+            what = f"a tick came {1e3 * seen.late:.0f} ms late"
+            raise SafetyStop(what, fix="close other programs, or a longer control_period")
         if not all(map(math.isfinite, seen.estimate)):
             raise SafetyStop("the observer's estimate is not a number", fix="see the frames in data/frames.csv")
         if abs(angle) > math.radians(limits.angle_deg):
@@ -71,9 +74,6 @@ class Monitor:
             raise SafetyStop(f"a spool {1e3 * reeled:.1f} mm from zero, beyond {1e3 * limits.travel:g} mm", fix=fix)
         if seen.state != State.ENABLED:
             raise SafetyStop(f"the board is {seen.state.name}, not ENABLED", fix="home again")
-        if seen.late > limits.late:
-            what = f"a tick came {1e3 * seen.late:.0f} ms late"
-            raise SafetyStop(what, fix="close other programs, or a longer control_period")
 
     def answer(self, answer: Answer) -> None:
         """Judge what the law wants."""

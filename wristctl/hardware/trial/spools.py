@@ -23,20 +23,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.directions import DIRECTIONS
+from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
 
 Array = NDArray[np.float64]
 
-TENDONS = (1, 2, 4, 5)
-"""The tendon that each of the board's axes winds."""
-
 
 def on_plus_side(plane: str) -> NDArray[np.bool_]:
     """Which axes wind a tendon of the + side of this bending plane (ulnar or flexion), (4,)."""
-    pulling = DIRECTIONS[plane].tendons
-    return np.array([tendon in pulling for tendon in TENDONS])
+    return np.isin(ACTIVE, tendons_of(plane)[:2])
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
+
+if TYPE_CHECKING:
+    from wristctl.runs import Run
 
 Array = NDArray[np.float64]
 
@@ -64,6 +67,11 @@ class View:
         arrays = {name: getattr(self, name).tolist() for name in _ARRAYS}
         text = json.dumps({"schema": SCHEMA, "size": self.size, **arrays, **more}, indent=2, allow_nan=False)
         file.write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def of(cls, run: Run | None) -> Self:
+        """As a calibrate-camera run found it; square without one. Raises UserError."""
+        return cls.load(run.file(FILE)) if run else cls()
 
     @classmethod
     def load(cls, file: Path) -> Self:

@@ -1,4 +1,4 @@
-"""SIGTERM counts as Ctrl-C, and neither may disturb the sealing of a run."""
+"""SIGTERM counts as Ctrl-C; where something must come to its end, neither disturbs it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _handled(handlers: dict[signal.Signals, Any]) -> Iterator[None]:
 
 @dataclass
 class Interrupts:
-    """Whether Ctrl-C or SIGTERM has come: a KeyboardInterrupt in a compiler's callback is lost on its way up."""
+    """Whether Ctrl-C or SIGTERM has come: whoever compiles or builds a model meanwhile may raise another error."""
 
     asked: bool = False
 
