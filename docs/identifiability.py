@@ -12,7 +12,7 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.fit import Problem, linearise
 from wristctl.identification.identifiability import widest, width_text
-from wristctl.identification.intervals import NORMAL_95, condition, information_of, inverse
+from wristctl.identification.intervals import condition, promised
 from wristctl.identification.rehearsal import Truth, rehearse
 from wristctl.identification.trials import trials_of
 
@@ -33,7 +33,7 @@ EXPERIMENTS = {
     "upright and level, eight steps": ((UPRIGHT, LEVEL), STEPS, {}),
     "the same, radius known to 0.1 %": ((UPRIGHT, LEVEL), STEPS, {"radius_error": 0.001}),
 }
-NOISE = np.deg2rad(0.1)
+NOISE = np.deg2rad(Truth.noise_deg)
 
 
 def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, float]) -> list[str]:
@@ -43,12 +43,13 @@ def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, f
         wrist = pose.model_copy(update={"stiffness": 0.7 * pose.stiffness})
         truth, rng = Truth(wrist, actuator), np.random.default_rng(number)
         tables = rehearse(pose, truth, [(side, moves) for side in SIDES], 5.0, rng)
-        trials += trials_of(f"run {number}", pose, actuator.step_length, settings.step, *tables)
+        length, label = actuator.step_length, f"run {number}"
+        trials += trials_of(label, pose, length, settings.step, *tables, exposure=truth.exposure)
     start = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
     tendons = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction}
     problem = Problem(trials, start | tendons | {"delay": truth.delay}, settings)
     slopes, weights = [each / NOISE for each in linearise(problem, problem.begin()).slopes], problem.prior()
-    half = NORMAL_95 * np.sqrt(np.diag(inverse(information_of(slopes, weights))))
+    half = promised(problem, slopes)
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
     told = [
         text if half[at] <= widest(name, settings) else f"~~{text}~~"
@@ -65,7 +66,7 @@ def main() -> None:
     (HERE / "identifiability.md").write_text(
         "# What can be identified from what\n\nMade by `python docs/identifiability.py`: half the 95 % interval that "
         "each experiment promises, all of its parameters found together, by the Jacobian at the true ones (springs 30 "
-        "% softer than believed, 20 kN/m tendons, 60 frames a second with 0.1 deg of noise, four directions of 5 s "
+        "% softer than believed, 20 kN/m tendons, 60 frames a second with 0.05 deg of noise, four directions of 5 s "
         "for each pose; level: the forearm level and rolled by 45 deg, gravity across both planes). Struck out: too "
         "wide to count as identified.\n\n" + "\n".join(lines) + "\n"
     )

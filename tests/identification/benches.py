@@ -36,6 +36,7 @@ def bench(seed: int, **truth: float) -> tuple[Callable[[WristParameters], Truth]
     """A bench whose wrist has 30 % softer springs, with small errors of its own drawn from the seed: Truth by pose."""
     rng = np.random.default_rng(seed)
     radius = KNOWN.tendon_radius * (1.0 + 0.01 * rng.standard_normal())
+    clock = IdentifySettings().clock_error * rng.standard_normal()
     values = {
         "stiffness": 0.7 * KNOWN.stiffness, "damping": KNOWN.damping, "tendon_stiffness": 20e3, "friction": 0.1,
         "delay": 0.03, "tendon_radius": radius,
@@ -46,7 +47,7 @@ def bench(seed: int, **truth: float) -> tuple[Callable[[WristParameters], Truth]
         tendons = {name: values[name] for name in ("tendon_stiffness", "friction")}
         zero, taut = 0.1 * rng.standard_normal(2), 2e-5 * rng.standard_normal(4)
         return Truth(
-            pose.model_copy(update=own), TENDONS.model_copy(update=tendons), values["delay"],
+            pose.model_copy(update=own), TENDONS.model_copy(update=tendons), values["delay"] + clock,
             zero_deg=tuple(zero), taut=tuple(taut),
         )  # fmt: skip
 
@@ -65,7 +66,7 @@ def logged(
     rng, trials = np.random.default_rng([seed, 1]), []
     for number, pose in enumerate(poses):
         tables = rehearse(pose, made(pose), [(each, moves) for each in directions], 5.0, rng)
-        trials += trials_of(f"run {number}", pose, TENDONS.step_length, 1e-3, *tables)
+        trials += trials_of(f"run {number}", pose, TENDONS.step_length, 1e-3, *tables, exposure=Truth.exposure)
     return trials, values
 
 

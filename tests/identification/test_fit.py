@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,15 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
 from wristctl.identification.fit import Fit, fit, linearise
 from wristctl.identification.forward import Candidate, angles
-from wristctl.identification.intervals import autocorrelation, bandwidth, condition, interval, knowledge, long_run
+from wristctl.identification.intervals import (
+    autocorrelation,
+    bandwidth,
+    condition,
+    inflation,
+    interval,
+    knowledge,
+    long_run,
+)
 from wristctl.identification.rehearsal import spools
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -118,6 +127,41 @@ def test_residuals_that_are_alike_widen_what_they_tell_of_a_mean() -> None:
         lags = bandwidth(autocorrelation([noise]), len(noise))
         ratios.append(float(long_run(noise[:, None], lags)[0, 0] / (noise @ noise)))
     assert np.mean(ratios) == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.15)
+
+
+def test_a_small_error_that_lasts_is_seen_behind_the_noise_of_single_frames() -> None:
+    """Its share of the variance is counted as often as it stays: here 5 %, dying away by 1/e in 20 frames."""
+    rng, stays, share = np.random.default_rng(0), np.exp(-1.0 / 20.0), 0.05
+    found = []
+    for _ in range(300):
+        lasting = np.sqrt(share * (1.0 - stays**2)) * rng.standard_normal(1000)
+        lasting[0] /= np.sqrt(1.0 - stays**2)
+        for at in range(1, len(lasting)):
+            lasting[at] += stays * lasting[at - 1]
+        found.append(inflation([lasting + np.sqrt(1.0 - share) * rng.standard_normal(1000)], 30))
+    lags = np.arange(1, 31)
+    assert np.mean(found) == pytest.approx(1.0 + 2.0 * share * ((1.0 - lags / 31.0) * stays**lags).sum(), rel=0.05)
+
+
+def test_a_picture_shows_the_mean_of_its_exposure() -> None:
+    """Of a sine the mean over a time e is sin(w e/2)/(w e/2) of it."""
+    (trial, *_), _ = logged(0, poses=(UPRIGHT,), directions=("ulnar",))
+    rate, exposure = 2.0 * np.pi * 10.0, 0.02
+    within = trial.captured[(trial.captured > 0.1) & (trial.captured < 4.9)]
+    seen = replace(trial, exposure=exposure, captured=within).shown(np.sin(rate * trial.time), 0.03)
+    weaker = np.sin(0.5 * rate * exposure) / (0.5 * rate * exposure)
+    assert weaker < 0.95
+    np.testing.assert_allclose(seen, weaker * np.sin(rate * (within - 0.03)), rtol=0.0, atol=4e-3)
+
+
+def test_what_the_clocks_may_be_off_by_widens_the_delay_and_nothing_else() -> None:
+    trials, _ = logged(0, poses=(UPRIGHT,), directions=("flexion",))
+    fitted = fit(problem(trials, clock_error=0.0))
+    sure = knowledge(fitted).deviation
+    unsure = knowledge(replace(fitted, problem=problem(trials, clock_error=3e-3))).deviation
+    at = fitted.problem.coordinates["delay"]
+    assert unsure[at] == pytest.approx(np.hypot(sure[at], 3e-3))
+    assert np.delete(unsure, at) == pytest.approx(np.delete(sure, at))
 
 
 def test_the_condition_number_sees_columns_that_point_the_same_way_whatever_their_length() -> None:

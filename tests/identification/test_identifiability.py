@@ -63,7 +63,7 @@ def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay()
 def _tables(push: float, verdict: str) -> tuple[pd.DataFrame, ...]:
     time = [0.005 * k for k in range(100)]
     steps = {f"position_{tendon}": [tendon * k for k in range(100)] for tendon in (1, 2, 4, 5)}
-    log = pd.DataFrame({"trial": 0, "time": time} | steps)
+    log = pd.DataFrame({"trial": 0, "time": time, "counted": [each + 0.5e-3 for each in time]} | steps)
     frames = pd.DataFrame({"trial": 0, "captured": time, "used": time, "theta": 0.1, "verdict": "ok"})
     frames.loc[:49, "verdict"] = verdict
     return log, frames, pd.DataFrame({"trial": [0], "direction": ["extension"], "push": [push]})

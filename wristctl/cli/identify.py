@@ -75,8 +75,12 @@ def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
     for run in inputs.values():
         config = run.config
         actuator = config.hw_run.actuator
-        wrist, tables = config.wrist, [run.data(name) for name in ("log", "frames", "trials")]
-        trials += trials_of(run.id, wrist, actuator.step_length, settings.step, *tables)
+        wrist, (ticks, frames, kinds) = config.wrist, (run.data(name) for name in ("log", "frames", "trials"))
+        exposure = settings.exposure
+        if exposure is None:
+            exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
+        length = actuator.step_length
+        trials += trials_of(run.id, wrist, length, settings.step, ticks, frames, kinds, exposure)
         own = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
         known = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction, "delay": 0.0}
         start = start or own | known

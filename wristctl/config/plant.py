@@ -65,7 +65,7 @@ class Sensor(Section):
     level: Literal["ideal", "camera"] = choice("ideal", "how the angle is measured")
     frame_rate: float = quantity(60.0, "1/s", "frames per second", "assumed", gt=0)
     delay_frames: float = quantity(2.0, "", "frames between capture and use", "assumed", ge=0, le=20)
-    noise_deg: float = quantity(0.1, "deg", "standard deviation of the angle", "measured on rendered markers", ge=0)
+    noise_deg: float = quantity(0.1, "deg", "standard deviation of the angle", "rendered markers: 0.025", ge=0)
     dropped: float = quantity(0.05, "", "share of frames without a result", "assumed", ge=0, lt=1)
     seed: int = choice(0, "stream of noise and dropped frames", ge=0)
     torque_noise: float = quantity(5e-4, "N m s^0.5", "observer: white torque that its model does not know", gt=0)

@@ -123,13 +123,13 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         nudges = [_NUDGE_M if name.startswith(_SPOOL) else _NUDGE for name in moved]
         near = [x + nudge * (np.arange(len(x)) == coordinates[name]) for name, nudge in zip(moved, nudges, strict=True)]
         course = problem.simulate(trial, [problem.candidate(trial, each) for each in (x, *near)])
-        expected, *others = (np.interp(trial.captured - delay, trial.time, each) for each in course)
+        expected, *others = (trial.shown(each, delay) for each in course)
         slopes = np.zeros((len(expected), len(x)))
         for name, nudge, other in zip(moved, nudges, others, strict=True):
             slopes[:, coordinates[name]] = (other - expected) / nudge
         if "delay" in problem.free:
             h = problem.settings.step
-            early, late = (np.interp(trial.captured - delay + shift, trial.time, course[0]) for shift in (-h, h))
+            early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
             slopes[:, coordinates["delay"]] = (early - late) / (2.0 * h)
         slopes[:, coordinates[_zero(trial)]] = 1.0
         return expected + x[coordinates[_zero(trial)]], slopes

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification.fit import Fit, Problem, linearise
-from wristctl.identification.intervals import NORMAL_95, Knowledge, information_of, inverse
+from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.trials import Trial
 from wristctl.identification.unknowns import UNKNOWNS
 
@@ -115,7 +115,7 @@ def _addition(fit: Fit, x: Array, what: str, move: Added, load: Added) -> Additi
     for name, at in fit.problem.coordinates.items():
         wider[problem.coordinates[name]] = x[at]
     slopes = [each / fit.noise for each in linearise(problem, wider).slopes]
-    half = NORMAL_95 * np.sqrt(np.diag(inverse(information_of(slopes, problem.prior()))))
+    half = promised(problem, slopes)
     widths = {name: float(half[at]) for at, name in enumerate(problem.free)}
     enough = all(width <= widest(name, problem.settings) for name, width in widths.items())
     return Addition(what, widths, enough)
@@ -170,8 +170,7 @@ def budget(fit: Fit, known: Knowledge) -> dict[str, dict[str, float]]:
         changed = {name: turned if name == "gravity" else 1.01 * getattr(trial.wrist, name) for name in KNOWN}
         candidates = [problem.candidate(trial, fit.x, **{name: value}) for name, value in changed.items()]
         course = problem.simulate(trial, [problem.candidate(trial, fit.x), *candidates])
-        at = trial.captured - fit.values["delay"]
-        expected, *others = (np.interp(at, trial.time, each) for each in course)
+        expected, *others = (trial.shown(each, fit.values["delay"]) for each in course)
         for name, other in zip(KNOWN, others, strict=True):
             push[name] += weights * slopes.T @ (other - expected)
     bread = inverse(known.information)

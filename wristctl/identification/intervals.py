@@ -2,7 +2,9 @@
 
 Neighbouring residuals may be alike (an error of the model, the camera's filter). The covariance is therefore the
 sandwich of Newey and West (Econometrica 55 (1987) 703) within each trial, with Andrews' bandwidth for a first-order
-autoregression (Econometrica 59 (1991) 817); no interval is narrower than independent frames would allow.
+autoregression (Econometrica 59 (1991) 817). No interval is narrower than so many independent frames would allow as the
+residuals are worth: small errors that last (the average of the base's marker, a rest on the same pixels) hide behind
+the noise of single frames, and show in the sum of the autocorrelations over half a second.
 """
 
 from __future__ import annotations
@@ -13,12 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.identification.fit import Fit
+from wristctl.identification.fit import Fit, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959964
+_LASTING = 30
+"""Frames over which small errors are alike: half a second at 60 a second."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +68,25 @@ def knowledge(fit: Fit) -> Knowledge:
         meat = meat + long_run(slope * residual[:, None], lags) * count / max(1, count - len(fit.problem.free))
     bread = inverse(information)
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
-    alike = 1.0 + 2.0 * sum((1.0 - lag / (lags + 1.0)) * rho**lag for lag in range(1, lags + 1))
-    deviation = np.sqrt(np.maximum(np.diag(bread), np.diag(bread @ meat @ bread)))
-    return Knowledge(deviation, information, condition(stacked), rho, count / max(alike, 1e-3))
+    alike = max(1.0, inflation(residuals, _LASTING))
+    deviation = np.sqrt(np.maximum(alike * np.diag(bread), np.diag(bread @ meat @ bread)))
+    deviation = _with_clocks(fit.problem, deviation)
+    return Knowledge(deviation, information, condition(stacked), rho, count / alike)
+
+
+def promised(problem: Problem, slopes: Sequence[Array]) -> Array:
+    """Half the 95 % interval of each coordinate that frames with these slopes, in standard deviations, would leave."""
+    bread = inverse(information_of(slopes, problem.prior()))
+    return NORMAL_95 * _with_clocks(problem, np.sqrt(np.diag(bread)))
+
+
+def _with_clocks(problem: Problem, deviation: Array) -> Array:
+    """An error of the clocks is a delay, and nothing in the trials tells the two apart."""
+    wider = deviation.copy()
+    if "delay" in problem.free:
+        at = problem.coordinates["delay"]
+        wider[at] = np.hypot(wider[at], problem.settings.clock_error)
+    return wider
 
 
 def information_of(slopes: Sequence[Array], weights: Array) -> Array:
@@ -96,6 +116,13 @@ def autocorrelation(residuals: Sequence[Array]) -> float:
     """Correlation of each residual with the next one of its trial."""
     both = sum(float(each[:-1] @ each[1:]) for each in residuals)
     return float(np.clip(both / sum(float(each @ each) for each in residuals), -0.97, 0.97))
+
+
+def inflation(residuals: Sequence[Array], lags: int) -> float:
+    """How many times the variance of a mean is what it would be if residuals were independent (Bartlett)."""
+    total = sum(float(each @ each) for each in residuals)
+    means = sum(float(long_run(each[:, None], lags)[0, 0]) for each in residuals)
+    return means / total
 
 
 def bandwidth(rho: float, length: float) -> int:

@@ -47,10 +47,11 @@ class Truth:
     wrist: WristParameters
     actuator: Actuator
     delay: float = 0.03
-    noise_deg: float = 0.1
+    noise_deg: float = 0.05
     zero_deg: tuple[float, float] = (0.0, 0.0)
     taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     frame_rate: float = 60.0
+    exposure: float = 4e-3
     dropped: float = 0.05
 
 
@@ -93,11 +94,12 @@ def rehearse(
         time = _PERIOD * np.arange(len(angle))
         ticks = slice(None, None, _LOGGED)
         steps = np.rint(reeled[ticks] / truth.actuator.step_length).astype(int)
-        columns = {"trial": number, "time": time[ticks]}
+        columns = {"trial": number, "time": time[ticks], "counted": time[ticks] + 0.5 * _PERIOD}
         tendons = enumerate(tendons_of(side.plane))
         logs.append(pd.DataFrame(columns | {f"position_{tendon}": steps[:, at // 2] for at, tendon in tendons}))
         captured = np.arange(rng.uniform(0.0, 1.0), horizon * truth.frame_rate) / truth.frame_rate
-        theta = np.interp(captured - truth.delay, time, angle) + np.deg2rad(
+        open_ = captured - truth.delay + truth.exposure * np.linspace(-0.5, 0.5, 41)[:, None]
+        theta = np.interp(open_, time, angle).mean(axis=0) + np.deg2rad(
             truth.noise_deg * rng.standard_normal(len(captured)) + truth.zero_deg[side.plane == "flexion"]
         )
         kept = rng.random(len(captured)) >= truth.dropped

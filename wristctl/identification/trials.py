@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 _FEWEST = 20
 """Frames that a trial must have to be of use."""
 
+_INSTANTS = 5
+"""Instants of an exposure whose mean stands for it."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -38,11 +41,19 @@ class Trial:
     """Time stamps of the frames, (F,) [s]."""
     angle: Array
     """What they show, (F,) [rad]."""
+    exposure: float
+    """How long the shutter is open, about the time stamp [s]; the picture shows the mean of that time."""
 
     @property
     def tendons(self) -> tuple[int, int, int, int]:
         """The tendons in the order of `reeled`."""
         return tendons_of(self.plane)
+
+    def shown(self, course: Array, delay: float) -> Array:
+        """What the frames (F,) would show of angles (T,) on the grid, `delay` [s] before their time stamps."""
+        since = self.exposure * ((np.arange(_INSTANTS) + 0.5) / _INSTANTS - 0.5)
+        found: Array = np.interp(self.captured - delay + since[:, None], self.time, course).mean(axis=0)
+        return found
 
     def faster(self, factor: float) -> Trial:
         """The same motion in a fraction of the time, then at rest, as often seen."""
@@ -53,11 +64,12 @@ class Trial:
 
 def trials_of(
     label: str, wrist: WristParameters, step_length: float, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
-    kinds: pd.DataFrame,
+    kinds: pd.DataFrame, exposure: float = 0.0,
 ) -> list[Trial]:  # fmt: skip
     """The trials of a run's tables log, frames and trials, without a person's push, on a grid [s].
 
-    `step_length` is what one microstep reels in [m]. UserError where no trial is of use.
+    `step_length` is what one microstep reels in [m], `exposure` how long the shutter is open [s]. UserError where no
+    trial is of use.
     """
     from scipy.interpolate import CubicSpline
 
@@ -75,10 +87,11 @@ def trials_of(
             continue
         trial = Trial(
             f"{label}, trial {number}: {direction}", label, DIRECTIONS[direction].plane, in_plane(wrist, direction),
-            time, np.empty((len(time), 4)), captured[usable], angle[usable],
+            time, np.empty((len(time), 4)), captured[usable], angle[usable], exposure,
         )  # fmt: skip
         steps = own[[f"position_{tendon}" for tendon in trial.tendons]].to_numpy(float)
-        reeled = step_length * CubicSpline(clock, steps)(time)  # chords would cut the corners of 5 ms
+        # What is held over a step is what its middle has. Chords would cut the corners of 5 ms.
+        reeled = step_length * CubicSpline(own.counted, steps)(time + 0.5 * grid)
         found.append(replace(trial, reeled=reeled))
     if not found:
         raise UserError(

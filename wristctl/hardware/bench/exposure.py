@@ -27,7 +27,7 @@ class Exposure(NamedTuple):
     """middle of the exposure [s]"""
     shown: int
     theta: Array
-    """(k, n) at k instants [rad]"""
+    """(k, n) of k parts of the exposure [rad]"""
     covered: bool
     swapped: bool
     seed: int

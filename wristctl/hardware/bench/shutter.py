@@ -11,9 +11,9 @@ from wristctl.hardware.bench.exposure import Exposure, stream
 from wristctl.hardware.bench.faults import Faults
 from wristctl.hardware.bench.wrist import BenchWrist
 
-_SMEAR, _MOST_INSTANTS = np.deg2rad(0.25), 8
-"""Turn of the last disc (about half a pixel of its marker's way) for which an instant of the exposure is drawn, and how
-many are drawn at most."""
+_SMEAR, _MOST_INSTANTS, _WITHIN = np.deg2rad(0.25), 8, 8
+"""Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how
+many are drawn at most; moments whose mean a part shows."""
 
 
 class Shutter:
@@ -47,9 +47,10 @@ class Shutter:
         ends = self._wrist.angles(np.array([at - half, at + half]))
         turned = abs(ends.sum(axis=1) @ [-1.0, 1.0])
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
-        instants = at + half * (2.0 * np.arange(count) + 1.0 - count) / count
+        moments = at + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
+        parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
         covered, swapped = (self._faults.on(kind, at) for kind in ("marker-covered", "markers-swapped"))
-        return Exposure(number, time, shown, self._wrist.angles(instants), covered, swapped, self._seed)
+        return Exposure(number, time, shown, parts, covered, swapped, self._seed)
 
     def _time(self, number: int) -> float:
         return number / self._settings.frame_rate

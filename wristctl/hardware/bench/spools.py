@@ -132,7 +132,8 @@ def follow(
 
     `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on, `sides`
     the axes of two tendons on the + and two on the - side, `tendon` the Drive of one tendon. A row of `out` is what
-    is so at a period's end: angles, rates, pulls, reeled lengths. A wrist bent beyond a full turn stops there.
+    is so at a period's end: angles, rates; and what was in its middle, and held throughout: pulls, reeled lengths. A
+    wrist bent beyond a full turn stops there.
     """
     undisturbed = load_segments(rows_of(plant))
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
@@ -142,8 +143,8 @@ def follow(
     zero = 0.0 * reeled[0]
     at = 0
     for k in range(acting.shape[0]):
-        end = (first + k + 1) * CYCLES
-        while at < edges.shape[0] and edges[at, 0] < end:
+        middle = (first + k) * CYCLES + CYCLES // 2
+        while at < edges.shape[0] and edges[at, 0] < middle:
             _hear(spools, motor, edges[at, 0], edges[at, 1], edges[at, 2])
             at += 1
         _turn(spools, motor, tendon.stiffness)

@@ -36,9 +36,10 @@ class Truth(NamedTuple):
     rate: Array
     """(T, n) [rad/s]"""
     pull: Array
-    """(T, 4) at the wrist [N], of tendons 1, 2, 4, 5"""
+    """(T, 4) at the wrist [N], of tendons 1, 2, 4, 5, throughout the millisecond that ends then"""
     reeled: Array
-    """(T, 4) tendon on the spools [m], 0 where it is taut without pulling on the straight wrist"""
+    """(T, 4) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
+    straight wrist"""
 
 
 class Motion(NamedTuple):

@@ -43,6 +43,7 @@ LOG: Columns = {
     **_of_tendons("tension", "N", "commanded"),
     **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
     **_of_tendons("position", "steps", "spool position by the board's status"),
+    "counted": ("s", "when the board had those positions, on the trial's time"),
     **_of_tendons("sent", "1/s", "step rate really sent"),
     "state": ("", "of the board"),
     "faults": ("", "of the board"),

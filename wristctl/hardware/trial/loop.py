@@ -31,8 +31,9 @@ Array = NDArray[np.float64]
 Shown = Callable[[dict[str, Any]], None]
 """Takes each tick's row of the log, to show it."""
 
-_UNDERWAY = 0.35
-"""Share of a command's round trip until the board has read it, by the bytes of command and answer."""
+_UNDERWAY, _BUSY = 0.33, 6.6e-9
+"""Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
+longer [s] that takes for each step/s of all axes together, whose interrupts come first."""
 
 
 @dataclass
@@ -77,6 +78,7 @@ class ControlLoop:
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
         self._underway, self._skipped, self._verdict = 0.0, 0, "no frame"
+        self._counted = self._epoch
 
     @property
     def next_tick(self) -> float:
@@ -122,6 +124,7 @@ class ControlLoop:
             "torque": answer.torque,
             "state": self._status.state.name,
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
+            "counted": self._counted - task.begin,
             "late": clock - due,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
@@ -167,9 +170,11 @@ class ControlLoop:
         # the command acts once the board has read it; by then the one before has moved the spools for a whole period
         gap = target + moving * self._underway - (position + self._sent * self._period)
         rates = self._signs * self._spools.rate(gap, moving, self._sent, self._period)
+        began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
         sent, self._status = self._board.turn(rates.tolist())
         self._sent = self._signs * np.array(sent)
         self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
+        self._counted = began + self._underway + busy
         return target
 
     def _go_on(self) -> None:

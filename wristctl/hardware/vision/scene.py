@@ -20,7 +20,7 @@ from wristctl.hardware.vision.view import View
 
 Array = NDArray[np.float64]
 
-_CELL, _FINE, _BITS = 16, 3, 4
+_CELL, _FINE, _BITS = 16, 6, 4
 """Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners."""
 _WALL, _EDGE = 122, 48
 _LEVELS = 2**16
