@@ -72,6 +72,21 @@ def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(co
     assert labels(plus) == ["commanded"]
 
 
+def test_a_long_course_of_tensions_is_drawn_by_samples_of_its_own_that_keep_every_peak(course: Course) -> None:
+    short = course("smc/exchanged")
+    rng = np.random.default_rng(0)
+    time, tension = np.arange(20_007) * 1e-3, rng.uniform(2.0, 60.0, (20_007, 2))
+    torque = 0.04 * (tension[:, 0] - tension[:, 1])
+    one = replace(short, time=time, tension=tension, torque=torque, torque_wanted=torque)
+    drawn = tensions(one).axes[0].lines[0]
+    at = np.searchsorted(time, np.asarray(drawn.get_xdata()))
+    np.testing.assert_array_equal(drawn.get_ydata(), tension[at, 0])
+    assert len(at) < 1100 and (np.diff(at) > 0).all()
+    for first in range(0, 20_000, 400):  # ten parts: peaks stay where they are
+        whole, kept = tension[first : first + 400, 0], tension[at[(at >= first) & (at < first + 400)], 0]
+        assert (kept.min(), kept.max()) == (whole.min(), whole.max())
+
+
 def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(course: Course) -> None:
     one = course("smc/exchanged")
     late = replace(one, seen=np.roll(one.theta, 3), acting=0.5 * one.tension)

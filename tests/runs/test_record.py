@@ -81,6 +81,19 @@ def test_tables_and_arrays_read_back_exactly(results: Path) -> None:
     assert read.array("values")["whole"].dtype == np.arange(3).dtype
 
 
+def test_a_table_of_columns_or_of_a_frame_is_what_pandas_would_write(results: Path) -> None:
+    columns = {
+        "time": np.array([0.0, 0.1, 1e-300]), "angle": np.array([1 / 3, np.nan, -np.inf]), "tick": np.arange(3),
+        "failed": np.array([True, False, True]), "what": np.array(["a,b", 'say "c"', ""], dtype=object),
+    }  # fmt: skip
+    frame = pd.DataFrame(columns)
+    with start_run("tune", Study(), "", results) as run:
+        run.table("data/columns.csv", columns)
+        run.table("data/frame.csv", frame)
+    written = [(Run(run.path).path / f"data/{name}.csv").read_text() for name in ("columns", "frame")]
+    assert written == 2 * [frame.to_csv(index=False, lineterminator="\n")]
+
+
 def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 

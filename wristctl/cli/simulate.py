@@ -37,7 +37,7 @@ def simulate(session: Session) -> Table:
     own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
     columns = COLUMNS | own
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
-    run.table("data/trajectory.csv", course.frame(), units=units, meaning=meaning)
+    run.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
     rows = []
     for name, metric in METRICS.items():
         run.metric(name, done.metrics[name], unit=metric.unit, better="lower", meaning=metric.formula)

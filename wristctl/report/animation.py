@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -70,11 +71,17 @@ def _compared(run: Run) -> tuple[Iterable[Named], np.ndarray]:
 
 
 def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
-    table, settings = run.data("trajectory"), getattr(run.config, run.kind.replace("-", "_"))
-    own = [name for name in table.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
+    import numpy as np
+
+    with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # read before pandas is loaded
+        names, *rows = csv.reader(file)
+    numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    table = dict(zip(names, numbers.T, strict=True))
+    own = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
+    settings = getattr(run.config, run.kind.replace("-", "_"))
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
     name = ("", f"{settings.controller}/{gains}", settings.controller)
-    return [(*name, table[own].to_numpy(), table["theta_desired"].to_numpy())], table["time"].to_numpy()
+    return [(*name, np.stack([table[each] for each in own], axis=1), table["theta_desired"])], table["time"]
 
 
 def _trials(run: Run) -> tuple[Iterable[Named], np.ndarray]:

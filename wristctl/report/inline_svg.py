@@ -9,7 +9,7 @@ from pathlib import Path
 
 _HEAD = re.compile(r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>", re.DOTALL)
 """What does not belong inside a page; matplotlib's style would rule all of it, page.css has it for figures alone."""
-_DIGITS = re.compile(r"(\d+\.\d{2})\d+")
+_DIGITS = re.compile(r"\.\d{3,}")
 _PATH = re.compile(r'(?<= d=")[^"]*')
 LARGEST = 300_000
 """Characters of an SVG beyond which its PNG is smaller and quicker to show."""
@@ -18,7 +18,7 @@ LARGEST = 300_000
 def inline_figure(svg: Path, prefix: str) -> str:
     """The figure as SVG markup whose ids begin with `prefix`; where that is too large, its PNG beside it."""
     text = _HEAD.sub("", svg.read_text(encoding="utf-8")).strip()
-    text = _PATH.sub(lambda path: _DIGITS.sub(r"\1", path[0]).replace("\n", " "), text)
+    text = _PATH.sub(lambda path: _DIGITS.sub(lambda digits: digits[0][:3], path[0]).replace("\n", " "), text)
     picture = svg.with_suffix(".png")
     name = html.escape(svg.stem.replace("-", " "), quote=True)
     if len(text) > LARGEST and picture.is_file():

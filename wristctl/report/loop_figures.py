@@ -25,10 +25,14 @@ from wristctl.report.style import (
 )
 from wristctl.simulation.trajectory import Trajectory
 
+Array = NDArray[np.float64]
+
 _SMALLEST = 1e-8
 """Errors below this [rad] are not shown on a logarithmic axis."""
 _LAST = 20
 """Samples in the close-up of tensions."""
+_COLUMNS = 500
+"""Parts of a long course of which each is drawn by its least and its largest value."""
 _OTHER: Any = {"color": BLACK, "linewidth": 0.7}
 _DOTS: Any = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
 
@@ -88,13 +92,14 @@ def tensions(trajectory: Trajectory) -> Figure:
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
         for each, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
-            each.step(time[part], tension[part], color=colour, linewidth=1.0, where="post", label="commanded")
+            drawn = _envelope(time[part], tension[part])
+            each.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
         for each, tension in zip(column, () if acting is None else acting.T, strict=False):
-            each.plot(time[part], tension[part], label="acting", **_OTHER)
+            each.plot(*_envelope(time[part], tension[part]), label="acting", **_OTHER)
         wanted = {"color": GREY, "label": "wanted by the law"}
         given = {"color": BLACK, "label": "of the commanded tensions"}
         for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
-            column[2].step(time[part], torque[part], linewidth=1.0, where="post", **style)
+            column[2].step(*_envelope(time[part], torque[part]), linewidth=1.0, where="post", **style)
     for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
         each.set_ylabel(name)
     for each in axes[:2, 0]:
@@ -111,7 +116,19 @@ def tensions(trajectory: Trajectory) -> Figure:
     return made
 
 
-def _apart(other: NDArray[np.float64] | None, known: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _envelope(time: Array, course: Array) -> tuple[Array, Array]:
+    """What a picture can show of a course (T,) that jumps at every sample: each part's least and largest value."""
+    each = len(time) // _COLUMNS
+    if each < 4:
+        return time, course
+    whole = each * _COLUMNS
+    parts = course[:whole].reshape(_COLUMNS, each)
+    ends = np.stack([parts.argmin(axis=1), parts.argmax(axis=1)], axis=1) + each * np.arange(_COLUMNS)[:, None]
+    kept = np.unique(np.append(ends, np.arange(whole, len(time))))
+    return time[kept], course[kept]
+
+
+def _apart(other: Array | None, known: Array) -> Array | None:
     """The other course if it is not the known one, to a millionth of its size."""
     size = 1e-6 * float(np.nanmax(np.abs(known), initial=1e-6))
     return None if other is None or np.allclose(other, known, rtol=0.0, atol=size, equal_nan=True) else other

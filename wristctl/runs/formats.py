@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,11 +15,18 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    Columns = pd.DataFrame | Mapping[str, np.ndarray]
 
-def write_table(path: Path, frame: pd.DataFrame) -> None:
-    """A DataFrame as CSV without its index; floats are written so that they read back exactly."""
-    with replacing(path) as temporary:
-        frame.to_csv(temporary, index=False, lineterminator="\n")
+
+def write_table(path: Path, columns: Columns) -> None:
+    """Columns as CSV under their names; floats are written so that they read back exactly, nan as nothing."""
+    import numpy as np
+
+    values = [[None if cell != cell else cell for cell in np.asarray(each).tolist()] for _, each in columns.items()]
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns.keys())
+        writer.writerows(zip(*values, strict=True))
 
 
 def read_table(path: Path) -> pd.DataFrame:

@@ -36,7 +36,6 @@ from wristctl.runs.readme import readme
 
 if TYPE_CHECKING:
     import numpy as np
-    import pandas as pd
     from matplotlib.figure import Figure
 
 Page = Callable[[Path, Manifest], str]
@@ -79,14 +78,14 @@ class LiveRun:
     def table(
         self,
         name: str,
-        frame: pd.DataFrame,
+        columns: formats.Columns,
         units: Mapping[str, str] | None = None,
         meaning: Mapping[str, str] | None = None,
     ) -> None:
-        """Write a DataFrame as CSV (exact round trip); the columns' units and meaning are noted."""
-        formats.write_table(self.file(name), frame)
+        """Write columns, or a DataFrame, as CSV (exact round trip); the columns' units and meaning are noted."""
+        formats.write_table(self.file(name), columns)
         units, meaning = units or {}, meaning or {}
-        names = map(str, frame.columns)
+        names = map(str, columns.keys())
         self.columns(name, {each: (units.get(each, ""), meaning.get(each, "")) for each in names})
 
     def columns(self, name: str, columns: Mapping[str, tuple[str, str]]) -> None:

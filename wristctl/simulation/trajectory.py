@@ -69,10 +69,8 @@ class Trajectory:
         """e = theta - theta_ref (E12), (T,)."""
         return self.theta - self.theta_ref
 
-    def frame(self) -> pd.DataFrame:
-        """Everything as a table with the columns of COLUMNS."""
-        import pandas as pd
-
+    def columns(self) -> dict[str, Array]:
+        """Everything under the names of COLUMNS, (T,) each."""
         acting = self.tension if self.acting is None else self.acting
         columns = {
             "time": self.time,
@@ -93,8 +91,13 @@ class Trajectory:
             "acting_plus": acting[:, 0],
             "acting_minus": acting[:, 1],
         }
-        columns |= {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
-        return pd.DataFrame(columns)
+        return columns | {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
+
+    def frame(self) -> pd.DataFrame:
+        """The columns as a table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns())
 
 
 def desired_errors(trajectory: Trajectory) -> dict[str, float]:
