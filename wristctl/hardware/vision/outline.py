@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 3
+_ROUNDS = 2
 """Each looks along the lines of the one before; a rough corner may be off by 2 px."""
-_FINE = 0.5
-"""Distance of samples across a side [px]."""
+_FINE, _PLACES = 0.5, 32
+"""Distance of samples across a side [px]; places along a side at which it is looked for, at most."""
 
 
 def outlined(image: NDArray[Any], corners: Array, cells: int) -> Array:
@@ -41,7 +41,7 @@ def _lines(image: NDArray[Any], at: NDArray[np.complex128], margin: float) -> tu
     side = np.roll(at, -1) - at
     length = float(np.abs(side).mean())
     out, reach = -1j * side / np.abs(side), margin * length
-    along = np.linspace(margin, 1.0 - margin, max(8, round(length)))
+    along = np.linspace(margin, 1.0 - margin, min(_PLACES, max(8, round(length))))
     across = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / _FINE)) + 1)
     places = (at[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
     flat = places.reshape(-1, len(across)).astype(np.complex64)
