@@ -9,10 +9,12 @@ import argparse
 import json
 import os
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from datetime import datetime
 from pathlib import Path
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[1])}
@@ -31,10 +33,12 @@ COMMANDS: dict[str, list[str]] = {
     "compare": ["STUDY"],
 }
 """Each command's smallest run, in this order; train needs gen-data's."""
+AGAIN = 5
+"""Runs with a filled cache, of which the median counts."""
 
 
 def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
-    """Wall time of one command and, from its events, until its first report of progress beyond nothing."""
+    """Wall time of one command, and until it first reports progress beyond nothing, to the user or in its run."""
     arguments = [str(folder / "study.yaml") if word == "STUDY" else word for word in COMMANDS[command]]
     out = [] if command == "--help" else ["--out", str(folder / "results")]
     start = time.time()
@@ -52,7 +56,16 @@ def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
             first = time.time() - start
     if process.wait() != 0:
         raise RuntimeError(f"wristctl {command}: {''.join(said)}")
-    return {"whole": time.perf_counter() - begun, **({"first_progress": first} if first is not None else {})}
+    whole = time.perf_counter() - begun
+    firsts = [each - start for each in counted(folder / "results", command)] + ([first] if first is not None else [])
+    return {"whole": whole, **({"first_progress": min(firsts)} if firsts else {})}
+
+
+def counted(results: Path, command: str) -> list[float]:
+    """When the newest run of a command told that something is done, an epoch for one [s since 1970]."""
+    journal = max(results.glob(f"*-{command}-*/events.jsonl"), default=None)
+    events = [json.loads(line) for line in journal.read_text().splitlines()] if journal else []
+    return [datetime.fromisoformat(each["time"]).timestamp() for each in events if each.get("count")]
 
 
 def import_seconds(command: str) -> float:
@@ -64,7 +77,7 @@ def import_seconds(command: str) -> float:
 
 
 def main() -> None:
-    """Measure every command twice, cache empty and filled."""
+    """Measure every command with its cache empty and, several times, filled."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, help="JSON file to write")
     options = parser.parse_args()
@@ -75,7 +88,8 @@ def main() -> None:
         (folder / "study.yaml").write_text(STUDY)
         for command in COMMANDS:
             cache = folder / f"cache-{command.strip('-')}"  # of its own: what another command compiled is no help
-            first, again = (seconds_of(command, folder, cache) for _ in range(2))
+            first, *later = (seconds_of(command, folder, cache) for _ in range(1 + AGAIN))
+            again = {each: statistics.median(run[each] for run in later) for each in later[0]}
             rows[command] = {"import": import_seconds(command), "first": first, "again": again}
             progress = [f"{run['first_progress']:.2f}" if "first_progress" in run else "-" for run in (first, again)]
             print(

@@ -99,9 +99,9 @@ def of_cold_start(rows: dict[str, Any]) -> list[Claim]:
     simulate, train = rows["simulate"], rows["train"]
     begun = train["first"].get("first_progress")
     return [
-        Claim("first simulate, nothing compiled: under 20 s", f"{simulate['first']['whole']:.1f} s",
+        Claim("first simulate, nothing compiled: under 20 s", f"{simulate['first']['whole']:.2f} s",
               simulate["first"]["whole"] < 20.0),
-        Claim("second simulate: under 2 s", f"{simulate['again']['whole']:.1f} s", simulate["again"]["whole"] < 2.0),
-        Claim("train's first epoch, nothing compiled: within 3 s", f"{begun:.1f} s" if begun else "-",
+        Claim("second simulate: under 2 s", f"{simulate['again']['whole']:.2f} s", simulate["again"]["whole"] < 2.0),
+        Claim("train's first epoch, nothing compiled: within 3 s", f"{begun:.2f} s" if begun else "-",
               begun < 3.0 if begun else None),
     ]  # fmt: skip

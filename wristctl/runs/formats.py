@@ -63,9 +63,12 @@ def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
         figure.set_dpi(dpi)
         layout.execute(figure)
         figure.set_layout_engine(None)
-    nothing: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
+    options: dict[str, dict[str, Any]] = {
+        "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 1}},  # 30 % larger, 10 ms sooner
+        "svg": {"metadata": {"Date": None, "Creator": None}},
+    }
     # in one piece, a line that chatters takes seconds to draw
     with mpl.rc_context({"svg.hashsalt": stem.name, "agg.path.chunksize": 500}):
-        for suffix, metadata in nothing.items():
+        for suffix, given in options.items():
             with replacing(stem.with_name(f"{stem.name}.{suffix}")) as temporary:
-                figure.savefig(temporary, format=suffix, metadata=metadata, dpi=dpi)
+                figure.savefig(temporary, format=suffix, dpi=dpi, **given)
