@@ -15,7 +15,7 @@ import pytest
 
 from wristctl.learning import processes, training
 from wristctl.learning.network_file import load_network, training_record
-from wristctl.learning.training import Epoch
+from wristctl.learning.trial import Epoch
 from wristctl.runs import list_runs, open_run
 
 LEAVES = ("hidden=[16,8]", "activation=tanh", "learning_rate=0.01", "workers=1", "epochs=12")

@@ -6,7 +6,8 @@ import pytest
 from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
-from wristctl.learning.training import Job, Trial, train_one
+from wristctl.learning.training import train_one
+from wristctl.learning.trial import Job, Trial
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,8 @@ from wristctl.learning import levenberg_marquardt
 from wristctl.learning.dataset import draw_samples, split_samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt
 from wristctl.learning.metrics import error_map
-from wristctl.learning.training import Job, train_one
+from wristctl.learning.training import train_one
+from wristctl.learning.trial import Job
 
 
 def linear(seed: int) -> tuple[torch.nn.Linear, torch.Tensor, torch.Tensor]:

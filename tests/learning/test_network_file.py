@@ -12,7 +12,7 @@ from wristctl.config.errors import UserError
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.network_file import load_network, save_network, training_record
-from wristctl.learning.training import Trial
+from wristctl.learning.trial import Trial
 
 RECORD: dict[str, object] = {"seed": 3, "settings": {"epochs": 5, "hidden": [24, 16]}, "data_sha256": "ab12"}
 

@@ -14,7 +14,8 @@ from wristctl.learning import training
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
 from wristctl.learning.metrics import AngleErrors, angle_errors
 from wristctl.learning.processes import train_all
-from wristctl.learning.training import Epoch, Job, Trial, best_of, train_one
+from wristctl.learning.training import train_one
+from wristctl.learning.trial import Epoch, Job, Trial, best_of
 
 SEED = np.random.SeedSequence(7)
 

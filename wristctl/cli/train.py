@@ -15,7 +15,7 @@ from wristctl.runs import Run
 if TYPE_CHECKING:
     from wristctl.learning.dataset import Samples, Split
     from wristctl.learning.selection import Choice
-    from wristctl.learning.training import Job, Trial
+    from wristctl.learning.trial import Job, Trial
 
 CHECKPOINTS = "checkpoints"
 
@@ -102,7 +102,7 @@ def _trained(
     """Every network from every seed; a seed begins all networks alike."""
     import numpy as np
 
-    from wristctl.learning.training import Job
+    from wristctl.learning.trial import Job
 
     count, run = session.settings.seeds, session.run
     seeds = [np.random.SeedSequence(run.stream(f"training {trial}")) for trial in range(count)]
@@ -139,7 +139,7 @@ def _done(session: Session, what: str, samples: Samples, jobs: list[Job]) -> lis
 
     from wristctl.lanes.cores import cores
     from wristctl.learning.processes import train_all
-    from wristctl.learning.training import Epoch
+    from wristctl.learning.trial import Epoch
 
     settings, run = session.settings, session.run
     device = settings.device

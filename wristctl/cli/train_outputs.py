@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from wristctl.learning.evaluation import Place
     from wristctl.learning.network import Network
     from wristctl.learning.selection import Choice
-    from wristctl.learning.training import Trial
+    from wristctl.learning.trial import Trial
 
 
 def write_results(
@@ -28,7 +28,7 @@ def write_results(
     """Everything about the trained networks, by name; `reason` says why the one network was chosen."""
     from wristctl.cli.train_ranking import write_rows
     from wristctl.learning.evaluation import places
-    from wristctl.learning.training import best_of
+    from wristctl.learning.trial import best_of
 
     name, own = min(trials.items(), key=lambda item: min(_losses(item[1])))
     kept, where = best_of(own), places(samples, split)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from wristctl.learning.evaluation import Place
     from wristctl.learning.selection import Candidate, Choice
-    from wristctl.learning.training import Trial
+    from wristctl.learning.trial import Trial
 
 
 def write_rows(session: Session, trials: dict[str, list[Trial]], where: list[Place]) -> list[Table]:

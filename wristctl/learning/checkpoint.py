@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -13,10 +13,8 @@ import torch
 
 from wristctl.config.errors import UserError
 from wristctl.learning.dataset import Samples
+from wristctl.learning.trial import Job
 from wristctl.runs.files import replacing
-
-if TYPE_CHECKING:
-    from wristctl.learning.training import Job
 
 
 def fingerprint(samples: Samples, job: Job) -> str:

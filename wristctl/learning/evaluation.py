@@ -11,7 +11,7 @@ from wristctl.learning.baseline import Polynomial
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
 from wristctl.learning.inference import compiled_network
 from wristctl.learning.metrics import angle_errors, error_map
-from wristctl.learning.training import Trial
+from wristctl.learning.trial import Trial
 from wristctl.wrist.kinematics import Array, exact_angle
 
 HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}

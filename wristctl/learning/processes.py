@@ -15,7 +15,8 @@ from typing import Any
 
 from wristctl.config.errors import UserError
 from wristctl.learning.dataset import Samples
-from wristctl.learning.training import Epoch, Job, Trial, train_one
+from wristctl.learning.training import train_one
+from wristctl.learning.trial import Epoch, Job, Trial
 
 Report = Callable[[int, Epoch], None]
 """Told the job's number and its last epoch."""

@@ -11,7 +11,7 @@ import numpy as np
 from wristctl.config.errors import UserError
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.learning.dataset import Split
-from wristctl.learning.training import Job, Trial
+from wristctl.learning.trial import Job, Trial
 from wristctl.wrist.kinematics import Array
 
 

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from wristctl.config.errors import UserError
-from wristctl.config.learning import Activation, NetworkSettings
+from wristctl.config.learning import Activation
 from wristctl.learning.checkpoint import fingerprint, read_checkpoint, write_checkpoint
-from wristctl.learning.dataset import Samples, Split
+from wristctl.learning.dataset import Samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt, blocks
 from wristctl.learning.network import LEAK, Network, Scaler
+from wristctl.learning.trial import Epoch, Job, Trial
 
 DTYPE = torch.float64
 """Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding."""
@@ -36,49 +35,6 @@ LAYERS: dict[Activation, Callable[[], nn.Module]] = {
     "tanh": nn.Tanh,
     "silu": nn.SiLU,
 }
-
-
-@dataclass(frozen=True)
-class Job:
-    """One training: of which network, on which samples, from which random start."""
-
-    name: str
-    """its own among those trained together; names its checkpoint"""
-    settings: NetworkSettings
-    split: Split
-    seed: np.random.SeedSequence
-    trial: int = 0
-    """which of the trainings of its network, from 0"""
-
-
-@dataclass(frozen=True)
-class Epoch:
-    """Losses of one pass over the training data: mean squared errors of the angle [rad^2]."""
-
-    trial: int
-    """which of the trainings, from 0"""
-    epoch: int
-    """from 1"""
-    train_loss: float
-    """mean over the epoch's steps, each before its own"""
-    validation_loss: float
-    """after the epoch"""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What came of one training."""
-
-    job: Job
-    network: Network
-    """of the last epoch; with patience, of the one with the least validation loss"""
-    epochs: tuple[Epoch, ...]
-    validation_loss: float
-    """of the network [rad^2]; not finite where the training diverged"""
-    gradient_norm: float
-    """norm of the training loss's gradient at these weights: of the scaled angle, without weight decay"""
-    interrupted: bool
-    """whether Ctrl-C ended it early; the network is then that of the last whole epoch"""
 
 
 def train_one(
@@ -117,19 +73,6 @@ def train_one(
         model, loss = course.kept()
         norm = problem.gradient_norm(model)
         return Trial(job, problem.export(model), tuple(course.epochs), loss, norm, interrupted)
-
-
-def best_of(trials: list[Trial]) -> Trial:
-    """The trial with the least validation loss. Raises UserError where every one of them diverged."""
-    finite = [trial for trial in trials if math.isfinite(trial.validation_loss)]
-    if not finite:
-        last = trials[-1]
-        raise UserError(
-            f"the training diverged in epoch {last.epochs[-1].epoch}",
-            where="train.learning_rate",
-            fix=f"choose less than {last.job.settings.learning_rate:g}, or set standardise: true",
-        )
-    return min(finite, key=lambda trial: trial.validation_loss)
 
 
 class _Problem:

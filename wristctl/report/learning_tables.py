@@ -13,7 +13,7 @@ from wristctl.wrist.kinematics import Array
 
 if TYPE_CHECKING:
     from wristctl.learning.selection import Candidate
-    from wristctl.learning.training import Epoch
+    from wristctl.learning.trial import Epoch
 
 UNITS = {
     "x": "m",

@@ -1,0 +1,69 @@
+"""Trainings: what each is given, and what came of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wristctl.config.errors import UserError
+from wristctl.config.learning import NetworkSettings
+from wristctl.learning.dataset import Split
+from wristctl.learning.network import Network
+
+
+@dataclass(frozen=True)
+class Job:
+    """One training: of which network, on which samples, from which random start."""
+
+    name: str
+    """its own among those trained together; names its checkpoint"""
+    settings: NetworkSettings
+    split: Split
+    seed: np.random.SeedSequence
+    trial: int = 0
+    """which of the trainings of its network, from 0"""
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """Losses of one pass over the training data: mean squared errors of the angle [rad^2]."""
+
+    trial: int
+    """which of the trainings, from 0"""
+    epoch: int
+    """from 1"""
+    train_loss: float
+    """mean over the epoch's steps, each before its own"""
+    validation_loss: float
+    """after the epoch"""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came of one training."""
+
+    job: Job
+    network: Network
+    """of the last epoch; with patience, of the one with the least validation loss"""
+    epochs: tuple[Epoch, ...]
+    validation_loss: float
+    """of the network [rad^2]; not finite where the training diverged"""
+    gradient_norm: float
+    """norm of the training loss's gradient at these weights: of the scaled angle, without weight decay"""
+    interrupted: bool
+    """whether Ctrl-C ended it early; the network is then that of the last whole epoch"""
+
+
+def best_of(trials: list[Trial]) -> Trial:
+    """The trial with the least validation loss. Raises UserError where every one of them diverged."""
+    finite = [trial for trial in trials if math.isfinite(trial.validation_loss)]
+    if not finite:
+        last = trials[-1]
+        raise UserError(
+            f"the training diverged in epoch {last.epochs[-1].epoch}",
+            where="train.learning_rate",
+            fix=f"choose less than {last.job.settings.learning_rate:g}, or set standardise: true",
+        )
+    return min(finite, key=lambda trial: trial.validation_loss)
