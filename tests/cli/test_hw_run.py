@@ -87,6 +87,13 @@ def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_seco
     stop = json.loads(run.file("data/stop.json").read_text())
     assert stop["motors_stand"] and stop["trial"] == 0 and stop["rate"] == [0, 0, 0, 0]
     assert len(run.data("log")) > 40 and "no tip" in set(run.data("frames")["verdict"])
+    assert call("hw", "watch", "--file", "seen.png")[:2] == (0, "seen.png\n")  # what there is of it
+    assert Path("seen.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_a_run_there_is_nothing_to_watch(call) -> None:
+    code, _, err = call("hw", "watch")
+    assert code == 2 and "there is no run of hw-run - results - fix: start one" in err
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from wristctl.cli.hw_calibrate import app as calibrations
+from wristctl.cli.hw_watch import watch
 from wristctl.cli.progress import listening, progress
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
@@ -18,10 +19,13 @@ from wristctl.config.errors import UserError
 log = logging.getLogger(__name__)
 
 app = typer.Typer(
-    help="The motor board: find, check, flash, emulate, stop; calibrate.", no_args_is_help=True, add_completion=False
+    help="The motor board: find, check, flash, emulate, stop; calibrate; watch trials.",
+    no_args_is_help=True,
+    add_completion=False,
 )
 
 app.add_typer(calibrations, name="calibrate")
+app.command("watch")(watch)
 
 Port = Annotated[
     str | None,

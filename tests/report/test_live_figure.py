@@ -1,0 +1,42 @@
+"""A trial is drawn while its log grows: whole rows only, and no more of them than asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wristctl.hardware.trial.log import LOG
+from wristctl.report.live_figure import newest_rows, recent
+
+PERIOD = 0.005
+
+
+def rows(count: int) -> pd.DataFrame:
+    time = PERIOD * np.arange(count)
+    words = {"state": "ENABLED", "verdict": "ok", "faults": "ESTOP"}
+    return pd.DataFrame({name: words.get(name, time) for name in LOG} | {"trial": 1, "theta": 0.1 * time})
+
+
+@pytest.mark.parametrize("count", [1, 300, 40_000])
+def test_the_last_seconds_are_read_but_for_a_row_that_is_being_written(tmp_path: Path, count: int) -> None:
+    log, whole = tmp_path / "log.csv", rows(count)
+    log.write_text(whole.to_csv(index=False) + "1,0.12")
+    found = newest_rows(log, 1.0, PERIOD)
+    pd.testing.assert_frame_equal(
+        found.reset_index(drop=True), whole[-200:].reset_index(drop=True), check_dtype=False, atol=1e-12
+    )
+
+
+def test_the_picture_shows_angle_and_reference_up_to_now() -> None:
+    above, below = recent(rows(100)).axes
+    angle, = (each for each in above.lines if each.get_label() == "angle")
+    assert np.asarray(angle.get_xdata())[-1] == 0.0
+    np.testing.assert_allclose(angle.get_ydata(), np.degrees(0.1 * PERIOD * np.arange(100)))
+    assert [each.get_label() for each in below.lines] == [f"tendon {number}" for number in (1, 2, 4, 5)]
+
+
+def test_before_the_first_row_there_are_axes_and_no_lines() -> None:
+    assert not any(axes.lines for axes in recent(rows(0)).axes)
