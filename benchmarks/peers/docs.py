@@ -155,8 +155,7 @@ def main() -> None:
         if name in found:
             claims += claimed(found[name])
             parts.append(section(found[name]))
-    page = [about(result), "## Wanted and measured\n", claims_table(claims)]
-    page += [ONE_LANE]
+    page = [about(result), "## Wanted and measured\n", claims_table(claims), ONE_LANE]
     page += ["![rates and ratios](images/benchmarks.svg)\n", "## Rates\n", *parts]
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     (DOCS / "benchmarks.md").write_text("\n".join(page))

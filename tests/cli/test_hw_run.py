@@ -91,7 +91,8 @@ def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_seco
     assert Path("seen.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_a_run_there_is_nothing_to_watch(call) -> None:
+def test_without_a_run_of_trials_there_is_nothing_to_watch(call) -> None:
+    assert call("gen-data", "--samples", "10", "--label", "hw-run")[0] == 0  # by its label only
     code, _, err = call("hw", "watch")
     assert code == 2 and "there is no run of hw-run - results - fix: start one" in err
 

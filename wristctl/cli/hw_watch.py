@@ -50,7 +50,9 @@ def watch(
 
 
 def _newest(results: Path) -> Run:
-    found = max(results.glob("*-hw-run-*/run.json"), default=None)
-    if found is None:
+    from wristctl.runs.index import indexed
+
+    found = [each.id for each in indexed(results, renew=False) if each.kind == "hw-run"]
+    if not found:
         raise UserError("there is no run of hw-run", str(results), "start one, or say --out DIR")
-    return Run(found.parent)
+    return Run(results / found[-1])

@@ -73,7 +73,7 @@ def _compared(run: Run) -> tuple[Iterable[Named], np.ndarray]:
 def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
     import numpy as np
 
-    with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # read before pandas is loaded
+    with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
         names, *rows = csv.reader(file)
     numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
     table = dict(zip(names, numbers.T, strict=True))
