@@ -17,9 +17,9 @@ from report import claims_table, markdown
 from table import OURS
 
 ONE_LANE = (
-    "One rollout alone runs in a block of sixteen lanes and takes what sixteen take: where a product and a sum fuse "
-    "depends on the width, and a rollout's bits must not depend on whether others run beside it. The C loop runs one "
-    "lane in a build of its own, one lane wide, and JAX compiles anew for every number of lanes.\n"
+    "One rollout alone runs in a kernel of its own, one lane wide, and has the bits that it has in a block of sixteen: "
+    "a product and a sum fuse where the equations are written so, whatever the width. C's one lane is a build of its "
+    "own as well, and JAX compiles anew for every number of lanes.\n"
 )
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

@@ -11,10 +11,8 @@ import pytest
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, now_of, wrist_of
 from wristctl.control.table import controller
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
-from wristctl.lanes.types import LANES
 from wristctl.wrist.allocation import allocate, reach
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments, segments
@@ -62,15 +60,11 @@ def _closed_loop(
     """Follow a reference (T, 3) of angle, rate and acceleration from rest, one row per control period."""
     law, ticks = controller(name), len(reference)
     rows = [segments(plant, segments_), segments(model, 1), np.array([4.0, limit]), np.array([*gains, 0.0])]
-    plant_row, model_row, limits, gain_row = (to_blocks(row[None])[0] for row in rows)
-    lanes = np.ascontiguousarray(np.repeat(reference[:, :, None], LANES, axis=2))
-    memory, state = np.zeros((max(1, law.memory), LANES)), np.zeros((2 * segments_, LANES))
-    out = np.zeros((ticks, 3 + len(memory), LANES))
-    _run(
-        law.compiled, plant_row, model_row, limits, gain_row, lanes, np.zeros((len(NOW), LANES)), memory, state, out,
-        period, (0,) * segments_,
-    )  # fmt: skip
-    return Course(out[:, 0, 0], out[:, 1, 0], out[:, 2, 0], out[:, 3:, 0])
+    memory, state = np.zeros(max(1, law.memory)), np.zeros(2 * segments_)
+    out = np.zeros((ticks, 3 + len(memory)))
+    now, followed = np.zeros(len(NOW)), np.ascontiguousarray(reference)
+    _run(law.compiled(), *rows, followed, now, memory, state, out, period, (0,) * segments_)
+    return Course(out[:, 0], out[:, 1], out[:, 2], out[:, 3:])
 
 
 @pytest.fixture(scope="session")

@@ -9,10 +9,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.gvsc import strain_model
 from wristctl.control.law import wrist_of
 from wristctl.control.model import one_segment
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.lanes.types import LANES
 from wristctl.wrist.model import linearised, terms
 from wristctl.wrist.segments import segments
 
@@ -29,9 +27,9 @@ def _strain(wrist, theta, out):
 
 def strain(wrist: WristParameters, theta: float) -> np.ndarray:
     """Inertia, slope, torque and beta of the strain model, then inertia and torque of one segment."""
-    out = np.zeros((6, LANES))
-    _strain(to_blocks(segments(wrist, 1)[None])[0], np.full((1, LANES), theta), out)
-    return out[:, 0]
+    out = np.zeros(6)
+    _strain(segments(wrist, 1), np.array([theta]), out)
+    return out
 
 
 def equilibrium_at(wrist: WristParameters, theta: float, n: int) -> tuple[np.ndarray, float]:

@@ -12,10 +12,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, now_of, wrist_of
 from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
-from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.lanes.types import LANES
 from wristctl.wrist.model import terms
 from wristctl.wrist.segments import segments
 
@@ -37,12 +35,11 @@ def _one_segment(wrist, now, out):
 def torque(name: str, gains: tuple[float, ...], memory: np.ndarray | None = None, **now: float) -> float:
     chosen = controller(name)
     given_now = {"torque_low": -1e9, "torque_high": 1e9, "period": 1e-3} | now
-    row = np.array([[given_now.get(field, 0.0) for field in NOW]])
-    kept = np.zeros((max(1, chosen.memory), LANES)) if memory is None else memory
-    wrist = to_blocks(segments(WRIST, 1)[None])[0]
-    out = np.zeros((1, LANES))
-    _call(chosen.compiled, to_blocks(row)[0], wrist, to_blocks(np.array([[*gains, 0.0]]))[0], kept, out)
-    return float(out[0, 0])
+    row = np.array([given_now.get(field, 0.0) for field in NOW])
+    kept = np.zeros(max(1, chosen.memory)) if memory is None else memory
+    out = np.zeros(1)
+    _call(chosen.compiled(), row, segments(WRIST, 1), np.array([*gains, 0.0]), kept, out)
+    return float(out[0])
 
 
 def inertia_and_load(theta: float, rate: float) -> tuple[float, float]:
@@ -57,11 +54,10 @@ state = st.tuples(st.floats(-0.87, 0.87), st.floats(-5.0, 5.0), st.floats(-0.87,
 @given(state)
 def test_one_segment_model_of_the_laws_is_the_wrists(at: tuple[float, float, float]) -> None:
     theta, rate, _ = at
-    row = np.zeros((1, len(NOW)))
-    row[0, :2] = theta, rate
-    out = np.zeros((2, LANES))
-    _one_segment(to_blocks(segments(WRIST, 1)[None])[0], to_blocks(row)[0], out)
-    assert to_rows(out[None], 1)[0] == pytest.approx(inertia_and_load(theta, rate), rel=1e-12, abs=1e-14)
+    row, out = np.zeros(len(NOW)), np.zeros(2)
+    row[:2] = theta, rate
+    _one_segment(segments(WRIST, 1), row, out)
+    assert out == pytest.approx(inertia_and_load(theta, rate), rel=1e-12, abs=1e-14)
 
 
 @settings(max_examples=80)
@@ -91,7 +87,7 @@ def test_feedforward_holds_the_model_at_the_reference() -> None:
 
 
 def test_pid_opposes_the_error_and_integrates_it() -> None:
-    memory = np.zeros((1, LANES))
+    memory = np.zeros(1)
     first = torque("pid", (10.0, 5.0, 2.0), memory, theta=0.2, rate=0.5)
     assert first == pytest.approx(-(10.0 * 0.2 + 5.0 * 0.2e-3 + 2.0 * 0.5))
     second = torque("pid", (10.0, 5.0, 2.0), memory, theta=0.2, rate=0.5)
@@ -100,7 +96,7 @@ def test_pid_opposes_the_error_and_integrates_it() -> None:
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_pid_holds_its_integral_in_saturation_and_lets_it_unwind(side: float) -> None:
-    memory = np.full((1, LANES), -0.3 * side)
+    memory = np.full(1, -0.3 * side)
     reach = {"torque_low": -0.1, "torque_high": 0.1}
     torque("pid", (10.0, 5.0, 2.0), memory, theta=-0.2 * side, **reach)
     assert (memory == -0.3 * side).all()
@@ -116,7 +112,7 @@ def test_every_law_is_finite_for_any_state_and_gains_in_the_box(
 ) -> None:
     theta, rate, theta_ref = at
     gains = tuple(g.low * (g.high / g.low) ** u for g, u in zip(controller(name).gains.values(), share, strict=False))
-    kept = np.zeros((max(1, controller(name).memory), LANES))
+    kept = np.zeros(max(1, controller(name).memory))
     for _ in range(3):
         u = torque(name, gains, kept, theta=theta, rate=rate, theta_ref=theta_ref, rate_ref=rate_ref)
         assert np.isfinite(u) and np.isfinite(kept).all()

@@ -31,7 +31,7 @@ def _functions(x, out):
 
 def values(x: np.ndarray) -> np.ndarray:
     blocks = to_blocks(x[:, None])
-    out = np.empty((len(blocks), 8, LANES))
+    out = np.empty((len(blocks), 8, *blocks.shape[2:]))
     for block, result in zip(blocks, out, strict=True):
         _functions(block, result)
     return to_rows(out, len(x))

@@ -9,10 +9,8 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
@@ -32,11 +30,9 @@ def _drive(drive, state, model, commands, out, h):
 
 def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
     """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
-    state = np.repeat(at_rest(drive, WRIST, np.zeros(1))[:, None], LANES, axis=1)
-    out = np.zeros((len(commands), 2, LANES))
-    lanes = np.ascontiguousarray(np.repeat(commands[:, :, None], LANES, axis=2))
-    _drive(drive, state, to_blocks(segments(WRIST, 1)[None])[0], lanes, out, PERIOD)
-    return out[:, :, 0]
+    out = np.zeros((len(commands), 2))
+    _drive(drive, at_rest(drive, WRIST, np.zeros(1)), segments(WRIST, 1), np.ascontiguousarray(commands), out, PERIOD)
+    return out
 
 
 def run(

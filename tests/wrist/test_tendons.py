@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach, torque_of
@@ -31,10 +30,9 @@ def _allocate(parameters, asked, out):
 
 
 def allocated(theta: float, torque: float, low: float, high: float) -> np.ndarray:
-    wrist = to_blocks(segments(WRIST, 1)[None])[0]
-    out = np.zeros((5, wrist.shape[1]))
-    _allocate(wrist, to_blocks(np.array([[theta, torque, low, high]]))[0], out)
-    return to_rows(out[None], 1)[0]
+    out = np.zeros(5)
+    _allocate(segments(WRIST, 1), np.array([theta, torque, low, high]), out)
+    return out
 
 
 @settings(max_examples=300)

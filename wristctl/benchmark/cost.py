@@ -9,7 +9,6 @@ import numpy as np
 
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, wrist_of
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate
@@ -38,16 +37,14 @@ def _steps(law: Any, count: int, now: Any, wrist: Any, limits: Any, gains: Any, 
 
 def step_time(controller: Controller, gains: tuple[float, ...], wrist: WristParameters) -> StepTime:
     """Time law and allocation over 400 chunks of 500 steps."""
-    row = np.zeros((1, len(NOW)))
-    row[0, NOW.index("period")] = 1e-3
-    now, model = to_blocks(row)[0], to_blocks(segments(wrist, 1)[None])[0]
-    rows = to_blocks(np.array([[*gains, 0.0]]))[0]
-    limits = to_blocks(TENDONS_PER_SIDE * np.array([[wrist.pretension, wrist.tension_limit]]))[0]
-    memory, out = np.zeros((max(1, controller.memory), now.shape[1])), np.zeros((2, now.shape[1]))
-    _steps(controller.compiled, 10, now, model, limits, rows, memory, out)
+    now, model, rows = np.zeros(len(NOW)), segments(wrist, 1), np.array([*gains, 0.0])
+    now[NOW.index("period")] = 1e-3
+    limits = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
+    memory, out, law = np.zeros(max(1, controller.memory)), np.zeros(2), controller.compiled()
+    _steps(law, 10, now, model, limits, rows, memory, out)
     times = []
     for _ in range(400):
         start = time.perf_counter()
-        _steps(controller.compiled, 500, now, model, limits, rows, memory, out)
+        _steps(law, 500, now, model, limits, rows, memory, out)
         times.append((time.perf_counter() - start) / 500 * 1e6)
     return StepTime(float(np.median(times)), float(np.percentile(times, 99)))

@@ -9,24 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache
 from typing import Any
 
 import numba
 
+from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import cache_folder
 from wristctl.lanes.rows import rows_named
-from wristctl.lanes.types import RowsType, lane
+from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
 
 NOW = ("theta", "rate", "theta_ref", "rate_ref", "acceleration_ref", "torque_low", "torque_high", "period")
 """What a law sees: measured angle and rate, the reference with two derivatives, the torques that the tendons can
 reach now [N m], and the control period [s]."""
-
-_NOW = RowsType(lane, None, fields=NOW)
-_WRIST = RowsType(lane, None, fields=Segments._fields)
-_ROWS = RowsType(lane, None)
-_SIGNATURE = lane(_NOW, _WRIST, _ROWS, _ROWS)
 
 now_of = rows_named(NOW)
 wrist_of = rows_named(Segments._fields)
@@ -57,7 +53,14 @@ class Controller:
     notes: Mapping[str, str] = field(default_factory=dict)
     """What a reader should know about a preset."""
 
-    @cached_property
-    def compiled(self) -> Any:
-        """The law as native code that every rollout kernel can call."""
-        return numba.cfunc(_SIGNATURE, cache=cache_folder() is not None)(self.law)
+    def compiled(self, count: int = 1) -> Any:
+        """The law as native code that every kernel of as many rollouts can call."""
+        return _native(self.law, width(count))
+
+
+@cache
+def _native(law: Law, lanes: int) -> Any:
+    number = LaneType(lanes)
+    rows = RowsType(number, None)
+    now, wrist = (RowsType(number, None, fields=fields) for fields in (NOW, Segments._fields))
+    return numba.cfunc(number(now, wrist, rows, rows), cache=cache_folder() is not None)(law)

@@ -1,6 +1,6 @@
 """The forward model: the angle that a wrist on elastic tendons takes where its spools are moved as recorded.
 
-Eight candidates at a time, one a lane: a Jacobian costs one block. Actuator and integrator are the simulation's own.
+A block of candidates at a time, one a lane: a Jacobian costs one block. Actuator and integrator are the simulation's own.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
@@ -80,8 +80,8 @@ def angles(candidates: Sequence[Candidate], reeled: Array, h: float, n: int) -> 
     """
     models = to_blocks(np.array([segments(each.wrist, n) for each in candidates]))
     tendons = to_blocks(np.array([[each.tendon_stiffness, each.friction, *each.taut] for each in candidates]))
-    found = np.empty((len(models), len(reeled), models.shape[-1]))
+    found = np.empty((len(models), len(reeled), *models.shape[2:]))
     reeled = np.ascontiguousarray(reeled, float)
     for model, tendon, angle in zip(models, tendons, found, strict=True):
-        _advance(model, tendon, reeled, h, round(SETTLE / h), np.zeros((2 * n, angle.shape[-1])), angle, (0,) * n)
-    return np.ascontiguousarray(found.transpose(0, 2, 1).reshape(-1, len(reeled))[: len(candidates)])
+        _advance(model, tendon, reeled, h, round(SETTLE / h), np.zeros((2 * n, *angle.shape[1:])), angle, (0,) * n)
+    return to_rows(found, len(candidates))

@@ -17,10 +17,8 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import Candidate, angles
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -69,12 +67,11 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     loop = Loop(actuator=actuator)
     done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
     sides = [2.0 * done.column(name, 0) for name in ("tension_plus", "tension_minus")]
-    commands = np.repeat(np.stack([*sides, followed.theta_ref], axis=1)[..., None], LANES, axis=2)
+    commands = np.stack([*sides, followed.theta_ref], axis=1)
     drive = drive_of(actuator)
-    motors = np.repeat(at_rest(drive, wrist, np.zeros(1))[:, None], LANES, axis=1)
-    out = np.empty((len(commands), 2, LANES))
-    _reel_in(drive, motors, to_blocks(segments(wrist, 1)[None])[0], np.ascontiguousarray(commands), out, _PERIOD)
-    return np.ascontiguousarray(out[..., 0])
+    out = np.empty((len(commands), 2))
+    _reel_in(drive, at_rest(drive, wrist, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
+    return out
 
 
 def rehearse(

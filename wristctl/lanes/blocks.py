@@ -1,4 +1,8 @@
-"""Between rows of numbers, one per rollout, and blocks of lanes, as compiled code wants them."""
+"""Between rows of numbers, one per rollout, and blocks of lanes, as compiled code wants them.
+
+A block holds LANES rollouts along its last axis; a rollout alone is a block without that axis. The last block is
+filled up with the last rollout.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +14,24 @@ from wristctl.lanes.types import LANES
 Array = NDArray[np.float64]
 
 
-def to_blocks(rows: Array) -> Array:
-    """(count, variables) -> (blocks, variables, LANES); the last block is filled up with the last rollout."""
-    count, variables = rows.shape
+def width(count: int) -> int:
+    """Lanes of each block of as many rollouts."""
+    return 1 if count == 1 else LANES
+
+
+def lanes_of(count: int) -> NDArray[np.int64]:
+    """The rollout of each block's lanes, (blocks, LANES), or (1,) where there is only one."""
+    if count == 1:
+        return np.zeros(1, np.int64)
     blocks = -(-count // LANES)
-    index = np.minimum(np.arange(blocks * LANES), count - 1)
-    return np.ascontiguousarray(rows[index].reshape(blocks, LANES, variables).transpose(0, 2, 1))
+    return np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
+
+
+def to_blocks(rows: Array) -> Array:
+    """(count, variables) -> (blocks, variables, LANES), or (1, variables) where there is only one."""
+    return np.ascontiguousarray(np.moveaxis(rows[lanes_of(len(rows))], -1, 1))
 
 
 def to_rows(blocks: Array, count: int) -> Array:
-    """(blocks, variables, LANES) -> (count, variables), the filling dropped."""
-    return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:count])
+    """(blocks, variables, LANES) or (1, variables) -> (count, variables), the filling dropped."""
+    return np.ascontiguousarray(np.moveaxis(blocks, 1, -1).reshape(-1, blocks.shape[1])[:count])

@@ -52,9 +52,9 @@ def _forget_old(base: Path, current: Path) -> None:
 
 
 def compiled(function: F) -> F:
-    """Compile for lanes: cached, without the interpreter's lock, of fast-math only `contract`."""
+    """Compile for lanes: cached, without the interpreter's lock, without fast-math."""
     folder = cache_folder()
     if folder is not None:
         numba.config.CACHE_DIR = str(folder)
-    jit = numba.njit(fastmath={"contract"}, error_model="numpy", nogil=True, forceinline=True, cache=folder is not None)
+    jit = numba.njit(error_model="numpy", nogil=True, forceinline=True, cache=folder is not None)
     return cast(F, jit(function))

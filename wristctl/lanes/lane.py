@@ -1,4 +1,7 @@
-"""Arithmetic of lanes and of planar vectors, as numba lowers it. Its functions run in compiled code only."""
+"""Arithmetic of lanes and of planar vectors, as numba lowers it. Its functions run in compiled code only.
+
+A product next to a sum becomes one fused multiply-add, rounded once; of two products the first fuses.
+"""
 
 from __future__ import annotations
 
@@ -11,27 +14,54 @@ from numba.core import cgutils
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
-from wristctl.lanes.types import FAST, LANES, PAIR, VECTOR, define, lane, mask, plane
-
-define(operator.add, (lane, lane), lane, lambda b, x, y: b.fadd(x, y, flags=FAST))
-define(operator.sub, (lane, lane), lane, lambda b, x, y: b.fsub(x, y, flags=FAST))
-define(operator.mul, (lane, lane), lane, lambda b, x, y: b.fmul(x, y, flags=FAST))
-define(operator.truediv, (lane, lane), lane, lambda b, x, y: b.fdiv(x, y, flags=FAST))
-define(operator.neg, (lane,), lane, lambda b, x: b.fneg(x, flags=FAST))
-define(operator.lt, (lane, lane), mask, lambda b, x, y: b.fcmp_ordered("<", x, y))
-define(operator.le, (lane, lane), mask, lambda b, x, y: b.fcmp_ordered("<=", x, y))
-define(operator.gt, (lane, lane), mask, lambda b, x, y: b.fcmp_ordered(">", x, y))
-define(operator.ge, (lane, lane), mask, lambda b, x, y: b.fcmp_ordered(">=", x, y))
-define(operator.and_, (mask, mask), mask, lambda b, x, y: b.and_(x, y))
-define(operator.or_, (mask, mask), mask, lambda b, x, y: b.or_(x, y))
+from wristctl.lanes.types import LaneType, MaskType, PlaneType, define
 
 
 def _instruction(name: str) -> Callable[..., Any]:
     def emit(builder: Any, *values: Any) -> Any:
-        kind = ir.FunctionType(VECTOR, [VECTOR] * len(values))
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"), values)
+        vector = values[0].type
+        kind = ir.FunctionType(vector, [vector] * len(values))
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{vector.count}f64")
+        return builder.call(function, values)
 
     return emit
+
+
+_fma = _instruction("fma")
+
+
+def _factors(value: Any) -> Any:
+    return value.operands if getattr(value, "opname", None) == "fmul" else None
+
+
+def _add(builder: Any, x: Any, y: Any) -> Any:
+    if product := _factors(x):
+        return _fma(builder, *product, y)
+    if product := _factors(y):
+        return _fma(builder, *product, x)
+    return builder.fadd(x, y)
+
+
+def _subtract(builder: Any, x: Any, y: Any) -> Any:
+    if product := _factors(x):
+        return _fma(builder, *product, builder.fneg(y))
+    if product := _factors(y):
+        return _fma(builder, builder.fneg(product[0]), product[1], x)
+    return builder.fsub(x, y)
+
+
+_TWO = (LaneType, LaneType)
+define(operator.add, _TWO, LaneType, _add)
+define(operator.sub, _TWO, LaneType, _subtract)
+define(operator.mul, _TWO, LaneType, lambda b, x, y: b.fmul(x, y))
+define(operator.truediv, _TWO, LaneType, lambda b, x, y: b.fdiv(x, y))
+define(operator.neg, (LaneType,), LaneType, lambda b, x: b.fneg(x))
+define(operator.lt, _TWO, MaskType, lambda b, x, y: b.fcmp_ordered("<", x, y))
+define(operator.le, _TWO, MaskType, lambda b, x, y: b.fcmp_ordered("<=", x, y))
+define(operator.gt, _TWO, MaskType, lambda b, x, y: b.fcmp_ordered(">", x, y))
+define(operator.ge, _TWO, MaskType, lambda b, x, y: b.fcmp_ordered(">=", x, y))
+define(operator.and_, (MaskType, MaskType), MaskType, lambda b, x, y: b.and_(x, y))
+define(operator.or_, (MaskType, MaskType), MaskType, lambda b, x, y: b.or_(x, y))
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
@@ -55,32 +85,33 @@ def exp2i(k: Any) -> Any:
 
 
 def _exp2i(builder: Any, k: Any) -> Any:
-    integers = ir.VectorType(ir.IntType(64), LANES)
-    biased = builder.add(builder.fptosi(k, integers), ir.Constant(integers, [1023] * LANES))
-    return builder.bitcast(builder.shl(biased, ir.Constant(integers, [52] * LANES)), VECTOR)
+    width = k.type.count
+    integers = ir.VectorType(ir.IntType(64), width)
+    biased = builder.add(builder.fptosi(k, integers), ir.Constant(integers, [1023] * width))
+    return builder.bitcast(builder.shl(biased, ir.Constant(integers, [52] * width)), k.type)
 
 
-define(where, (mask, lane, lane), lane, lambda b, c, x, y: b.select(c, x, y))
-define(sqrt, (lane,), lane, _instruction("sqrt"))
-define(floor, (lane,), lane, _instruction("floor"))
-define(abs, (lane,), lane, _instruction("fabs"))
-define(exp2i, (lane,), lane, _exp2i)
+define(where, (MaskType, LaneType, LaneType), LaneType, lambda b, c, x, y: b.select(c, x, y))
+define(sqrt, (LaneType,), LaneType, _instruction("sqrt"))
+define(floor, (LaneType,), LaneType, _instruction("floor"))
+define(abs, (LaneType,), LaneType, _instruction("fabs"))
+define(exp2i, (LaneType,), LaneType, _exp2i)
 
 
 def polynomial(coefficients: tuple[float, ...]) -> Any:
     """The polynomial with these coefficients, highest power first, as a function of compiled code (Horner)."""
 
     def emit(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        total = ir.Constant(VECTOR, [coefficients[0]] * LANES)
-        for coefficient in coefficients[1:]:
-            product = builder.fmul(total, args[0], flags=FAST)
-            total = builder.fadd(product, ir.Constant(VECTOR, [coefficient] * LANES), flags=FAST)
+        x = args[0]
+        total, *rest = (ir.Constant(x.type, [coefficient] * x.type.count) for coefficient in coefficients)
+        for coefficient in rest:
+            total = _fma(builder, total, x, coefficient)
         return total
 
     @intrinsic
     def p(typingctx: Any, x: Any) -> Any:
         """Value at x."""
-        return signature(lane, lane), emit
+        return signature(x, x) if isinstance(x, LaneType) else None, emit
 
     return p
 
@@ -101,46 +132,50 @@ def dot(u: Any, v: Any) -> Any:
 
 
 def _xy(builder: Any, v: Any) -> tuple[Any, Any]:
+    if getattr(v, "opname", None) == "insertvalue":
+        return v.operands[0].operands[1], v.operands[1]
     return builder.extract_value(v, 0), builder.extract_value(v, 1)
 
 
 def _planar(builder: Any, x: Any, y: Any) -> Any:
-    return builder.insert_value(builder.insert_value(ir.Constant(PAIR, ir.Undefined), x, 0), y, 1)
+    empty = ir.Constant(ir.ArrayType(x.type, 2), ir.Undefined)
+    return builder.insert_value(builder.insert_value(empty, x, 0), y, 1)
 
 
-def _each(name: str) -> Callable[..., Any]:
+def _each(emit_part: Callable[..., Any]) -> Callable[..., Any]:
     def emit(builder: Any, u: Any, v: Any) -> Any:
         parts = zip(_xy(builder, u), _xy(builder, v), strict=True)
-        return _planar(builder, *(getattr(builder, name)(a, b, flags=FAST) for a, b in parts))
+        return _planar(builder, *(emit_part(builder, a, b) for a, b in parts))
 
     return emit
 
 
 def _scaled(builder: Any, s: Any, v: Any) -> Any:
-    return _planar(builder, *(builder.fmul(s, a, flags=FAST) for a in _xy(builder, v)))
+    return _planar(builder, *(builder.fmul(s, a) for a in _xy(builder, v)))
 
 
 def _dot(builder: Any, u: Any, v: Any) -> Any:
     (a, b), (c, d) = _xy(builder, u), _xy(builder, v)
-    return builder.fadd(builder.fmul(a, c, flags=FAST), builder.fmul(b, d, flags=FAST), flags=FAST)
+    return _add(builder, builder.fmul(a, c), builder.fmul(b, d))
 
 
 def _complex_product(builder: Any, u: Any, v: Any) -> Any:
     (a, b), (c, d) = _xy(builder, u), _xy(builder, v)
-    real = builder.fsub(builder.fmul(a, c, flags=FAST), builder.fmul(b, d, flags=FAST), flags=FAST)
-    imaginary = builder.fadd(builder.fmul(a, d, flags=FAST), builder.fmul(b, c, flags=FAST), flags=FAST)
+    real = _subtract(builder, builder.fmul(a, c), builder.fmul(b, d))
+    imaginary = _add(builder, builder.fmul(a, d), builder.fmul(b, c))
     return _planar(builder, real, imaginary)
 
 
 def _turn(builder: Any, v: Any) -> Any:
     x, y = _xy(builder, v)
-    return _planar(builder, builder.fneg(y, flags=FAST), x)
+    return _planar(builder, builder.fneg(y), x)
 
 
-define(planar, (lane, lane), plane, _planar)
-define(turn, (plane,), plane, _turn)
-define(dot, (plane, plane), lane, _dot)
-define(operator.add, (plane, plane), plane, _each("fadd"))
-define(operator.sub, (plane, plane), plane, _each("fsub"))
-define(operator.mul, (lane, plane), plane, _scaled)
-define(operator.mul, (plane, plane), plane, _complex_product)
+_VECTORS = (PlaneType, PlaneType)
+define(planar, _TWO, PlaneType, _planar)
+define(turn, (PlaneType,), PlaneType, _turn)
+define(dot, _VECTORS, LaneType, _dot)
+define(operator.add, _VECTORS, PlaneType, _each(_add))
+define(operator.sub, _VECTORS, PlaneType, _each(_subtract))
+define(operator.mul, (LaneType, PlaneType), PlaneType, _scaled)
+define(operator.mul, _VECTORS, PlaneType, _complex_product)

@@ -1,7 +1,8 @@
 """Rows: sequences of lanes or planar vectors, indexed like a list or, where they form a matrix, by [i, j].
 
-Rows are views of an array [row, lane] or scratch memory on the stack. Their length is part of their type where it is
-the number of segments, so that loops over segments unroll. Scratch lives as long as the function that asks for it.
+Rows are views of an array, [row, lane] of a block or [row] of a rollout alone, or scratch memory on the stack. Their
+length is part of their type where it is the number of segments, so that loops over segments unroll. Scratch lives as
+long as the function that asks for it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numba.core.imputils import lower_builtin, lower_getattr_generic
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import intrinsic
 
-from wristctl.lanes.types import LaneType, PlaneType, RowsType, lane, plane
+from wristctl.lanes.types import LANES, LaneType, PlaneType, RowsType
 
 _PAIR_OF_INDICES = numba.types.UniTuple(numba.types.intp, 2)
 
@@ -88,19 +89,24 @@ def _field(context: Any, builder: Any, rows: RowsType, pointer: Any, name: str) 
     return builder.load(_address(builder, rows, pointer, index), align=8)
 
 
+_WIDTH = {1: 1, 2: LANES}
+"""Lanes of an array's rows, by its number of axes."""
+
+
 def rows_named(fields: tuple[str, ...]) -> Any:
-    """An intrinsic that views an array [row, lane] as rows whose first entries have these names."""
+    """An intrinsic that views an array as `rows_of` does, its first rows by these names."""
 
     @intrinsic
     def view(typingctx: Any, array: types.Array) -> Any:
-        return _view(RowsType(lane, None, fields=fields), array)
+        return _view(array, fields)
 
     return view
 
 
-def _view(result: RowsType, array: types.Array) -> Any:
-    if array.dtype != types.float64 or array.layout != "C":
+def _view(array: types.Array, fields: tuple[str, ...] = ()) -> Any:
+    if array.dtype != types.float64 or array.layout != "C" or array.ndim not in _WIDTH:
         return None
+    result = RowsType(LaneType(_WIDTH[array.ndim]), None, fields=fields)
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         struct = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0])
@@ -111,8 +117,8 @@ def _view(result: RowsType, array: types.Array) -> Any:
 
 @intrinsic
 def rows_of(typingctx: Any, array: types.Array) -> Any:
-    """View a contiguous float64 array [..., row, lane] as rows of lanes."""
-    return _view(RowsType(lane, None), array)
+    """View a contiguous float64 array, [row, lane] of a block or [row] of a rollout alone, as rows of lanes."""
+    return _view(array)
 
 
 @intrinsic
@@ -146,17 +152,17 @@ def _scratch(result: RowsType, rows: RowsType) -> Any:
 @intrinsic
 def lanes_like(typingctx: Any, rows: RowsType) -> Any:
     """Scratch lanes, uninitialised, as many as `rows`."""
-    return _scratch(RowsType(lane, rows.size), rows)
+    return _scratch(RowsType(LaneType(rows.element.width), rows.size), rows)
 
 
 @intrinsic
 def planes_like(typingctx: Any, rows: RowsType) -> Any:
     """Scratch planar vectors, uninitialised, as many as `rows`."""
-    return _scratch(RowsType(plane, rows.size), rows)
+    return _scratch(RowsType(PlaneType(rows.element.width), rows.size), rows)
 
 
 @intrinsic
 def square_like(typingctx: Any, rows: RowsType) -> Any:
     """A scratch matrix of lanes, uninitialised, with a row and a column for each of `rows`."""
-    return _scratch(RowsType(lane, rows.size, columns=rows.size or 1), rows)
+    return _scratch(RowsType(LaneType(rows.element.width), rows.size, columns=rows.size or 1), rows)
 

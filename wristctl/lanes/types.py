@@ -1,7 +1,9 @@
 """Numba's types of lanes: a number, a comparison, a planar vector, each a block of rollouts wide, and rows of them.
 
-A lane is an LLVM vector of doubles. Arithmetic on it is vertical, so what one rollout computes cannot depend on its
-neighbours, on the batch or on the thread count, bit for bit; of fast-math only `contract` (fused multiply-add) is on.
+A lane is an LLVM vector of doubles, as wide as a block of rollouts or, where there is only one, of width one.
+Arithmetic on it is vertical and without fast-math; a product and a sum fuse where they are written next to each other
+(`wristctl.lanes.lane`), not where a compiler finds it convenient. So what a rollout computes cannot depend, bit for
+bit, on its neighbours, on the batch, on the thread count or on the processor's registers.
 """
 
 from __future__ import annotations
@@ -18,42 +20,52 @@ from numba.extending import models, register_model
 
 LANES = 16
 """Rollouts of one block: two registers of AVX-512, four of AVX2, so that independent operations fill the waits of
-others. Where a product and a sum fuse may change with the width, so it is the same on every machine."""
+others."""
 
-FAST = ("contract",)
-VECTOR = ir.VectorType(ir.DoubleType(), LANES)
-PAIR = ir.ArrayType(VECTOR, 2)
+WIDTHS = (1, LANES)
+"""A rollout alone, and a block of rollouts."""
 
 
-class LaneType(types.Type):
+class _Wide(types.Type):
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"{type(self).__name__}({width})")
+
+    @property
+    def vector(self) -> ir.VectorType:
+        """The lanes' doubles."""
+        return ir.VectorType(ir.DoubleType(), self.width)
+
+
+class LaneType(_Wide):
     """A number; Python's numbers convert to it by repetition."""
 
-    llvm = VECTOR
-
-    def __init__(self) -> None:
-        super().__init__(name=f"lane{LANES}")
+    @property
+    def llvm(self) -> ir.Type:
+        """A double for each rollout."""
+        return self.vector
 
     def can_convert_from(self, typingctx: Any, other: types.Type) -> Conversion | None:
         """Numbers become lanes by repetition."""
         return Conversion.safe if isinstance(other, types.Number) else None
 
 
-class MaskType(types.Type):
+class MaskType(_Wide):
     """The result of comparing two lanes."""
 
-    llvm = ir.VectorType(ir.IntType(1), LANES)
+    @property
+    def llvm(self) -> ir.Type:
+        """A bit for each rollout."""
+        return ir.VectorType(ir.IntType(1), self.width)
 
-    def __init__(self) -> None:
-        super().__init__(name=f"mask{LANES}")
 
-
-class PlaneType(types.Type):
+class PlaneType(_Wide):
     """A planar vector, written as a complex number: x + i y."""
 
-    llvm = PAIR
-
-    def __init__(self) -> None:
-        super().__init__(name=f"plane{LANES}")
+    @property
+    def llvm(self) -> ir.Type:
+        """x and y."""
+        return ir.ArrayType(self.vector, 2)
 
 
 class RowsType(types.Type):
@@ -80,11 +92,6 @@ class RowsType(types.Type):
         return self.size * self.columns
 
 
-lane = LaneType()
-mask = MaskType()
-plane = PlaneType()
-
-
 @register_model(LaneType)
 @register_model(MaskType)
 @register_model(PlaneType)
@@ -94,35 +101,41 @@ class _AsInLLVM(models.PrimitiveModel):
         super().__init__(dmm, fe_type, fe_type.llvm)
 
 
-def repeat(builder: Any, scalar: Any) -> Any:
+def repeat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
     """The vector of a double repeated over the lanes."""
-    one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), zeros)
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), vector.count), [0] * vector.count)
+    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
 
 @lower_cast(types.Float, LaneType)
 @lower_cast(types.Integer, LaneType)
-def _number_to_lane(context: Any, builder: Any, fromty: types.Type, toty: types.Type, value: Any) -> Any:
-    return repeat(builder, context.cast(builder, value, fromty, types.float64))
+def _number_to_lane(context: Any, builder: Any, fromty: types.Type, toty: LaneType, value: Any) -> Any:
+    return repeat(builder, context.cast(builder, value, fromty, types.float64), toty.vector)
 
 
-def define(function: Any, arguments: tuple[types.Type, ...], result: types.Type, emit: Callable[..., Any]) -> None:
-    """Teach numba `function` on these types by `emit(builder, *values)`; numbers among them are repeated."""
+def define(
+    function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide], emit: Callable[..., Any]
+) -> None:
+    """Teach numba `function` on these types by `emit(builder, *values)`; numbers among the lanes are repeated."""
 
+    def lowered(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        return emit(builder, *args)
+
+    for width in WIDTHS:
+        _teach(function, tuple(kind(width) for kind in arguments), result(width), lowered)
+
+
+def _teach(function: Any, arguments: tuple[_Wide, ...], result: _Wide, lowered: Callable[..., Any]) -> None:
     class Signature(AbstractTemplate):
         def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
             if len(args) != len(arguments) or all(isinstance(given, types.Number) for given in args):
                 return None
             fits = all(
-                given == wanted or (wanted == lane and isinstance(given, types.Number))
+                given == wanted or (isinstance(wanted, LaneType) and isinstance(given, types.Number))
                 for given, wanted in zip(args, arguments, strict=True)
             )
             return signature(result, *arguments) if fits else None
 
     infer_global(function)(Signature)
-
-    def lowered(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        return emit(builder, *args)
-
     lower_builtin(function, *arguments)(lowered)

@@ -76,10 +76,11 @@ def _run_block(
     old_theta, old_omega = lanes_like(theta), lanes_like(theta)
     zero = 0.0 * low
     h = period / substeps + zero
+    targets = target.reshape(3, len(which))
     for sample in range(first, last):
         for signal in range(3):
             for lane in range(len(which)):
-                target[signal, lane] = courses[which[lane], sample, signal]
+                targets[signal, lane] = courses[which[lane], sample, signal]
         if disturbed is not None:
             wrist = disturb(undisturbed, disturbed[sample, 0], disturbed[sample, 1])
         for tick in range(ticks):

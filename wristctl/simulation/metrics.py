@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
@@ -154,10 +153,8 @@ def metrics_of(
     count = len(theta)
     flags = np.zeros(count) if saturated is None else np.asarray(saturated, float)
     series = np.column_stack([theta, theta_ref, tension, flags])
-    goals = np.array([[final, final, 0.0, rest, count * period]])
-    sums = np.zeros((1, len(SUMS)))
-    sums[0, _ALIVE] = 1.0
-    blocks = to_blocks(sums)
-    lanes = np.ascontiguousarray(np.repeat(series[:, :, None], blocks.shape[-1], axis=2))
-    _replay(lanes, to_blocks(goals)[0], blocks[0], period)
-    return {name: float(value[0]) for name, value in summary(to_rows(blocks, 1), goals, period).items()}
+    goals = np.array([final, final, 0.0, rest, count * period])
+    sums = np.zeros(len(SUMS))
+    sums[_ALIVE] = 1.0
+    _replay(series, goals, sums, period)
+    return {name: float(value[0]) for name, value in summary(sums[None], goals[None], period).items()}

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from wristctl.config.plant import Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
-from wristctl.lanes.blocks import to_blocks
+from wristctl.lanes.blocks import lanes_of, to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import Drive, at_rest, pulls, tendon_stiffness
 from wristctl.simulation.camera import frames
 from wristctl.wrist.allocation import torque_of
@@ -30,7 +29,7 @@ _ONE = (0,)
 
 
 class Observer(NamedTuple):
-    """One block's estimates: gain (3,), what was delivered (ring, 2, LANES), and x (3, LANES).
+    """One block's estimates: gain (3,), what was delivered (ring, 2), and x (3,), each with its lanes.
 
     `fused` is x at the last fused frame, at tick `at[0]`; `now` is x at the present tick.
     """
@@ -43,7 +42,7 @@ class Observer(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """One block's camera: its Frames, pictures taken (F, LANES), and the next frame to take and to arrive, `turn`."""
+    """One block's camera: its Frames, pictures taken (F,), and the next frame to take and to arrive, `turn`."""
 
     captures: Any
     arrivals: Any
@@ -114,8 +113,8 @@ def expect(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: A
 
 
 @compiled
-def _predict_rows(drive: Any, model: Any, states: Any, plus: float, minus: float, h: float) -> None:
-    known, x = load_segments(rows_of(model)), rows_of(states)
+def _predict_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
+    known, x = load_segments(rows_of(model)), rows_of(state)
     predict(drive, known, x, plus + 0.0 * x[0], minus + 0.0 * x[0], h)
 
 
@@ -123,11 +122,10 @@ def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters,
     """The Kalman gain (3,) for one frame after another, from the prediction linearised where the wrist is straight."""
     delivered = at_rest(drive, wrist, np.zeros(1))[[0, 2]]
     small = 1e-6
-    states = np.zeros((3, LANES))
-    states[:, :3] = small * np.eye(3)
-    model = to_blocks(segments(wrist, 1)[None])[0]
-    _predict_rows(drive, model, states, float(delivered[0]), float(delivered[1]), period)
-    tick = (states[:, :3] - states[:, 3:4]) / small
+    states = small * np.eye(4, 3)
+    for state in states:
+        _predict_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
+    tick = (states[:3] - states[3]).T / small
     unknown = tick[1, 2]  # rate gained in one period per unit of torque
     noise = np.diag([0.0, unknown**2 * sensor.torque_noise**2 / period, sensor.load_drift**2 * period])
     ticks = max(1, round(1.0 / (sensor.frame_rate * period)))
@@ -145,11 +143,10 @@ def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters,
 def observer_of(
     sensor: Sensor, drive: Drive | None, wrist: WristParameters, period: float, ticks: int, theta: float
 ) -> Observer:
-    """An observer that knows the angle [rad] at which the wrist rests, and remembers the last `ticks` periods."""
-    start = np.zeros((3, LANES))
-    start[0] = theta
+    """A rollout's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
+    start = np.array([theta, 0.0, 0.0])
     gain = stationary_gain(sensor, drive, wrist, period)
-    return Observer(gain, np.zeros((ticks, 2, LANES)), start, start.copy(), np.zeros(1, np.int64))
+    return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1, np.int64))
 
 
 def cameras_of(
@@ -165,22 +162,27 @@ def cameras_of(
 
     All but captures, arrivals and gain have the block as their first axis: `of_block` is one block's.
     """
-    count, blocks = len(seeds), -(-len(seeds) // LANES)
     if sensor.level == "ideal":
         return None
     taken = frames(sensor, period, horizon, seeds)
     longest = int((taken.arrivals - taken.captures).max() + np.diff(taken.captures).max(initial=1)) + 2
     fresh = observer_of(sensor, drive, wrist, period, longest, theta)
-    lanes = np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
+    lanes = lanes_of(len(seeds))
+    blocks, *wide = lanes.shape
     watch = Watch(
         captures=taken.captures,
         arrivals=taken.arrivals,
-        readings=np.ascontiguousarray(np.moveaxis(taken.readings[..., lanes], -2, 0)),
-        pictures=np.zeros((blocks, len(taken.captures), LANES)),
+        readings=np.ascontiguousarray(np.moveaxis(taken.readings[..., lanes], 2, 0)),
+        pictures=np.zeros((blocks, len(taken.captures), *wide)),
         turn=np.zeros((blocks, 2), np.int64),
     )
-    own = {name: np.repeat(getattr(fresh, name)[None], blocks, axis=0) for name in ("delivered", "fused", "now", "at")}
-    return watch, fresh._replace(**own)
+
+    def for_each(values: Array) -> Array:
+        rows = to_blocks(np.broadcast_to(values.ravel(), (len(seeds), values.size)))
+        return rows.reshape(blocks, *values.shape, *wide)
+
+    own = {name: for_each(getattr(fresh, name)) for name in ("delivered", "fused", "now")}
+    return watch, fresh._replace(**own, at=np.tile(fresh.at, (blocks, 1)))
 
 
 @compiled

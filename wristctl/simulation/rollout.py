@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
-from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows, width
 from wristctl.lanes.cores import cores
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.kernel import RECORDED, run_blocks
@@ -82,7 +81,7 @@ def rollout(
     samples = len(motions[0].theta_ref)
     limit = wrist.tension_limit if loop.limits else np.inf
     fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
-    plant, model, limits = (np.repeat(np.tile(row, (1, 1))[..., None], LANES, axis=2)[0] for row in fixed)
+    plant, model, limits = (to_blocks(np.tile(row, (width(count), 1)))[0] for row in fixed)
     goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
     rest = np.zeros(n) if start is None else start
     drive, period = drive_of(loop.actuator), loop.control_period
@@ -95,28 +94,30 @@ def rollout(
         "motors": at_rest(drive, plant_of(wrist, loop.plant), rest),
     }
     blocks = {name: to_blocks(np.broadcast_to(row, (count, row.shape[-1]))) for name, row in begin_with.items()}
-    followed = to_blocks(np.asarray(which, float)[:, None])[:, 0].astype(np.int64)
+    lanes = lanes_of(count)
+    total, *wide = lanes.shape
+    followed = which[lanes].reshape(total, -1)
     courses = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
     disturbed = course(loop.disturbances, motions[0].time)
-    total = len(blocks["gains"])
     streams = np.zeros(count, np.int64) if seeds is None else seeds
     cameras = cameras_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest.sum())
-    recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, LANES))
+    recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, *wide))
     workers = threads or cores()
     each = samples * ticks * loop.substeps
     together = max(1, min(_SLICE_TICKS // each, total // (_SHARES * workers)))
+    law = controller.compiled(count)
     stop, done = threading.Event(), [0] * total
 
     def run(begin: int) -> None:
         end = min(begin + together, total)
-        now, target = np.zeros((len(NOW), LANES)), np.zeros((3, LANES))
+        now, target = np.zeros((len(NOW), *wide)), np.zeros((3, *wide))
         piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
             last = min(first + piece, samples)
             run_blocks(
-                controller.compiled, plant, model, limits, blocks["gains"], blocks["goals"], courses, followed,
+                law, plant, model, limits, blocks["gains"], blocks["goals"], courses, followed,
                 blocks["memory"], blocks["state"], blocks["sums"], recorded, drive, blocks["motors"], cameras,
                 disturbed, now, target, period, loop.substeps, ticks, begin, end, first, last, (0,) * n,
             )  # fmt: skip
@@ -133,7 +134,7 @@ def rollout(
             raise
 
     sums = to_rows(blocks["sums"], count)
-    kept = recorded.transpose(0, 3, 1, 2).reshape(total * LANES, -1, len(RECORDED) + n)[:count] if record else None
+    kept = to_rows(recorded.reshape(total, -1, *wide), count).reshape(count, samples, -1) if record else None
     metrics = summary(sums, goal_rows, loop.control_period)
     return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)
 

@@ -73,7 +73,7 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     *batch, n = theta.shape
     states = np.concatenate([theta, omega], axis=-1).reshape(-1, 2 * n)
     blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
-    out = np.empty((len(blocks), 3 + 5 * n + n * n, blocks.shape[-1]))
+    out = np.empty((len(blocks), 3 + 5 * n + n * n, *blocks.shape[2:]))
     _terms(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     tendon = rows[..., 3 + n : 3 + 5 * n].reshape(*batch, n, 2, 2)
@@ -117,7 +117,7 @@ def linearised(
     pulls = np.broadcast_to(pulls, (*batch, 2))
     states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
     blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
-    out = np.empty((len(blocks), n + 2 * n * n, blocks.shape[-1]))
+    out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
     _linearised(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
@@ -149,9 +149,8 @@ def integrate(
     if not np.allclose(counts * h, times, rtol=0, atol=1e-9 * h):
         raise ValueError(f"times must be whole numbers of steps of {h} s")
     n = len(np.atleast_1d(theta))
-    state = to_blocks(np.concatenate([np.atleast_1d(theta), np.atleast_1d(omega)]).astype(float)[None])
-    out = np.empty((len(counts) + 1, 2 * n, state.shape[-1]))
-    out[0] = state[0]
-    each = to_blocks(np.asarray(parameters, float)[None])[0]
-    _integrate(each, to_blocks(np.asarray(pulls, float)[None])[0], h, np.diff(counts, prepend=0), out, (0,) * n)
-    return out[1:, :n, 0], out[1:, n:, 0]
+    out = np.empty((len(counts) + 1, 2 * n))
+    out[0] = np.concatenate([np.atleast_1d(theta), np.atleast_1d(omega)])
+    held = np.ascontiguousarray(pulls, float)
+    _integrate(np.ascontiguousarray(parameters, float), held, h, np.diff(counts, prepend=0), out, (0,) * n)
+    return out[1:, :n], out[1:, n:]

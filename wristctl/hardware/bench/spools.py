@@ -19,7 +19,6 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import pulls
 from wristctl.simulation.disturbances import disturb
 from wristctl.wrist.integrator import step
@@ -55,7 +54,7 @@ def motor_of(settings: BenchSettings) -> Motor:
 
 
 class Spools(NamedTuple):
-    """State of the four axes, (4,) or (4, LANES); `latch` holds port A as last heard of.
+    """State of the four axes, (4,); `latch` holds port A as last heard of.
 
     `reeled` [m] counts from where the tendon of the straight wrist is taut without pulling.
     """
@@ -83,8 +82,8 @@ def spools_of(settings: BenchSettings) -> Spools:
         sense=np.where(settings.motors.reversed, -1, 1),
         slack=slack,
         latch=np.zeros(1, np.int64),
-        reeled=np.repeat(-slack[:, None], LANES, axis=1),
-        pull=np.zeros((AXES, LANES)),
+        reeled=-slack,
+        pull=np.zeros(AXES),
     )
 
 
@@ -104,7 +103,7 @@ def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
             on = 1 - (value >> axis & 1)
             if on and not spools.energised[axis]:
                 counted = motor.step * spools.counted[axis] - spools.slack[axis]
-                spools.slipped[axis] = int(np.rint((spools.reeled[axis, 0] - counted) / motor.turn))
+                spools.slipped[axis] = int(np.rint((spools.reeled[axis] - counted) / motor.turn))
             spools.energised[axis] = on
 
 
@@ -112,15 +111,14 @@ def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
 def _turn(spools: Any, motor: Any, stiffness: float) -> None:
     """Where the spools stand after a period, by the pulls at its start."""
     for axis in range(AXES):
-        pull = spools.pull[axis, 0]
+        pull = spools.pull[axis]
         if spools.energised[axis]:
             if pull > motor.holding:
                 spools.slipped[axis] -= 1
-            place = motor.step * spools.counted[axis] + motor.turn * spools.slipped[axis] - spools.slack[axis]
+            turned = motor.step * spools.counted[axis] + motor.turn * spools.slipped[axis]
+            spools.reeled[axis] = turned - spools.slack[axis]
         else:
-            place = spools.reeled[axis, 0] - motor.release * max(0.0, pull - motor.detent) / stiffness
-        for k in range(LANES):
-            spools.reeled[axis, k] = place
+            spools.reeled[axis] -= motor.release * max(0.0, pull - motor.detent) / stiffness
 
 
 @compiled
@@ -167,8 +165,8 @@ def follow(
             theta[i] = where(alive > zero, theta[i], old[i])
             omega[i] = where(alive > zero, omega[i], zero)
         for i in range(2 * n):
-            out[k, i] = state[i, 0]
+            out[k, i] = state[i]
         for axis in range(AXES):
-            out[k, 2 * n + axis] = spools.pull[axis, 0]
-            out[k, 2 * n + AXES + axis] = spools.reeled[axis, 0]
+            out[k, 2 * n + axis] = spools.pull[axis]
+            out[k, 2 * n + AXES + axis] = spools.reeled[axis]
     return at

@@ -13,7 +13,6 @@ from wristctl.config.wrist import WristParameters
 from wristctl.hardware.bench.spools import CYCLES, PERIOD, follow, motor_of, spools_of
 from wristctl.hardware.emulator.chip import FREQUENCY
 from wristctl.hardware.messages import AXES
-from wristctl.lanes.blocks import to_blocks
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.plant import plant_of
@@ -61,7 +60,7 @@ class BenchWrist:
         self._settings, self._wrist, self._n = settings, wrist, settings.segments
         self._tendon = drive._replace(stiffness=settings.actuator.tendon_stiffness)
         self._motor, self._spools = motor_of(settings), spools_of(settings)
-        self._state = to_blocks(np.zeros((1, 2 * self._n)))[0]
+        self._state = np.zeros(2 * self._n)
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
@@ -129,7 +128,7 @@ class BenchWrist:
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
         plant = plant_of(in_plane(self._wrist, direction), self._settings.plant)
-        self._plant = to_blocks(segments(plant, self._n)[None])[0]
+        self._plant = segments(plant, self._n)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
 
     def _make_room(self, count: int) -> None:

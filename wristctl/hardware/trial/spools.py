@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.directions import ACTIVE, tendons_of
@@ -88,14 +87,14 @@ class Paths:
     """The tendons' paths through the controller's one-segment wrist, for each axis of the board."""
 
     def __init__(self, wrist: WristParameters, plane: str) -> None:
-        self._model = to_blocks(segments(wrist, 1)[None])[0]
+        self._model = segments(wrist, 1)
         self._plus = on_plus_side(plane)
-        self._found = np.zeros((4, self._model.shape[-1]))
+        self._found = np.zeros(4)
 
     def taut(self, theta: float) -> tuple[Array, Array]:
         """By how much each tendon is reeled in where it is just taut at theta [m], and its change by theta [m/rad]."""
         _paths(self._model, theta, self._found)
-        reeled_plus, reeled_minus, arm_plus, arm_minus = self._found[:, 0]
+        reeled_plus, reeled_minus, arm_plus, arm_minus = self._found
         return np.where(self._plus, reeled_plus, reeled_minus), np.where(self._plus, arm_plus, arm_minus)
 
     def sides(self, values: Array) -> tuple[float, float]:

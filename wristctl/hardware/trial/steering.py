@@ -13,10 +13,8 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, wrist_of
 from wristctl.control.response import respond
-from wristctl.lanes.blocks import to_blocks
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.lanes.types import LANES
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import expect, fuse, observer_of
 from wristctl.wrist.allocation import TENDONS_PER_SIDE, torque_of
@@ -53,26 +51,26 @@ class Steering:
         self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float
     ) -> None:
         self._drive = drive_of(actuator)
-        self._model = to_blocks(segments(wrist, 1)[None])[0]
-        self._bounds = np.repeat([[wrist.pretension], [wrist.tension_limit]], LANES, axis=1) * TENDONS_PER_SIDE
+        self._model = segments(wrist, 1)
+        self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
         self._observer = observer_of(sensor, self._drive, wrist, period, REMEMBERED, theta)
-        self._signals, self._target, self._found = (np.zeros((rows, LANES)) for rows in (len(NOW), 3, 6))
+        self._signals, self._target, self._found = (np.zeros(rows) for rows in (len(NOW), 3, 6))
         self._period = period
         self._law: Any = None
-        self._gains = self._memory = np.zeros((1, LANES))
+        self._gains = self._memory = np.zeros(1)
         self.tick = 0
 
     @property
     def estimate(self) -> Estimate:
         """As of the present tick."""
-        theta, rate, load = self._observer.now[:, 0]
+        theta, rate, load = self._observer.now
         return Estimate(float(theta), float(rate), float(load))
 
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
         """Take up a law, its memory empty."""
-        self._law = controller.compiled
-        self._gains = np.repeat(np.array([*gains, 0.0])[:, None], LANES, axis=1)
-        self._memory = np.zeros((max(1, controller.memory), LANES))
+        self._law = controller.compiled()
+        self._gains = np.array([*gains, 0.0])
+        self._memory = np.zeros(max(1, controller.memory))
 
     def see(self, theta: float, captured: float) -> bool:
         """Fuse an angle [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come."""
@@ -85,12 +83,12 @@ class Steering:
 
     def respond(self, theta_ref: float, rate_ref: float, acceleration_ref: float) -> Answer:
         """The law's answer to this reference at the present estimate."""
-        self._target[:] = [[theta_ref], [rate_ref], [acceleration_ref]]
+        self._target[:] = theta_ref, rate_ref, acceleration_ref
         _respond(
             self._law, self._model, self._bounds, self._gains, self._memory, self._signals, self._target,
             self._observer.now, self._period, self._found,
         )  # fmt: skip
-        wanted, torque, plus, minus, low, high = map(float, self._found[:, 0])
+        wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
 
     def expect(self, reeled_plus: float, reeled_minus: float) -> None:
