@@ -5,20 +5,10 @@ The same formulas, law and RODAS3 step as wristctl's kernel, with x and y of pla
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-
-def _series(order: int, terms: int) -> list[float]:
-    """Taylor coefficients of j_order(x)/x^order in x^2, highest first."""
-    coefficients, value = [], 1.0 / math.prod(range(1, 2 * order + 2, 2))
-    for k in range(terms):
-        coefficients.append(value)
-        value /= -2.0 * (k + 1) * (2 * order + 2 * k + 3)
-    return coefficients[::-1]
-
-
-SERIES2, SERIES3 = _series(2, 15), _series(3, 15)
+from wristctl.lanes.series import E2, E3
 
 
 class Segment(NamedTuple):
@@ -38,12 +28,18 @@ class Segment(NamedTuple):
     force_y: Any
 
 
+def polynomial(coefficients: Sequence[float], x: Any) -> Any:
+    """The value at x by Horner's scheme, coefficients lowest power first."""
+    *rest, total = coefficients
+    for coefficient in reversed(rest):
+        total = total * x + coefficient
+    return total
+
+
 def bessel(x: Any) -> Any:
     """j_n(x)/x^n for n = 0..3, and x^2."""
     s = x * x
-    e2, e3 = SERIES2[0], SERIES3[0]
-    for a, b in zip(SERIES2[1:], SERIES3[1:], strict=True):
-        e2, e3 = e2 * s + a, e3 * s + b
+    e2, e3 = polynomial(E2, s), polynomial(E3, s)
     e1 = 5.0 * e2 - s * e3
     return 3.0 * e1 - s * e2, e1, e2, e3, s
 

@@ -13,9 +13,10 @@ from equations import Segment, pulls
 from rodas3 import step
 from venvs import CACHE
 
+from wristctl.lanes.types import LANES
+
 METRICS = {"+": 15, "*": 7}
 """Additions and products of the C loop's gather(), which the equations for arrays leave out."""
-LANES = 16
 
 
 class Counted:

@@ -32,7 +32,7 @@ class Running:
         environment = {
             **os.environ,
             **{name: str(threads) for name in names},
-            "PYTHONPATH": str(ROOT) if side.venv is None else "",
+            "PYTHONPATH": str(ROOT),
             "PEERS_CACHE": str(CACHE),
             **({} if side.width is None else {"C_LANES": str(side.width)}),
             "JAX_PLATFORMS": "cpu",

@@ -1,6 +1,6 @@
 """The forward model: the angle that a wrist on elastic tendons takes where its spools are moved as recorded.
 
-A block of candidates at a time, one a lane: a Jacobian costs one block. Actuator and integrator are the simulation's own.
+Candidates run side by side, one a lane: a Jacobian costs a block or two. Actuator and integrator are the simulation's.
 """
 
 from __future__ import annotations

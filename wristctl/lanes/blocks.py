@@ -29,9 +29,13 @@ def lanes_of(count: int) -> NDArray[np.int64]:
 
 def to_blocks(rows: Array) -> Array:
     """(count, variables) -> (blocks, variables, LANES), or (1, variables) where there is only one."""
-    return np.ascontiguousarray(np.moveaxis(rows[lanes_of(len(rows))], -1, 1))
+    if len(rows) == 1:
+        return np.array(rows)
+    return np.ascontiguousarray(rows[lanes_of(len(rows))].transpose(0, 2, 1))
 
 
 def to_rows(blocks: Array, count: int) -> Array:
     """(blocks, variables, LANES) or (1, variables) -> (count, variables), the filling dropped."""
-    return np.ascontiguousarray(np.moveaxis(blocks, 1, -1).reshape(-1, blocks.shape[1])[:count])
+    if blocks.ndim == 2:
+        return blocks
+    return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:count])

@@ -7,11 +7,12 @@ from typing import Any
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import exp2i, floor, polynomial, where
+from wristctl.lanes.series import E2, E3
 
 _LOG2_E = 1.0 / math.log(2.0)
 _LN2_HIGH = 6.93147180369123816490e-01
 _LN2_LOW = 1.90821492927058770002e-10
-_exp_rest = polynomial(tuple(1.0 / math.factorial(k) for k in range(13, 1, -1)))
+_exp_rest = polynomial(tuple(1.0 / math.factorial(k) for k in range(2, 14)))
 """(exp(r) - 1 - r)/r^2"""
 
 
@@ -45,21 +46,11 @@ def tanh(x: Any) -> Any:
     return where(x < 0.0, -size, size)
 
 
-def _series(order: int, terms: int) -> tuple[float, ...]:
-    """Taylor coefficients of j_order(x)/x^order in x^2, highest first."""
-    coefficients = []
-    value = 1.0 / math.prod(range(1, 2 * order + 2, 2))
-    for k in range(terms):
-        coefficients.append(value)
-        value /= -2.0 * (k + 1) * (2 * order + 2 * k + 3)
-    return tuple(reversed(coefficients))
-
-
-_e2 = polynomial(_series(2, 15))
-_e3 = polynomial(_series(3, 15))
-
 ARC_LIMIT = 2.0 * math.pi
 """Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
+
+_e2 = polynomial(E2)
+_e3 = polynomial(E3)
 
 
 @compiled

@@ -99,14 +99,19 @@ define(exp2i, (LaneType,), LaneType, _exp2i)
 
 
 def polynomial(coefficients: tuple[float, ...]) -> Any:
-    """The polynomial with these coefficients, highest power first, as a function of compiled code (Horner)."""
+    """The polynomial with these coefficients, lowest power first, as a function of compiled code.
+
+    Estrin's scheme: neighbours pair up again and again, so that a lane alone does not wait as it does with Horner's.
+    """
 
     def emit(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        x = args[0]
-        total, *rest = (ir.Constant(x.type, [coefficient] * x.type.count) for coefficient in coefficients)
-        for coefficient in rest:
-            total = _fma(builder, total, x, coefficient)
-        return total
+        power = args[0]
+        terms = [ir.Constant(power.type, [coefficient] * power.type.count) for coefficient in coefficients]
+        while len(terms) > 1:
+            pairs = [_fma(builder, odd, power, even) for even, odd in zip(terms[::2], terms[1::2], strict=False)]
+            terms = pairs + terms[2 * len(pairs) :]
+            power = builder.fmul(power, power)
+        return terms[0]
 
     @intrinsic
     def p(typingctx: Any, x: Any) -> Any:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 from compile_c import compiled
-from equations import SERIES2, SERIES3
 from task import Task
+
+from wristctl.lanes.series import E2, E3
 
 SUMS = 19
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -30,7 +31,7 @@ class _Work(ctypes.Structure):
 
 
 def _library(segments: int, width: int) -> ctypes.CDLL:
-    series = [f"-DSERIES{k}=" + ",".join(map(repr, s)) for k, s in ((2, SERIES2), (3, SERIES3))]
+    series = [f"-DSERIES{k}=" + ",".join(map(repr, s)) for k, s in ((2, E2), (3, E3))]
     options = (f"-DSEGMENTS={segments}", f"-DLANES={width}", *series)
     return compiled("loop.cpp", Path(os.environ["PEERS_CACHE"]), options)
 

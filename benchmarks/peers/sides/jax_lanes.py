@@ -31,7 +31,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
 
     @jax.jit
     def loop(ticks):
-        still = [jnp.zeros(max(lanes, 8))] * n  # for one lane its compiler takes minutes where eight take seconds
+        still = [jnp.zeros(max(lanes, 4))] * n  # one lane alone is slower, and takes its compiler minutes
         return jax.lax.fori_loop(0, ticks, tick, (still, still, jnp.zeros(task.ticks)))[2]
 
     loop(2).block_until_ready()
