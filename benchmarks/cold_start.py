@@ -33,8 +33,8 @@ COMMANDS: dict[str, list[str]] = {
     "compare": ["STUDY"],
 }
 """Each command's smallest run, in this order; train needs gen-data's."""
-AGAIN = 5
-"""Runs with a filled cache, of which the median counts."""
+FIRST, AGAIN = 3, 5
+"""Runs with an empty cache, and with a filled one; their medians count."""
 
 
 def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
@@ -76,6 +76,11 @@ def import_seconds(command: str) -> float:
     return float(done.stdout)
 
 
+def median(runs: list[dict[str, float]]) -> dict[str, float]:
+    """Of each of the times."""
+    return {each: statistics.median(run[each] for run in runs) for each in runs[0]}
+
+
 def main() -> None:
     """Measure every command with its cache empty and, several times, filled."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -87,9 +92,9 @@ def main() -> None:
         folder = Path(name)
         (folder / "study.yaml").write_text(STUDY)
         for command in COMMANDS:
-            cache = folder / f"cache-{command.strip('-')}"  # of its own: what another command compiled is no help
-            first, *later = (seconds_of(command, folder, cache) for _ in range(1 + AGAIN))
-            again = {each: statistics.median(run[each] for run in later) for each in later[0]}
+            caches = [folder / f"cache-{command.strip('-')}-{k}" for k in range(FIRST)]  # of others' no help either
+            first = median([seconds_of(command, folder, cache) for cache in caches])
+            again = median([seconds_of(command, folder, caches[0]) for _ in range(AGAIN)])
             rows[command] = {"import": import_seconds(command), "first": first, "again": again}
             progress = [f"{run['first_progress']:.2f}" if "first_progress" in run else "-" for run in (first, again)]
             print(

@@ -108,8 +108,8 @@ def cold_start(rows: dict[str, Any]) -> str:
     """Seconds of each command."""
     lines = ["## Cold start\n"]
     lines.append(
-        "Seconds of each command's smallest run, its cache of compiled kernels empty, then filled; in brackets until "
-        "its first report of progress. What is missing between the two is compilation.\n"
+        "Seconds of each command's smallest run (medians), its cache of compiled kernels empty, then filled; in "
+        "brackets until its first report of progress. What is missing between the two is compilation.\n"
     )
     lines.append("| command | import | first | again | compilation |\n|---|---|---|---|---|")
     for command, row in rows.items():
