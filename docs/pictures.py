@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from matplotlib.figure import Figure
 
 from wristctl.benchmark.compare import Result, compare
 from wristctl.benchmark.paper import T2
@@ -56,6 +57,12 @@ def camera() -> None:
     cv2.imwrite(str(HERE / "images" / "camera.jpg"), annotate(image, seen), [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
+def keep(name: str, figure: Figure) -> None:
+    """The figure as images/NAME.png."""
+    write_figure(HERE / "images" / name, figure)
+    (HERE / "images" / f"{name}.svg").unlink()
+
+
 def main() -> None:
     camera()
     study = load_study([], [f"rows={ROWS}", "inverses=[none]"], "compare")
@@ -68,10 +75,8 @@ def main() -> None:
             if r.loop == loop and r.label in shown and r.reference.startswith("minimum jerk 1")
         ]
         figure = errors(courses, f"loop {loop}: 30 deg in 1 s, error of the bending angle", log=True)
-        write_figure(HERE / "images" / f"errors-{loop}", figure)
-    write_figure(HERE / "images" / "directions", directions(study.wrist))
-    for image in (HERE / "images").glob("*.svg"):
-        image.unlink()
+        keep(f"errors-{loop}", figure)
+    keep("directions", directions(study.wrist))
     (HERE / "results.md").write_text(
         "# The paper's gains on three loops\n\nMade by `python docs/pictures.py`; the angle is given directly (no "
         "network). Loops: `exact` is the model as its own plant, torque held for a microsecond, no limits; `sampled` "

@@ -33,7 +33,7 @@ def figure(result: Result, path: Path) -> None:
         others = [v for v in reversed(order) if v.side != OURS]
         ratios = [ours / measured[v] for v in others]
         _bars(column[1], others, ratios, [number(ratio) for ratio in ratios])
-        column[1].axvline(1.0, color="k", lw=0.8)
+        column[1].axvline(1.0, color="k", lw=0.8, zorder=0)
         column[1].set(xlabel="times that wristctl is faster")
     names = {MINE: "wristctl", EQUAL: "error at most wristctl's", LARGER: "larger error", LIMIT: "the same loop in C"}
     patches = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in names]
@@ -47,7 +47,7 @@ def figure(result: Result, path: Path) -> None:
 
 def _bars(panel: Any, variants: list[Variant], values: list[float], labels: list[str]) -> None:
     bars = panel.barh([v.name for v in variants], values, color=[_colour(v) for v in variants], log=True)
-    panel.bar_label(bars, labels, padding=3, fontsize=7)
+    panel.bar_label(bars, labels, padding=3, fontsize=7, bbox={"color": "white", "pad": 0.5})
     panel.margins(x=0.18)
     panel.tick_params(labelsize=8)
     panel.spines[["top", "right"]].set_visible(False)
