@@ -1,4 +1,4 @@
-"""wristctl beside its peers: `make bench-peers`, or `python benchmarks/peers/run.py --out DIR [--quick]`.
+"""wristctl beside its peers: `make bench-peers`, or `python benchmarks/peers/run.py --out DIR`.
 
 Writes peers.json, peers.md and peers.png/svg into DIR. Peers are installed in environments of their own first; one that
 cannot be is left out and named.
@@ -84,10 +84,7 @@ def main() -> None:
     parser.add_argument("--lanes", nargs="*", type=int, default=[1, 64, 1024])
     parser.add_argument("--budget", type=float, default=0.2, help="seconds of one timed run")
     parser.add_argument("--rounds", type=int, default=5, help="alternating runs of each side")
-    parser.add_argument("--quick", action="store_true", help="shorter runs, three rounds")
     options = parser.parse_args()
-    if options.quick:
-        options.budget, options.rounds = 0.05, 3
     chosen = tuple(side for side in SIDES if not options.sides or side.name in (OURS, *options.sides))
     CACHE.mkdir(parents=True, exist_ok=True)
     options.out.mkdir(parents=True, exist_ok=True)

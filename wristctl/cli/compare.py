@@ -24,16 +24,22 @@ _HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chatte
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.cli.loops import check_row
+    from wristctl.benchmark.compare import refuse_tuned_scenarios
+    from wristctl.cli.loops import check_row, tuned_study
     from wristctl.cli.tune import check_search
 
-    settings = study.compare
+    settings, earlier = study.compare, tuned_study(inputs)
+    found_here = settings.tuning.controllers if settings.tuning is not None else ()
     for number, row in enumerate(settings.rows):
-        with under(f"compare.rows.{number}"):
-            check_row(row)
+        if row.gains != "tuned" or row.controller not in found_here:
+            with under(f"compare.rows.{number}"):
+                check_row(row, inputs)
     if settings.tuning is not None:
         with under("compare.tuning"):
             check_search(settings.tuning)
+        refuse_tuned_scenarios(settings, settings.tuning)
+    if earlier is not None:
+        refuse_tuned_scenarios(settings, earlier.tune)
     count = len(settings.rows) * len(settings.loops) * len(settings.references) * len(settings.inverses)
     return f"{count} rollouts of {settings.horizon:g} s"
 
@@ -41,20 +47,17 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 def compare(session: Session) -> list[Table]:
     """Compare controllers on loops and references, beside the paper's numbers."""
     from wristctl.benchmark.compare import compare as run_comparison
-    from wristctl.benchmark.compare import frame, refuse_tuned_scenarios, series
+    from wristctl.benchmark.compare import frame, series
     from wristctl.benchmark.cost import step_time
-    from wristctl.cli.loops import network_of, tuned_of, tuned_study, warn_if_it_buckles
+    from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
     from wristctl.cli.tune import search_all
     from wristctl.control.table import controller, gains_of
 
     run, settings = session.run, session.settings
     warn_if_it_buckles(session, settings.loops.values())
-    earlier, tuned = tuned_study(session), tuned_of(session)
-    scenarios = earlier.tune if earlier is not None else settings.tuning
-    if scenarios is not None:
-        refuse_tuned_scenarios(settings, scenarios)
+    tuned = dict(tuned_of(session.inputs) or {})
     if settings.tuning is not None:
-        tuned = {name: found.gains for name, found in search_all(session, settings.tuning).items()}
+        tuned |= {name: found.gains for name, found in search_all(session, settings.tuning).items()}
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(session.study, network_of(session), tuned, lambda share: done(round(100 * share)))
     run.table("data/comparison.csv", frame(results), units=_units())

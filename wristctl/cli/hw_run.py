@@ -16,7 +16,7 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
     settings = study.hw_run
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.rows.{number}"):
-            check_row(row)
+            check_row(row, inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest

@@ -45,7 +45,7 @@ def reported(session: Session, trials: pd.DataFrame) -> list[Table]:
 
 def _twins(session: Session, trials: pd.DataFrame) -> Twins:
     """Each trial in simulation; repetitions share one."""
-    network, tuned = network_of(session), tuned_of(session)
+    network, tuned = network_of(session), tuned_of(session.inputs)
     names = [row.label for row in session.settings.rows]
     done: dict[tuple[Any, ...], Simulation] = {}
     found = {}

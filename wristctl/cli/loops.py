@@ -13,6 +13,7 @@ from wristctl.config.control import Row, SimulateSettings
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
+from wristctl.runs import Run
 
 if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
@@ -22,13 +23,11 @@ log = logging.getLogger(__name__)
 Gains = Mapping[str, Mapping[str, float]]
 
 
-def check_row(row: Row | SimulateSettings) -> None:
-    """UserError, naming the key, for an unknown controller, preset or gain; tuned gains are another run's."""
+def check_row(row: Row | SimulateSettings, inputs: Mapping[str, Run]) -> None:
+    """UserError, naming the key, for an unknown controller, preset or gain, or tuned gains that no input has."""
     from wristctl.control.table import controller, gains_of
 
-    chosen = controller(row.controller)
-    if row.gains != "tuned":
-        gains_of(chosen, row.gains)
+    gains_of(controller(row.controller), row.gains, tuned_of(inputs))
 
 
 def network_of(session: Session) -> Inverse | None:
@@ -70,19 +69,19 @@ def identified(session: Session, command: str) -> Session:
     return replace(session, study=study, settings=getattr(study, command.replace("-", "_")))
 
 
-def tuned_of(session: Session) -> Gains | None:
-    """The gains of the session's tune run, None without one."""
+def tuned_of(inputs: Mapping[str, Run]) -> Gains | None:
+    """The gains of the tune run among a command's inputs, None without one."""
     from wristctl.tuning.gains_file import read_gains
 
-    run = session.inputs.get("tuned")
+    run = inputs.get("tuned")
     return read_gains(run.file("data/gains.json")) if run else None
 
 
-def tuned_study(session: Session) -> Study | None:
-    """The study of the session's tune run, None without one."""
+def tuned_study(inputs: Mapping[str, Run]) -> Study | None:
+    """The study of the tune run among a command's inputs, None without one."""
     from wristctl.config.load import load_study
 
-    run = session.inputs.get("tuned")
+    run = inputs.get("tuned")
     return load_study([run.file("config.yaml")]) if run else None
 
 
