@@ -80,7 +80,8 @@ def rollout(
     ticks = max(1, round(sample_period(loop) / loop.control_period))
     samples = len(motions[0].theta_ref)
     limit = wrist.tension_limit if loop.limits else np.inf
-    fixed = [segments(plant_of(wrist, loop.plant), n), segments(wrist, 1), np.array([wrist.pretension, limit])]
+    actual = plant_of(wrist, loop.plant)
+    fixed = [segments(actual, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
     plant, model, limits = (to_blocks(np.tile(row, (width(count), 1)))[0] for row in fixed)
     goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
     rest = np.zeros(n) if start is None else start
@@ -91,7 +92,7 @@ def rollout(
         "sums": np.array([float(name == "alive") for name in SUMS]),
         "memory": np.zeros(max(1, controller.memory)),
         "state": np.concatenate([rest, np.zeros(n)]),
-        "motors": at_rest(drive, plant_of(wrist, loop.plant), rest),
+        "motors": at_rest(drive, actual, rest),
     }
     blocks = {name: to_blocks(np.broadcast_to(row, (count, row.shape[-1]))) for name, row in begin_with.items()}
     lanes = lanes_of(count)
