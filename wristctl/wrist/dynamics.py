@@ -61,7 +61,9 @@ def bias(
     a = planar(spin, spin)
     for k in range(len(z)):
         w = omega[k]
-        bent = w * w * d2z[k] + 2.0 * spin * w * turn(dz[k]) - spin * spin * z[k]
+        bent = w * w * d2z[k]
+        if k > 0:  # the base does not turn
+            bent = bent + 2.0 * spin * w * turn(dz[k]) - spin * spin * z[k]
         force[k] = segment.mass * (a + 0.5 * bent - weight)
         a = a + bent
         spin = spin + w

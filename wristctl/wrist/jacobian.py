@@ -33,12 +33,16 @@ def residual_jacobians(
     p, v, a = planar(spin, spin), planar(spin, spin), planar(spin, spin)
     for k in range(n):
         w = omega[k]
-        turning = planar(-spin * spin, spin_rate)
-        swing = planar(acceleration[k], 2.0 * spin * w)
-        rate = spin * turn(z[k]) + w * dz[k]
-        bent = turning * z[k] + swing * dz[k] + w * w * d2z[k]
-        own_field[k] = turning * dz[k] + swing * d2z[k] + w * w * d3z[k]
-        own_sweep[k] = spin * turn(dz[k]) + w * d2z[k]
+        rate = w * dz[k]
+        bent = acceleration[k] * dz[k] + w * w * d2z[k]
+        own_field[k] = acceleration[k] * d2z[k] + w * w * d3z[k]
+        own_sweep[k] = w * d2z[k]
+        if k > 0:  # the base does not turn
+            turning, across = planar(-spin * spin, spin_rate), 2.0 * spin * w
+            rate = rate + spin * turn(z[k])
+            bent = bent + turning * z[k] + across * turn(dz[k])
+            own_field[k] = own_field[k] + turning * dz[k] + across * turn(d2z[k])
+            own_sweep[k] = own_sweep[k] + spin * turn(dz[k])
         middle[k] = p + 0.5 * z[k]
         velocity[k] = v + 0.5 * rate
         force[k] = segment.mass * (a + 0.5 * bent - weight)
