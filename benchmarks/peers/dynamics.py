@@ -67,7 +67,9 @@ def bias(s: Segment, theta: list[Any], omega: list[Any], p: Posture) -> list[Any
     n, force, a, spin = len(theta), [], (0.0, 0.0), 0.0
     weight = (s.gravity_x, s.gravity_y)
     for k, w in enumerate(omega):
-        bent = add(mul(-spin * spin, p.z[k]), mul(2.0 * spin * w, turn(p.dz[k])), mul(w * w, p.d2z[k]))
+        bent = mul(w * w, p.d2z[k])
+        if k > 0:  # the base does not turn
+            bent = add(bent, mul(2.0 * spin * w, turn(p.dz[k])), mul(-spin * spin, p.z[k]))
         force.append(mul(s.mass, add(a, mul(0.5, bent), mul(-1.0, weight))))
         a, spin = add(a, bent), spin + w
     hand = mul(s.hand_offset, p.tangent)
@@ -89,11 +91,16 @@ def jacobians(s: Segment, omega: list[Any], acceleration: list[Any], at: Posture
     p, v, a, weight = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (-s.gravity_x, -s.gravity_y)
     pivot, middle, velocity, force, field, sweep, own_field, own_sweep = ([] for _ in range(8))
     for k, w in enumerate(omega):
-        turning, swing = (-spin * spin, spin_rate), (acceleration[k], 2.0 * spin * w)
-        rate = add(mul(spin, turn(z[k])), mul(w, dz[k]))
-        bent = add(product(turning, z[k]), product(swing, dz[k]), mul(w * w, d2z[k]))
-        own_field.append(add(product(turning, dz[k]), product(swing, d2z[k]), mul(w * w, d3z[k])))
-        own_sweep.append(add(mul(spin, turn(dz[k])), mul(w, d2z[k])))
+        rate, own_turn = mul(w, dz[k]), mul(w, d2z[k])
+        bent = add(mul(acceleration[k], dz[k]), mul(w * w, d2z[k]))
+        own_bend = add(mul(acceleration[k], d2z[k]), mul(w * w, d3z[k]))
+        if k > 0:  # the base does not turn
+            turning, across = (-spin * spin, spin_rate), 2.0 * spin * w
+            rate, own_turn = add(rate, mul(spin, turn(z[k]))), add(own_turn, mul(spin, turn(dz[k])))
+            bent = add(bent, product(turning, z[k]), mul(across, turn(dz[k])))
+            own_bend = add(own_bend, product(turning, dz[k]), mul(across, turn(d2z[k])))
+        own_field.append(own_bend)
+        own_sweep.append(own_turn)
         middle.append(add(p, mul(0.5, z[k])))
         velocity.append(add(v, mul(0.5, rate)))
         force.append(mul(s.mass, add(a, mul(0.5, bent), weight)))

@@ -69,8 +69,9 @@ INLINE void bias(const segment *s, const lane *theta, const lane *omega, const p
     lane spin = 0.0;
     EACH(k) {
         lane w = omega[k];
-        plane swing = mul(-spin * spin, p->z[k]), bow = mul(2.0 * spin * w, turn(p->dz[k]));
-        plane bent = add(add(swing, bow), mul(w * w, p->d2z[k]));
+        plane bent = mul(w * w, p->d2z[k]);
+        if (k > 0) /* the base does not turn */
+            bent = sub(add(bent, mul(2.0 * spin * w, turn(p->dz[k]))), mul(spin * spin, p->z[k]));
         force[k] = mul(s->mass, sub(add(a, mul(0.5, bent)), weight));
         a = add(a, bent);
         spin += w;
@@ -96,11 +97,17 @@ INLINE void jacobians(const segment *s, const lane *omega, const lane *accelerat
     lane spin = 0.0, spin_rate = 0.0;
     EACH(k) {
         lane w = omega[k];
-        plane turning = planar(-spin * spin, spin_rate), swing = planar(acceleration[k], 2.0 * spin * w);
-        plane rate = add(mul(spin, turn(z[k])), mul(w, dz[k]));
-        plane bent = add(add(product(turning, z[k]), product(swing, dz[k])), mul(w * w, d2z[k]));
-        own_field[k] = add(add(product(turning, dz[k]), product(swing, d2z[k])), mul(w * w, d3z[k]));
-        own_sweep[k] = add(mul(spin, turn(dz[k])), mul(w, d2z[k]));
+        plane rate = mul(w, dz[k]), bent = add(mul(acceleration[k], dz[k]), mul(w * w, d2z[k]));
+        own_field[k] = add(mul(acceleration[k], d2z[k]), mul(w * w, d3z[k]));
+        own_sweep[k] = mul(w, d2z[k]);
+        if (k > 0) { /* the base does not turn */
+            plane turning = planar(-spin * spin, spin_rate);
+            lane across = 2.0 * spin * w;
+            rate = add(rate, mul(spin, turn(z[k])));
+            bent = add(bent, add(product(turning, z[k]), mul(across, turn(dz[k]))));
+            own_field[k] = add(own_field[k], add(product(turning, dz[k]), mul(across, turn(d2z[k]))));
+            own_sweep[k] = add(own_sweep[k], mul(spin, turn(dz[k])));
+        }
         middle[k] = add(p, mul(0.5, z[k]));
         velocity[k] = add(v, mul(0.5, rate));
         force[k] = mul(s->mass, sub(add(a, mul(0.5, bent)), weight));
