@@ -25,15 +25,15 @@ _HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chatte
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check names and say how many rollouts there will be."""
     from wristctl.benchmark.compare import refuse_tuned_scenarios
-    from wristctl.cli.loops import check_row, tuned_study
+    from wristctl.cli.loops import check_row, tuned_of, tuned_study
     from wristctl.cli.tune import check_search
 
-    settings, earlier = study.compare, tuned_study(inputs)
+    settings, earlier, tuned = study.compare, tuned_study(inputs), tuned_of(inputs)
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
     for number, row in enumerate(settings.rows):
         if row.gains != "tuned" or row.controller not in found_here:
             with under(f"compare.rows.{number}"):
-                check_row(row, inputs)
+                check_row(row, tuned)
     if settings.tuning is not None:
         with under("compare.tuning"):
             check_search(settings.tuning)

@@ -11,12 +11,12 @@ from wristctl.runs import Run
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check controllers and gains and say what would be done; opens nothing."""
-    from wristctl.cli.loops import check_row
+    from wristctl.cli.loops import check_row, tuned_of
 
-    settings = study.hw_run
+    settings, tuned = study.hw_run, tuned_of(inputs)
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.rows.{number}"):
-            check_row(row, inputs)
+            check_row(row, tuned)
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest

@@ -23,11 +23,11 @@ log = logging.getLogger(__name__)
 Gains = Mapping[str, Mapping[str, float]]
 
 
-def check_row(row: Row | SimulateSettings, inputs: Mapping[str, Run]) -> None:
-    """UserError, naming the key, for an unknown controller, preset or gain, or tuned gains that no input has."""
+def check_row(row: Row | SimulateSettings, tuned: Gains | None) -> None:
+    """UserError, naming the key, for an unknown controller, preset or gain, or gains that are not among the tuned."""
     from wristctl.control.table import controller, gains_of
 
-    gains_of(controller(row.controller), row.gains, tuned_of(inputs))
+    gains_of(controller(row.controller), row.gains, tuned)
 
 
 def network_of(session: Session) -> Inverse | None:

@@ -10,11 +10,11 @@ from wristctl.runs import Run
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check the controller and its gains."""
-    from wristctl.cli.loops import check_row
+    from wristctl.cli.loops import check_row, tuned_of
 
     settings = study.simulate
     with under("simulate"):
-        check_row(settings, inputs)
+        check_row(settings, tuned_of(inputs))
     return f"one rollout of {settings.horizon:g} s"
 
 
