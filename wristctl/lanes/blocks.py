@@ -34,6 +34,11 @@ def to_blocks(rows: Array) -> Array:
     return np.ascontiguousarray(rows[lanes_of(len(rows))].transpose(0, 2, 1))
 
 
+def spread(row: Array, count: int) -> Array:
+    """`to_blocks` for as many rollouts, each with the same row (variables,) or with its own (count, variables)."""
+    return to_blocks(np.broadcast_to(row, (count, row.shape[-1])))
+
+
 def to_rows(blocks: Array, count: int) -> Array:
     """(blocks, variables, LANES) or (1, variables) -> (count, variables), the filling dropped."""
     if blocks.ndim == 2:

@@ -137,7 +137,7 @@ def dot(u: Any, v: Any) -> Any:
 
 
 def _xy(builder: Any, v: Any) -> tuple[Any, Any]:
-    if getattr(v, "opname", None) == "insertvalue":
+    if getattr(v, "opname", None) == "insertvalue":  # fresh from _planar: its products may still fuse
         return v.operands[0].operands[1], v.operands[1]
     return builder.extract_value(v, 0), builder.extract_value(v, 1)
 

@@ -17,7 +17,7 @@ from numba.core.imputils import lower_builtin, lower_getattr_generic
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import intrinsic
 
-from wristctl.lanes.types import LANES, LaneType, PlaneType, RowsType
+from wristctl.lanes.types import WIDTHS, LaneType, PlaneType, RowsType
 
 _PAIR_OF_INDICES = numba.types.UniTuple(numba.types.intp, 2)
 
@@ -89,10 +89,6 @@ def _field(context: Any, builder: Any, rows: RowsType, pointer: Any, name: str) 
     return builder.load(_address(builder, rows, pointer, index), align=8)
 
 
-_WIDTH = {1: 1, 2: LANES}
-"""Lanes of an array's rows, by its number of axes."""
-
-
 def rows_named(fields: tuple[str, ...]) -> Any:
     """An intrinsic that views an array as `rows_of` does, its first rows by these names."""
 
@@ -104,9 +100,9 @@ def rows_named(fields: tuple[str, ...]) -> Any:
 
 
 def _view(array: types.Array, fields: tuple[str, ...] = ()) -> Any:
-    if array.dtype != types.float64 or array.layout != "C" or array.ndim not in _WIDTH:
+    if array.dtype != types.float64 or array.layout != "C" or array.ndim not in (1, 2):
         return None
-    result = RowsType(LaneType(_WIDTH[array.ndim]), None, fields=fields)
+    result = RowsType(LaneType(WIDTHS[array.ndim - 1]), None, fields=fields)
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         struct = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0])

@@ -31,19 +31,14 @@ class _Wide(types.Type):
         self.width = width
         super().__init__(name=f"{type(self).__name__}({width})")
 
-    @property
-    def vector(self) -> ir.VectorType:
-        """The lanes' doubles."""
-        return ir.VectorType(ir.DoubleType(), self.width)
-
 
 class LaneType(_Wide):
     """A number; Python's numbers convert to it by repetition."""
 
     @property
-    def llvm(self) -> ir.Type:
+    def llvm(self) -> ir.VectorType:
         """A double for each rollout."""
-        return self.vector
+        return ir.VectorType(ir.DoubleType(), self.width)
 
     def can_convert_from(self, typingctx: Any, other: types.Type) -> Conversion | None:
         """Numbers become lanes by repetition."""
@@ -65,7 +60,7 @@ class PlaneType(_Wide):
     @property
     def llvm(self) -> ir.Type:
         """x and y."""
-        return ir.ArrayType(self.vector, 2)
+        return ir.ArrayType(LaneType(self.width).llvm, 2)
 
 
 class RowsType(types.Type):
@@ -111,7 +106,7 @@ def repeat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
 @lower_cast(types.Float, LaneType)
 @lower_cast(types.Integer, LaneType)
 def _number_to_lane(context: Any, builder: Any, fromty: types.Type, toty: LaneType, value: Any) -> Any:
-    return repeat(builder, context.cast(builder, value, fromty, types.float64), toty.vector)
+    return repeat(builder, context.cast(builder, value, fromty, types.float64), toty.llvm)
 
 
 def define(

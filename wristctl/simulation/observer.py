@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wristctl.config.plant import Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
-from wristctl.lanes.blocks import lanes_of, to_blocks
+from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import Drive, at_rest, pulls, tendon_stiffness
@@ -178,8 +178,7 @@ def cameras_of(
     )
 
     def for_each(values: Array) -> Array:
-        rows = to_blocks(np.broadcast_to(values.ravel(), (len(seeds), values.size)))
-        return rows.reshape(blocks, *values.shape, *wide)
+        return spread(values.ravel(), len(seeds)).reshape(blocks, *values.shape, *wide)
 
     own = {name: for_each(getattr(fresh, name)) for name in ("delivered", "fused", "now")}
     return watch, fresh._replace(**own, at=np.tile(fresh.at, (blocks, 1)))

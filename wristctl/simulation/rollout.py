@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
-from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows, width
+from wristctl.lanes.blocks import lanes_of, spread, to_rows, width
 from wristctl.lanes.cores import cores
 from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.disturbances import course
@@ -82,7 +82,7 @@ def rollout(
     limit = wrist.tension_limit if loop.limits else np.inf
     actual = plant_of(wrist, loop.plant)
     fixed = [segments(actual, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
-    plant, model, limits = (to_blocks(np.tile(row, (width(count), 1)))[0] for row in fixed)
+    plant, model, limits = (spread(row, width(count))[0] for row in fixed)
     goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
     rest = np.zeros(n) if start is None else start
     drive, period = drive_of(loop.actuator), loop.control_period
@@ -94,7 +94,7 @@ def rollout(
         "state": np.concatenate([rest, np.zeros(n)]),
         "motors": at_rest(drive, actual, rest),
     }
-    blocks = {name: to_blocks(np.broadcast_to(row, (count, row.shape[-1]))) for name, row in begin_with.items()}
+    blocks = {name: spread(row, count) for name, row in begin_with.items()}
     lanes = lanes_of(count)
     total, *wide = lanes.shape
     followed = which[lanes].reshape(total, -1)

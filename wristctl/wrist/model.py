@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.blocks import spread, to_blocks, to_rows
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
@@ -72,7 +72,7 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     theta, omega = np.broadcast_arrays(np.asarray(theta, float), np.asarray(omega, float))
     *batch, n = theta.shape
     states = np.concatenate([theta, omega], axis=-1).reshape(-1, 2 * n)
-    blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
+    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, 12)), len(states))
     out = np.empty((len(blocks), 3 + 5 * n + n * n, *blocks.shape[2:]))
     _terms(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
@@ -116,7 +116,7 @@ def linearised(
     *batch, n = theta.shape
     pulls = np.broadcast_to(pulls, (*batch, 2))
     states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
-    blocks, each = to_blocks(states), to_blocks(np.broadcast_to(np.reshape(parameters, (-1, 12)), (len(states), 12)))
+    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, 12)), len(states))
     out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
     _linearised(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
