@@ -22,6 +22,7 @@ test: lint
 
 lint: .venv/dev
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict wristctl
 
 bench: .venv/run
@@ -32,13 +33,13 @@ bench: .venv/run
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:
-	$(MAKE) -C wristctl/hardware/firmware check
+	$(MAKE) -C wristctl/board/firmware check
 
 # The image on simavr and on our own core, thoroughly, and flashed through the stock bootloader
 # (Debian 12: also simavr libsimavr-dev libelf-dev pkg-config gcc avrdude arduino-core-avr).
 test-firmware: .venv/dev firmware
 	$(MAKE) -C tests/firmware
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/hardware
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/firmware tests/board tests/bench tests/trial
 
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
@@ -46,7 +47,7 @@ test-identify: .venv/dev
 
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/hardware/vision tests/cli/test_vision_commands.py
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/vision tests/cli/test_vision_commands.py
 
 # Faults of host, cable, board and camera, one by one and in pairs; hw-run stopped, killed and interrupted.
 test-faults: .venv/dev

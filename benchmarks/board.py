@@ -6,13 +6,13 @@ import subprocess
 import sys
 import time
 
-from wristctl.hardware.board import Board
-from wristctl.hardware.check import RoundTrips, round_trips
-from wristctl.hardware.emulator import Atmega2560
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.emulator.virtual import VirtualTransport
-from wristctl.hardware.messages import BAUD, Command
-from wristctl.hardware.transport import SerialTransport, Transport
+from wristctl.board.board import Board
+from wristctl.board.check import RoundTrips, round_trips
+from wristctl.board.emulator import Atmega2560
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.messages import BAUD, Command
+from wristctl.board.transport import SerialTransport, Transport
 
 COUNT, PERIOD, CYCLES = 1000, 0.005, 2000
 

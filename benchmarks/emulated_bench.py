@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import time
 
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.board import Board
 from wristctl.config.bench import BenchSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.board import Board
 
 SECONDS, PERIOD = 5.0, 0.005
 
 
-def cost(bench: Bench, board: Board, rate: float, commanded: bool, seen: bool) -> tuple[float, int]:
+def cost(bench: VirtualBench, board: Board, rate: float, commanded: bool, seen: bool) -> tuple[float, int]:
     """Processor seconds of SECONDS on the bench, swinging at up to `rate` steps/s; frames drawn."""
     start, began, frames, tick = bench.transport.now(), time.process_time(), 0, 0
     while bench.transport.now() < start + SECONDS - 1e-6:
@@ -31,7 +31,7 @@ def cost(bench: Bench, board: Board, rate: float, commanded: bool, seen: bool) -
 
 
 def main() -> None:
-    bench = Bench(BenchSettings(), WristParameters(), seed=0)
+    bench = VirtualBench(BenchSettings(), WristParameters(), seed=0)
     board = Board(bench.transport)
     board.connect()
     board.enable()

@@ -10,11 +10,11 @@ import numpy as np
 
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.detector import Detector
-from wristctl.hardware.vision.marker import Tracker, Verdict
-from wristctl.hardware.vision.scene import Scene
-from wristctl.hardware.vision.view import View
+from wristctl.vision.camera import Frame
+from wristctl.vision.detector import Detector
+from wristctl.vision.marker import SightingVerdict, Tracker
+from wristctl.vision.scene import Scene
+from wristctl.vision.view import View
 
 COUNT = 200
 WRIST = WristParameters(length=0.06)  # short, so that both markers are in the picture at 80 px too
@@ -30,7 +30,7 @@ def row(what: str, settings: SceneSettings, calibrated: bool = True) -> None:
     began = time.process_time()
     for frame, angle in zip(frames, degrees, strict=True):
         seen = tracker.see(frame)
-        if seen.verdict is Verdict.OK:
+        if seen.verdict is SightingVerdict.OK:
             off.append(math.degrees(seen.theta) - angle)
             side = float(np.linalg.norm(seen.corners[1][1] - seen.corners[1][0]))
         else:

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.config.identify import IdentifySettings
-from wristctl.config.loop import Direction, Reference
+from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.fit import Problem, linearise
 from wristctl.identification.identifiability import widest, width_text
 from wristctl.identification.intervals import condition, promised
-from wristctl.identification.rehearsal import Truth, rehearse
-from wristctl.identification.trials import trials_of
+from wristctl.identification.measured_trials import measured_trials
+from wristctl.identification.rehearsal import RehearsedTruth, rehearse
 
 HERE = Path(__file__).parent
 UPRIGHT = WristParameters()
@@ -22,7 +22,7 @@ LEVEL = UPRIGHT.model_copy(update={"gravity": (0.0, 6.94), "gravity_flexion": 6.
 HEAVY = UPRIGHT.model_copy(update={"hand_mass": 0.5})
 DEFAULT, QUICK = Reference(), Reference(duration=0.33)
 STEPS = Reference(kind="multi-step", angles_deg=(25.0, -10.0, 30.0, 0.0, 20.0, -15.0, 30.0, 0.0), duration=0.6)
-SIDES: tuple[Direction, ...] = ("ulnar", "radial", "flexion", "extension")
+SIDES: tuple[DirectionName, ...] = ("ulnar", "radial", "flexion", "extension")
 EXPERIMENTS = {
     "upright, 30 deg in 1 s (default)": ((UPRIGHT,), DEFAULT, {}),
     "level, 30 deg in 1 s": ((LEVEL,), DEFAULT, {}),
@@ -33,7 +33,7 @@ EXPERIMENTS = {
     "upright and level, eight steps": ((UPRIGHT, LEVEL), STEPS, {}),
     "the same, radius known to 0.1 %": ((UPRIGHT, LEVEL), STEPS, {"radius_error": 0.001}),
 }
-NOISE = np.deg2rad(Truth.noise_deg)
+NOISE = np.deg2rad(RehearsedTruth.noise_deg)
 
 
 def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, float]) -> list[str]:
@@ -41,10 +41,10 @@ def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, f
     actuator, settings, trials = Actuator(level="tendon"), IdentifySettings(**known), []
     for number, pose in enumerate(poses):
         wrist = pose.model_copy(update={"stiffness": 0.7 * pose.stiffness})
-        truth, rng = Truth(wrist, actuator), np.random.default_rng(number)
+        truth, rng = RehearsedTruth(wrist, actuator), np.random.default_rng(number)
         tables = rehearse(pose, truth, [(side, moves) for side in SIDES], 5.0, rng)
         length, label = actuator.step_length, f"run {number}"
-        trials += trials_of(label, pose, length, settings.step, *tables, exposure=truth.exposure)
+        trials += measured_trials(label, pose, length, settings.step, *tables, exposure=truth.exposure)
     start = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
     tendons = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction}
     problem = Problem(trials, start | tendons | {"delay": truth.delay}, settings)

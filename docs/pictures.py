@@ -9,18 +9,18 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.benchmark.compare import Result, compare
-from wristctl.benchmark.paper import T2
+from wristctl.comparison.comparison import ComparedRow, compare
+from wristctl.comparison.paper import T2
 from wristctl.config.load import load_study
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.annotate import annotate
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.marker import Tracker
-from wristctl.hardware.vision.scene import Scene
+from wristctl.records.formats import write_figure
 from wristctl.report.loop_figures import errors
 from wristctl.report.wrist_drawing import directions
-from wristctl.runs.formats import write_figure
+from wristctl.vision.annotate import annotate
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Tracker
+from wristctl.vision.scene import Scene
 
 HERE = Path(__file__).parent
 ROWS = "[" + ", ".join(
@@ -32,7 +32,7 @@ ROWS = "[" + ", ".join(
 ) + "]"  # fmt: skip
 
 
-def table(results: list[Result]) -> str:
+def table(results: list[ComparedRow]) -> str:
     """RMSE of every row on every loop, beside the paper's."""
     loops = list(dict.fromkeys(r.loop for r in results))
     references = list(dict.fromkeys(r.reference for r in results))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.wrist.model import integrate, terms
+from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import Segments
 
 RELATIVE, ABSOLUTE, ANGLE = 1e-9, 1e-12, 1e-6

@@ -46,7 +46,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            board = nodeid.startswith(("tests/hardware", "tests/firmware"))
+            board = nodeid.startswith(("tests/board", "tests/bench", "tests/trial", "tests/vision", "tests/firmware"))
             return "board" if board else nodeid.partition("::")[0]
 
     return ByFile(config, log)

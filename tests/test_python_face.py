@@ -13,8 +13,8 @@ import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
-    "cli", "report", "benchmark", "tuning", "learning", "identification", "hardware", "simulation", "control", "wrist",
-    "lanes", "runs", "config", "interrupt",
+    "cli", "studies", "report", "comparison", "tuning", "learning", "identification", "trial", "bench", "vision",
+    "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
 )  # fmt: skip
 
 

@@ -20,8 +20,8 @@ __all__ = ["__version__", "load_study", "open_run", "simulate"]
 
 if TYPE_CHECKING:
     from wristctl.config.study import Study
-    from wristctl.runs import open_run
-    from wristctl.simulation.simulate import simulate
+    from wristctl.records import open_run
+    from wristctl.simulation.closed_loop import simulate
 
 
 def load_study(file: str | None = None, *overrides: str) -> Study:
@@ -36,11 +36,11 @@ def load_study(file: str | None = None, *overrides: str) -> Study:
 def __getattr__(name: str) -> Any:
     """Heavy parts are imported when first asked for, so that `import wristctl` stays light."""
     if name == "simulate":
-        from wristctl.simulation.simulate import simulate
+        from wristctl.simulation.closed_loop import simulate
 
         return simulate
     if name == "open_run":
-        from wristctl.runs import open_run
+        from wristctl.records import open_run
 
         return open_run
     raise AttributeError(f"module 'wristctl' has no attribute {name!r}")

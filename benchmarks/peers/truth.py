@@ -14,7 +14,7 @@ from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import motion
 from wristctl.wrist.allocation import TENDONS_PER_SIDE
-from wristctl.wrist.model import linearised, terms
+from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
 
 GAINS = (20.0, 1.0, 20.0)

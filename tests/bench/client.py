@@ -6,12 +6,12 @@ import sys
 import time
 from pathlib import Path
 
+from wristctl.bench.real_time_bench import connect
+from wristctl.board.board import Board
+from wristctl.board.board_errors import Faulted
+from wristctl.board.messages import Configure
 from wristctl.config.bench import BenchSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.connect import connect
-from wristctl.hardware.board import Board
-from wristctl.hardware.errors import Faulted
-from wristctl.hardware.messages import Configure
 
 WATCHDOG = 1.0
 """Seconds of silence that the board bears: more than a busy computer is silent for by itself."""

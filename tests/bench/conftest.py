@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.board import Board
+from wristctl.board.messages import Flag, Target
 from wristctl.config.bench import BenchSettings, Motors
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.board import Board
-from wristctl.hardware.messages import Flag, Target
 
 TAUT = Motors(slack=(0.0, 0.0, 0.0, 0.0))
 TICK = 0.005
@@ -19,7 +19,7 @@ TICK = 0.005
 class Host:
     """Drives the bench's board; `start` is the clock's time when it was ready."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: VirtualBench) -> None:
         self.bench = bench
         self.board = Board(bench.transport)
         self.board.connect()
@@ -55,6 +55,6 @@ def host_on() -> HostOn:
     """Makes a host of a bench with these settings."""
 
     def make(settings: BenchSettings | None = None, wrist: WristParameters | None = None, seed: int = 0) -> Host:
-        return Host(Bench(settings or BenchSettings(motors=TAUT), wrist or WristParameters(), seed))
+        return Host(VirtualBench(settings or BenchSettings(motors=TAUT), wrist or WristParameters(), seed))
 
     return make

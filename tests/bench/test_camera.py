@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hardware.emulated_bench.conftest import TAUT, Host, HostOn
-from wristctl.config.bench import BenchSettings, Fault, FaultKind, RenderedCamera
+from tests.bench.conftest import TAUT, Host, HostOn
+from wristctl.bench.bench_transport import BenchTransport
+from wristctl.bench.rig import Rig
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.bench.virtual_camera import VirtualCamera
+from wristctl.config.bench import BenchSettings, FaultKind, InjectedFault, RenderedCamera
 from wristctl.config.vision import Gates, Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.bench.rig import Rig
-from wristctl.hardware.bench.transport import BenchTransport
-from wristctl.hardware.bench.virtual_camera import VirtualCamera
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.marker import Tracker, Verdict
-from wristctl.hardware.vision.scene import Scene
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import SightingVerdict, Tracker
+from wristctl.vision.scene import Scene
 
 WRIST = WristParameters()
 TICK = 0.005
@@ -37,7 +37,7 @@ class Sketch:
 class Stage:
     """A bench whose camera sketches."""
 
-    def __init__(self, camera: RenderedCamera, *faults: Fault, seed: int = 0) -> None:
+    def __init__(self, camera: RenderedCamera, *faults: InjectedFault, seed: int = 0) -> None:
         self.rig = Rig(BenchSettings(motors=TAUT, camera=camera, faults=faults), WRIST, seed)
         self.rig.scene = self.sketch = Sketch()
         self.transport = BenchTransport(self.rig.chip, self.rig.faults)
@@ -109,7 +109,7 @@ def test_an_exposure_averages_the_motion_around_its_middle_and_needs_one_instant
 
 
 def test_frames_are_lost_for_as_long_as_the_fault_lasts() -> None:
-    stage = Stage(RenderedCamera(dropped=0.0), Fault(kind="frames-dropped", at=0.5, duration=0.25))
+    stage = Stage(RenderedCamera(dropped=0.0), InjectedFault(kind="frames-dropped", at=0.5, duration=0.25))
     stage.rig.begin(0.0)
     captured = np.array([frame.time for _, frame in stage.look(1.0)])
     lost = (captured >= 0.5) & (captured < 0.75)
@@ -118,7 +118,7 @@ def test_frames_are_lost_for_as_long_as_the_fault_lasts() -> None:
 
 @pytest.mark.parametrize(("kind", "which"), [("marker-covered", 1), ("markers-swapped", 2)])
 def test_markers_are_covered_or_swapped_while_the_fault_lasts(kind: FaultKind, which: int) -> None:
-    stage = Stage(RenderedCamera(dropped=0.0), Fault(kind=kind, at=0.3, duration=0.2))
+    stage = Stage(RenderedCamera(dropped=0.0), InjectedFault(kind=kind, at=0.3, duration=0.2))
     stage.rig.begin(0.0)
     for (_, frame), drawn in zip(stage.look(1.0), stage.sketch.drawn, strict=True):
         assert drawn[which] == (0.3 <= frame.time < 0.5)
@@ -126,7 +126,7 @@ def test_markers_are_covered_or_swapped_while_the_fault_lasts(kind: FaultKind, w
 
 
 def test_a_frozen_camera_repeats_its_last_picture_under_new_times() -> None:
-    stage = Stage(RenderedCamera(dropped=0.0), Fault(kind="camera-frozen", at=0.5, duration=0.3))
+    stage = Stage(RenderedCamera(dropped=0.0), InjectedFault(kind="camera-frozen", at=0.5, duration=0.3))
     stage.rig.begin(0.0)
     seen = [frame for _, frame in stage.look(1.0)]
     frozen = [frame.image.tobytes() for frame in seen if 0.5 <= frame.time < 0.8]
@@ -137,7 +137,10 @@ def test_a_frozen_camera_repeats_its_last_picture_under_new_times() -> None:
 
 
 def test_a_dropped_frame_and_a_covered_marker_may_come_together() -> None:
-    faults = Fault(kind="frames-dropped", at=0.2, duration=0.2), Fault(kind="marker-covered", at=0.3, duration=0.3)
+    faults = (
+        InjectedFault(kind="frames-dropped", at=0.2, duration=0.2),
+        InjectedFault(kind="marker-covered", at=0.3, duration=0.3),
+    )
     stage = Stage(RenderedCamera(dropped=0.0), *faults)
     stage.rig.begin(0.0)
     times = [frame.time for _, frame in stage.look(0.8)]
@@ -156,7 +159,7 @@ def test_the_angle_found_in_rendered_pictures_is_the_one_the_wrist_had(host_on: 
         host.bench.transport.wait(TICK)
         if (frame := host.bench.camera.newest()) is not None:
             sighting = tracker.see(frame)
-            assert sighting.verdict == Verdict.OK
+            assert sighting.verdict == SightingVerdict.OK
             truth = host.bench.truth(frame.time - 1e-3)
             errors.append(sighting.theta - truth.theta[0].sum())
     assert host.bench.truth().theta[-1].sum() > 0.1
@@ -171,7 +174,7 @@ def test_a_camera_with_an_exposure_beyond_its_frame_is_refused() -> None:
 def test_the_whole_bench_gives_the_same_bytes_in_every_run() -> None:
     runs = []
     for _ in range(2):
-        bench = Bench(BenchSettings(), WRIST, seed=5)
+        bench = VirtualBench(BenchSettings(), WRIST, seed=5)
         bench.transport.wait(0.1)
         frame = bench.camera.newest()
         assert frame is not None

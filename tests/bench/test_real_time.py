@@ -14,24 +14,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.hardware.emulated_bench.client import WATCHDOG
-from tests.hardware.emulated_bench.conftest import TAUT
-from tests.hardware.emulated_bench.record import is_released, last_step, read, wait_for
-from wristctl.config.bench import BenchSettings, Fault, RenderedCamera
+from tests.bench.client import WATCHDOG
+from tests.bench.conftest import TAUT
+from tests.bench.record import is_released, last_step, read, wait_for
+from wristctl.bench.fault_injection import Faults
+from wristctl.bench.film import start_film
+from wristctl.bench.frame_memory import FrameMemory, SharedCamera
+from wristctl.bench.line import FaultyLine
+from wristctl.bench.rig import Rig
+from wristctl.bench.server import BenchServer
+from wristctl.board.board import Board
+from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
+from wristctl.board.emulator.serve import PtyLine
+from wristctl.board.messages import BAUD, Configure
+from wristctl.board.transport import SerialTransport
+from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.bench.film import start_film
-from wristctl.hardware.bench.frame_memory import FrameMemory, SharedCamera
-from wristctl.hardware.bench.line import FaultyLine
-from wristctl.hardware.bench.rig import Rig
-from wristctl.hardware.bench.server import BenchServer
-from wristctl.hardware.board import Board
-from wristctl.hardware.emulator.serve import PtyLine
-from wristctl.hardware.errors import NoAnswer, PortLost, Restarted
-from wristctl.hardware.messages import BAUD, Configure
-from wristctl.hardware.transport import SerialTransport
-from wristctl.hardware.vision.camera import Frame
+from wristctl.vision.camera import Frame
 
 SMALL = SceneSettings(width=160, height=120)
 STOPPED_WITHIN = WATCHDOG + 0.03
@@ -47,7 +47,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
     """Starts a bench's server in a thread; gives it, and the folder of its `frame` and `record`."""
     running: list[tuple[BenchServer, threading.Thread]] = []
 
-    def start(*faults: Fault) -> tuple[BenchServer, Path]:
+    def start(*faults: InjectedFault) -> tuple[BenchServer, Path]:
         settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
         line, wrist = PtyLine(), WristParameters()
         _, film = start_film(settings.camera, wrist, None, tmp_path / "frame")
@@ -93,7 +93,7 @@ def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(se
 
 
 def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving: Serving) -> None:
-    server, folder = serving(Fault(kind="port-lost", at=0.2), Fault(kind="marker-covered", at=0.1))
+    server, folder = serving(InjectedFault(kind="port-lost", at=0.2), InjectedFault(kind="marker-covered", at=0.1))
     board = board_of(server)
     server.begin(time.monotonic(), None)
     with pytest.raises(PortLost):
@@ -104,7 +104,7 @@ def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving
 
 
 def test_a_board_that_restarts_is_found_out_and_its_drives_are_off(serving: Serving) -> None:
-    server, folder = serving(Fault(kind="board-reset", at=0.2))
+    server, folder = serving(InjectedFault(kind="board-reset", at=0.2))
     board = board_of(server)
     server.begin(time.monotonic(), None)
     due = server._rig.faults.next("board-reset", 0.0)
@@ -141,7 +141,7 @@ class Wire:
 
 def test_on_a_faulty_line_the_host_is_not_heard_for_a_while_and_a_lost_port_is_closed() -> None:
     clock, wire = [0.0], Wire()
-    faults = Faults([Fault(kind="host-silent", at=1.0, duration=0.5), Fault(kind="port-lost", at=2.0)])
+    faults = Faults([InjectedFault(kind="host-silent", at=1.0, duration=0.5), InjectedFault(kind="port-lost", at=2.0)])
     faults.begin(10.0)
     line = FaultyLine(wire, faults, lambda: clock[0])
     heard = {}

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hardware.emulated_bench.conftest import TAUT, HostOn
+from tests.bench.conftest import TAUT, HostOn
+from wristctl.bench.bench_wrist import Truth
+from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.bench import BenchSettings, Motors, WeakenedPlant
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.bench.wrist import Truth
 from wristctl.simulation.plant import plant_of
-from wristctl.wrist.model import integrate, terms
+from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibrium
 
@@ -167,7 +167,7 @@ def test_an_overloaded_motor_slips_by_whole_turns_of_its_field(host_on: HostOn) 
 def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:
     courses = []
     for looks in (1, 7):
-        bench = Bench(BenchSettings(), WRIST, seed=3)
+        bench = VirtualBench(BenchSettings(), WRIST, seed=3)
         for _ in range(looks):
             bench.transport.wait(0.35 / looks)
             bench.truth()
@@ -187,7 +187,7 @@ def test_a_softer_plant_bends_further(host_on: HostOn) -> None:
 
 
 def test_the_last_minute_is_remembered_with_its_times() -> None:
-    bench = Bench(BenchSettings(), WRIST, 0)
+    bench = VirtualBench(BenchSettings(), WRIST, 0)
     bench.transport.wait(130.0)
     truth = bench.truth()
     assert 60.0 <= len(truth.time) * 1e-3 <= 120.0

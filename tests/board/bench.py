@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tests.hardware.drive_watch import CLOCK, DriveWatch
-from wristctl.hardware.messages import (
+from tests.board.drive_watch import CLOCK, DriveWatch
+from wristctl.board.messages import (
     ANSWER_TO,
     BAUD,
     COMMAND_OF,

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.board.bench import Bench, Chip
 from tests.firmware.simavr_board import LIBRARY, SimavrBoard
-from tests.hardware.bench import Bench, Chip
 
-IMAGE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware" / "wrist.hex"
+IMAGE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware" / "wrist.hex"
 
 
 def new_chip(emulator: str) -> Chip:
     if emulator == "simavr":
         return SimavrBoard(IMAGE)
-    from wristctl.hardware.emulator import Atmega2560
+    from wristctl.board.emulator import Atmega2560
 
     return Atmega2560(IMAGE)
 
@@ -27,7 +27,7 @@ def new_chip(emulator: str) -> Chip:
 def emulator(request: pytest.FixtureRequest) -> str:
     if request.param == "simavr" and not LIBRARY.exists():
         pytest.skip("simavr's board is not built: make -C tests/firmware")
-    if request.param == "own" and find_spec("wristctl.hardware.emulator") is None:
+    if request.param == "own" and find_spec("wristctl.board.emulator") is None:
         pytest.skip("no emulator in the package")
     return str(request.param)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wristctl.hardware.emulator import Atmega2560
+from wristctl.board.emulator import Atmega2560
 
 PROGRAM = Path(__file__).parent / "programs" / "flags.hex"
 ROUTINE_WORDS, RESULTS = 32, 0x400

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from wristctl.hardware import board as driver
-from wristctl.hardware.board import ATTEMPTS, Board, within_reach
-from wristctl.hardware.emulator.virtual import VirtualTransport
-from wristctl.hardware.errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.hardware.messages import (
+from wristctl.board import board as driver
+from wristctl.board.board import ATTEMPTS, Board, within_reach
+from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
+from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.messages import (
     DICTIONARY_HASH,
     MAX_RATE,
     TOTAL_RATE,

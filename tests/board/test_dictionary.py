@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from wristctl.hardware import messages
-from wristctl.hardware.dictionary import PROSE, c_header, dictionary_hash, load, python_module
-from wristctl.hardware.messages import ANSWER_TO, COMMAND_OF, LAYOUTS, Command, Configure, Rate, Status
+from wristctl.board import messages
+from wristctl.board.dictionary import PROSE, c_header, dictionary_hash, load, python_module
+from wristctl.board.messages import ANSWER_TO, COMMAND_OF, LAYOUTS, Command, Configure, Rate, Status
 
 TABLE = load()
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.board.bench import Bench
 from tests.firmware.simavr_board import LIBRARY, SimavrBoard
-from tests.hardware.bench import Bench
-from wristctl.hardware.emulator import Atmega2560
-from wristctl.hardware.messages import Rate, Target
+from wristctl.board.emulator import Atmega2560
+from wristctl.board.messages import Rate, Target
 
 PROGRAMS = Path(__file__).parent / "programs"
 BYTE = 160  # cycles at 1 Mbaud
 RATES = (7.5, 300.0, 9000.0)
-FIRMWARE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware" / "wrist.hex"
+FIRMWARE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware" / "wrist.hex"
 
 pytestmark = pytest.mark.skipif(not LIBRARY.exists(), reason="simavr's board is not built: make -C tests/firmware")
 

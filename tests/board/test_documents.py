@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from wristctl.board.dictionary import load
 from wristctl.config.bench import FAULTS
-from wristctl.hardware.dictionary import load
-from wristctl.hardware.vision.marker import MEANING
+from wristctl.vision.marker import MEANING
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
-FIRMWARE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware"
+FIRMWARE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware"
 TABLE = load()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hardware.drive_watch import MICROSECOND, DriveWatch
+from tests.board.drive_watch import MICROSECOND, DriveWatch
 
 STEP, DIR = 4, 8  # axis 1 on port A
 DTYPE = np.dtype([("cycle", "<u8"), ("port", "u1"), ("value", "u1")])

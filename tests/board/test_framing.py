@@ -6,10 +6,10 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wristctl.hardware.framing import LONGEST, Decoder, Frame, crc, encode, stuff, unstuff
+from wristctl.board.framing import LONGEST, Decoder, WireFrame, crc, encode, stuff, unstuff
 
 BYTES = st.binary(max_size=LONGEST)
-FRAMES = st.builds(Frame, st.integers(0, 255), st.integers(0, 255), st.binary(max_size=LONGEST - 4))
+FRAMES = st.builds(WireFrame, st.integers(0, 255), st.integers(0, 255), st.binary(max_size=LONGEST - 4))
 
 
 def crc_bit_by_bit(data: bytes) -> int:
@@ -50,7 +50,7 @@ def test_crc_of_the_catalogues_check_string() -> None:
 
 
 @given(st.lists(FRAMES, max_size=5), st.data())
-def test_frames_come_through_in_whatever_pieces_they_arrive(frames: list[Frame], data: st.DataObject) -> None:
+def test_frames_come_through_in_whatever_pieces_they_arrive(frames: list[WireFrame], data: st.DataObject) -> None:
     stream = b"".join(encode(*frame) for frame in frames)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
     decoder = Decoder()
@@ -60,12 +60,12 @@ def test_frames_come_through_in_whatever_pieces_they_arrive(frames: list[Frame],
 
 
 @given(st.binary(max_size=60), FRAMES)
-def test_garbage_before_a_frame_does_not_swallow_it(garbage: bytes, frame: Frame) -> None:
+def test_garbage_before_a_frame_does_not_swallow_it(garbage: bytes, frame: WireFrame) -> None:
     assert Decoder().feed(garbage + encode(*frame))[-1] == frame
 
 
 @given(FRAMES, st.data())
-def test_a_flipped_bit_never_gives_another_frame(frame: Frame, data: st.DataObject) -> None:
+def test_a_flipped_bit_never_gives_another_frame(frame: WireFrame, data: st.DataObject) -> None:
     wire = bytearray(encode(*frame))
     wire[data.draw(st.integers(1, len(wire) - 2))] ^= 1 << data.draw(st.integers(0, 7))
     decoder = Decoder()

@@ -77,9 +77,9 @@ def test_stop_latches_a_fault_beside_a_running_program(emulate: Served) -> None:
     port = emulate()
     holder = f"""
 import sys, time
-from wristctl.hardware.board import Board
-from wristctl.hardware.errors import Faulted, NoAnswer, PortLost
-from wristctl.hardware.transport import SerialTransport
+from wristctl.board.board import Board
+from wristctl.board.board_errors import Faulted, NoAnswer, PortLost
+from wristctl.board.transport import SerialTransport
 with Board(SerialTransport({port!r}, 250_000)) as board:
     board.enable(); board.home(); print("moving", flush=True)
     try:

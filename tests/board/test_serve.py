@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from wristctl.hardware.board import Board
-from wristctl.hardware.emulator import Atmega2560
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.emulator.serve import Line, PtyLine, TcpLine, serve
-from wristctl.hardware.errors import PortUnusable
-from wristctl.hardware.messages import BAUD, Configure, State
-from wristctl.hardware.transport import SerialTransport
+from wristctl.board.board import Board
+from wristctl.board.board_errors import PortUnusable
+from wristctl.board.emulator import Atmega2560
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.emulator.serve import Line, PtyLine, TcpLine, serve
+from wristctl.board.messages import BAUD, Configure, State
+from wristctl.board.transport import SerialTransport
 
 
 @pytest.fixture(params=[PtyLine, lambda: TcpLine(0)], ids=["pty", "tcp"])

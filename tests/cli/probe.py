@@ -8,7 +8,7 @@ import time
 from types import SimpleNamespace
 
 from wristctl.cli import app as application
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import UserError
 
 
@@ -42,7 +42,7 @@ _PROBES = {
     "gen-data": study_command(
         "gen-data", work=gen_data, plan=lambda study, inputs: f"{study.gen_data.samples} samples"
     ),
-    "train": study_command("train", work=train, inputs=(Input("data", "gen-data"),), shortcuts=("epochs",)),
+    "train": study_command("train", work=train, inputs=(EarlierRun("data", "gen-data"),), shortcuts=("epochs",)),
 }
 for _name, _app in _PROBES.items():
     sys.modules[f"probe-{_name}"] = SimpleNamespace(app=_app)  # type: ignore[assignment]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 if __name__ == "__main__":
     from wristctl.cli.app import main
-    from wristctl.hardware.trial import stands
+    from wristctl.trial import testbeds
 
-    stands.connect = functools.partial(stands.connect, record=Path(sys.argv.pop(1)))
+    testbeds.connect = functools.partial(testbeds.connect, record=Path(sys.argv.pop(1)))
     main()

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from wristctl.config.load import load_study
-from wristctl.runs import open_run
+from wristctl.records import open_run
 
 LEDGER = Path(__file__).parents[2] / "experiments" / "claims.yaml"
 

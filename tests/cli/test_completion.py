@@ -12,7 +12,7 @@ import pytest
 from wristctl.cli.completion import controllers
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS
-from wristctl.runs import start_run
+from wristctl.records import start_run
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "scipy", "pandas", "matplotlib", "cv2", "numba", "numpy", "jinja2"}

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from tests.report.browser import CHROMIUM, DRIVER, Browser
-from wristctl.runs import list_runs, open_run
+from wristctl.records import list_runs, open_run
 
 KEPT = Path(__file__).parents[2] / "build" / "screenshots"
 
@@ -67,8 +67,9 @@ def _look(page: Path) -> None:
     try:
         for width in (390, 1280):
             browser.open(page, width, False)
-            browser.run("const s = document.getElementById('instant'); s.value = s.max;"
-                        "s.dispatchEvent(new Event('input'))")
+            browser.run(
+                "const s = document.getElementById('instant'); s.value = s.max;s.dispatchEvent(new Event('input'))"
+            )
             browser.screenshot(KEPT / f"hw-run-{width}.png")
             assert browser.run("return document.documentElement.scrollWidth") <= width
             shown = browser.run("return document.querySelector('#wrists > div').lastChild.textContent")
@@ -127,7 +128,7 @@ def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
 def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
     call, monkeypatch: pytest.MonkeyPatch, silent_port: str
 ) -> None:
-    from wristctl.hardware.trial import stands
+    from wristctl.trial import testbeds
 
     class Dark:
         name = "dark"
@@ -141,7 +142,7 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
         def close(self) -> None:
             """Nothing is open."""
 
-    monkeypatch.setattr(stands, "DeviceCamera", Dark)
+    monkeypatch.setattr(testbeds, "DeviceCamera", Dark)
     code, _, err = call("hw-run", "--port", silent_port, "--yes")
     assert code == 4 and "no answer to HELLO" in err and "check USB cable and power" in err
     attempts = re.search(r"after (\d+) attempts", err)

@@ -14,8 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.hardware.emulated_bench.record import is_released, last_step, read, wait_for
-from wristctl.runs import list_runs
+from tests.bench.record import is_released, last_step, read, wait_for
+from wristctl.records import list_runs
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 pytestmark = pytest.mark.skipif(not THOROUGH, reason="WRISTCTL_THOROUGH=1 (make test-faults)")

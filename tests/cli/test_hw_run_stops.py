@@ -16,17 +16,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.board import Board
 from wristctl.config.bench import FAULTS
 from wristctl.config.study import Study
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.board import Board
-from wristctl.hardware.trial import homing, stands
-from wristctl.hardware.trial.calibration import FILE, Calibration
-from wristctl.hardware.trial.homing import Zero
-from wristctl.hardware.trial.log import TrialLog
+from wristctl.records import list_runs, start_run
+from wristctl.records.run import Run
 from wristctl.report import trial_figures
-from wristctl.runs import list_runs, start_run
-from wristctl.runs.run import Run
+from wristctl.trial import homing, testbeds
+from wristctl.trial.calibration import FILE, WristCalibration
+from wristctl.trial.homing import Zero
+from wristctl.trial.log import TrialLog
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 AT, PERIOD = 0.2, 5e-3
@@ -69,7 +69,7 @@ class Ended:
     code: int
     err: str
     run: Run
-    bench: Bench
+    bench: VirtualBench
 
     @property
     def stop(self) -> dict[str, Any]:
@@ -82,8 +82,8 @@ HwRun = Callable[..., Ended]
 @pytest.fixture(scope="module")
 def at_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A calibrate-wrist run that holds for the bench at power-on without slack."""
-    nonce = Board(Bench(Study().hw_run.bench, Study().wrist, 0).transport).connect().boot_nonce
-    known = Calibration(Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
+    nonce = Board(VirtualBench(Study().hw_run.bench, Study().wrist, 0).transport).connect().boot_nonce
+    known = WristCalibration(Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
     with start_run("calibrate-wrist", Study(), out=tmp_path_factory.mktemp("calibrated")) as run:
         run.file(FILE).write_text(json.dumps(known.plain()))
     return run.path
@@ -92,14 +92,14 @@ def at_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def hw_run(call, monkeypatch: pytest.MonkeyPatch, at_zero: Path) -> HwRun:
     """Performs a short hw-run, at zero from the start."""
-    benches: list[Bench] = []
+    benches: list[VirtualBench] = []
 
-    class Kept(Bench):
+    class Kept(VirtualBench):
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)
             benches.append(self)
 
-    monkeypatch.setattr(stands, "Bench", Kept)
+    monkeypatch.setattr(testbeds, "VirtualBench", Kept)
 
     def run(*options: str, out: Path = Path("results")) -> Ended:
         stored = ("--calibration", str(at_zero), "--set", "positions=stored")

@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 import typer
 
-from wristctl.cli.hw_view import trials_shown
 from wristctl.cli.operator import operator
 from wristctl.cli.progress import Terminal
-from wristctl.hardware.trial.log import LOG
-from wristctl.hardware.trial.trials import Trial
+from wristctl.cli.trial_panel import trials_shown
+from wristctl.trial.log import LOG
+from wristctl.trial.trials import Trial
 
 TRIALS = [Trial(0, "ulnar", 0, 0.0, 0), Trial(1, "radial", 0, 2.0, 0)]
 

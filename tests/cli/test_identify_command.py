@@ -13,8 +13,8 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.identification.identified import identified_yaml, with_identified
-from wristctl.runs import open_run
-from wristctl.simulation.simulate import simulate
+from wristctl.records import open_run
+from wristctl.simulation.closed_loop import simulate
 
 SIDES = ("ulnar", "extension")
 

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from wristctl.cli.app import COMMANDS
-from wristctl.runs import list_runs
+from wristctl.records import list_runs
 
 ROOT = Path(__file__).parents[2]
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
@@ -95,5 +95,5 @@ def test_killed_at_random_moments_no_run_looks_complete_that_is_not(tmp_path: Pa
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
     )  # fmt: skip
     assert listed.returncode == 0 and all(name in listed.stdout for name in whole)
-    print(f"{number} kills of {len(typed)} commands: {({state: states.count(state) for state in set(states)})}")
+    print(f"{number} kills of {len(typed)} commands: { ({state: states.count(state) for state in set(states)}) }")
     assert "crashed" in states

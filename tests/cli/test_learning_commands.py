@@ -15,8 +15,8 @@ import pytest
 
 from wristctl.learning import processes, training
 from wristctl.learning.network_file import load_network, training_record
-from wristctl.learning.trial import Epoch
-from wristctl.runs import list_runs, open_run
+from wristctl.learning.training_result import Epoch
+from wristctl.records import list_runs, open_run
 
 LEAVES = ("hidden=[16,8]", "activation=tanh", "learning_rate=0.01", "workers=1", "epochs=12")
 QUICK = tuple(word for leaf in LEAVES for word in ("--set", leaf))
@@ -98,9 +98,7 @@ def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "train_one", interrupted)
 
 
-def test_interrupted_training_keeps_the_network_found_so_far(
-    call, data: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupted_training_keeps_the_network_found_so_far(call, data: str, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupt_at(3, monkeypatch)
     code, _, _ = call("train", "--data", "latest:gen-data", *QUICK)
     (run,) = (run for run in list_runs(Path("results")) if run.kind == "train")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.runs import list_runs, open_run
+from wristctl.records import list_runs, open_run
 
 LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.5")
 MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from wristctl.config.study import Study
-from wristctl.runs import InputRun, Run, start_run
-from wristctl.runs.replay import causes, verdicts
+from wristctl.records import InputRun, Run, start_run
+from wristctl.records.replay import causes, verdicts
 
 ROOT = Path(__file__).parents[2]
 Command = Callable[..., tuple[int, str]]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wristctl.config.study import Study
-from wristctl.runs import InputRun, Run, start_run
+from wristctl.records import InputRun, Run, start_run
 
 
 @pytest.fixture

@@ -18,11 +18,11 @@ import pytest
 from wristctl.cli.calibrate_camera import look
 from wristctl.config.vision import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.board_shots import board_shots
-from wristctl.hardware.vision.camera import FolderCamera, Frame
-from wristctl.hardware.vision.scene import Scene
-from wristctl.runs import Run, open_run
-from wristctl.runs.manifest import command_of
+from wristctl.records import Run, open_run
+from wristctl.records.manifest import command_of
+from wristctl.vision.board_shots import board_shots
+from wristctl.vision.camera import FolderCamera, Frame
+from wristctl.vision.scene import Scene
 
 THOROUGH = os.environ.get("WRISTCTL_THOROUGH")
 Call = Callable[..., tuple[int, str, str]]
@@ -149,7 +149,7 @@ def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
         return path
 
     cameras: list[Webcam] = []
-    monkeypatch.setattr("wristctl.hardware.vision.camera.DeviceCamera", Webcam)
+    monkeypatch.setattr("wristctl.vision.camera.DeviceCamera", Webcam)
     monkeypatch.setattr("typer.prompt", lambda said, **_: asked.append(said))
     progress = contextlib.nullcontext(lambda *_, **__: None)
     session: Any = SimpleNamespace(

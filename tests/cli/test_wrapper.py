@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.runs import Run, list_runs, open_run
+from wristctl.records import Run, list_runs, open_run
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
 Begin = Callable[..., subprocess.Popen[bytes]]

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from wristctl.benchmark.compare import compare, frame, reference_name, series
-from wristctl.benchmark.cost import step_time
-from wristctl.benchmark.paper import verdict
+from wristctl.comparison.comparison import compare, frame, reference_name, series
+from wristctl.comparison.paper import verdict
+from wristctl.comparison.step_cost import step_time
 from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.control.table import CONTROLLERS, controller

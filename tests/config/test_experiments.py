@@ -18,9 +18,9 @@ from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.section import Section
 from wristctl.config.strict_yaml import KeyPath, parse_yaml
 from wristctl.config.study import Study
-from wristctl.runs.code import code_state
-from wristctl.runs.environment import environment_state
-from wristctl.runs.start import fingerprint
+from wristctl.records.code import code_state
+from wristctl.records.environment import environment_state
+from wristctl.records.start import fingerprint
 
 EXPERIMENTS = sorted((Path(__file__).parents[2] / "experiments").rglob("*.yaml"))
 SECTIONS = {field.alias or name: name for name, field in Study.model_fields.items()}

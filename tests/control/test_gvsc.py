@@ -11,7 +11,7 @@ from wristctl.control.law import wrist_of
 from wristctl.control.model import one_segment
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.model import linearised, terms
+from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
 
 FINE = 32

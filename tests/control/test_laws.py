@@ -14,7 +14,7 @@ from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.model import terms
+from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters(gravity=(-8.0, 3.0))

@@ -7,7 +7,7 @@ import numpy as np
 from wristctl.config.wrist import WristParameters
 from wristctl.control.mrac import HIGHEST, LOWEST, MODEL_ANGLE, MODEL_RATE, PARAMETERS
 from wristctl.control.table import controller
-from wristctl.wrist.model import terms
+from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 
 MODEL = WristParameters()

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.benchmark.compare import compare
+from wristctl.comparison.comparison import compare
 from wristctl.config.study import Study
 from wristctl.control.law import Controller, Gain
 from wristctl.control.table import CONTROLLERS
-from wristctl.simulation.simulate import simulate
+from wristctl.simulation.closed_loop import simulate
 from wristctl.tuning.search import search
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.board.bench import Bench
 from tests.firmware.simavr_board import LIBRARY, SimavrBoard
-from tests.hardware.bench import Bench
-from wristctl.hardware.messages import DICTIONARY_HASH, Command, State
+from wristctl.board.messages import DICTIONARY_HASH, Command, State
 
-IMAGE = Path(__file__).parents[2] / "wristctl" / "hardware" / "firmware" / "wrist.hex"
+IMAGE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware" / "wrist.hex"
 BOOTLOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 BOOTLOADER_BAUD = 115_200
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-HARDWARE = Path(__file__).parents[2] / "wristctl" / "hardware"
-IMAGE = HARDWARE / "firmware" / "wrist.hex"
+BOARD = Path(__file__).parents[2] / "wristctl" / "board"
+IMAGE = BOARD / "firmware" / "wrist.hex"
 
 needs_compiler = pytest.mark.skipif(not shutil.which("avr-gcc"), reason="needs gcc-avr, binutils-avr, avr-libc")
 
@@ -23,9 +23,9 @@ def test_image_has_the_hash_written_beside_it() -> None:
 @needs_compiler
 def test_sources_alone_in_another_place_build_the_same_bytes(tmp_path: Path) -> None:
     elsewhere = tmp_path / "another" / "place"
-    shutil.copytree(HARDWARE / "firmware", elsewhere / "firmware")
+    shutil.copytree(BOARD / "firmware", elsewhere / "firmware")
     for name in ("dictionary.py", "messages.toml"):
-        shutil.copy(HARDWARE / name, elsewhere)
+        shutil.copy(BOARD / name, elsewhere)
     command = ["make", "-C", elsewhere / "firmware", "check", f"BUILD={tmp_path}/build"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -37,7 +37,7 @@ def test_another_compiler_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "avr-gcc"
     other.write_text("#!/bin/sh\necho 7.3.0\n")
     other.chmod(0o755)
-    command = ["make", "-C", HARDWARE / "firmware", f"BUILD={tmp_path}/build"]
+    command = ["make", "-C", BOARD / "firmware", f"BUILD={tmp_path}/build"]
     run = subprocess.run(command, capture_output=True, text=True, env={"PATH": f"{tmp_path}:/usr/bin:/bin"})
     assert run.returncode != 0
     assert "avr-gcc 5.4.0 is needed" in run.stdout

@@ -15,9 +15,9 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.identification import rehearsal
 from wristctl.identification.fit import Problem
-from wristctl.identification.rehearsal import Truth, rehearse
-from wristctl.identification.trials import Trial, trials_of
-from wristctl.runs import Run, start_run
+from wristctl.identification.measured_trials import MeasuredTrial, measured_trials
+from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.records import Run, start_run
 
 KNOWN, TENDONS = WristParameters(), Actuator(level="tendon")
 UPRIGHT = KNOWN
@@ -32,8 +32,8 @@ START = {"tendon_stiffness": 20e3, "friction": 0.1, "delay": 0.0} | {
 rehearsal.spools = cache(rehearsal.spools)  # the same moves of the same motors, whatever hangs on them
 
 
-def bench(seed: int, **truth: float) -> tuple[Callable[[WristParameters], Truth], dict[str, float]]:
-    """A bench whose wrist has 30 % softer springs, with small errors of its own drawn from the seed: Truth by pose."""
+def bench(seed: int, **truth: float) -> tuple[Callable[[WristParameters], RehearsedTruth], dict[str, float]]:
+    """A bench whose wrist has 30 % softer springs, with small errors of its own drawn from the seed: truth by pose."""
     rng = np.random.default_rng(seed)
     radius = KNOWN.tendon_radius * (1.0 + 0.01 * rng.standard_normal())
     clock = IdentifySettings().clock_error * rng.standard_normal()
@@ -42,11 +42,11 @@ def bench(seed: int, **truth: float) -> tuple[Callable[[WristParameters], Truth]
         "delay": 0.03, "tendon_radius": radius,
     } | truth  # fmt: skip
 
-    def made(pose: WristParameters) -> Truth:
+    def made(pose: WristParameters) -> RehearsedTruth:
         own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
         tendons = {name: values[name] for name in ("tendon_stiffness", "friction")}
         zero, taut = 0.1 * rng.standard_normal(2), 2e-5 * rng.standard_normal(4)
-        return Truth(
+        return RehearsedTruth(
             pose.model_copy(update=own), TENDONS.model_copy(update=tendons), values["delay"] + clock,
             zero_deg=tuple(zero), taut=tuple(taut),
         )  # fmt: skip
@@ -60,17 +60,19 @@ def logged(
     poses: tuple[WristParameters, ...] = (UPRIGHT, LEVEL),
     directions: tuple[str, ...] = DIRECTIONS,
     **truth: float,
-) -> tuple[list[Trial], dict[str, float]]:
+) -> tuple[list[MeasuredTrial], dict[str, float]]:
     """Trials of a rehearsed bench, one run a pose, and the true parameters."""
     made, values = bench(seed, **truth)
     rng, trials = np.random.default_rng([seed, 1]), []
     for number, pose in enumerate(poses):
         tables = rehearse(pose, made(pose), [(each, moves) for each in directions], 5.0, rng)
-        trials += trials_of(f"run {number}", pose, TENDONS.step_length, 1e-3, *tables, exposure=Truth.exposure)
+        trials += measured_trials(
+            f"run {number}", pose, TENDONS.step_length, 1e-3, *tables, exposure=RehearsedTruth.exposure
+        )
     return trials, values
 
 
-def problem(trials: list[Trial], **settings: object) -> Problem:
+def problem(trials: list[MeasuredTrial], **settings: object) -> Problem:
     """The search for all parameters, begun at what the controller believes."""
     return Problem(trials, START, IdentifySettings.model_validate(settings))
 

@@ -7,7 +7,7 @@ from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
 from wristctl.learning.training import train_one
-from wristctl.learning.trial import Job, Trial
+from wristctl.learning.training_result import Job, TrainingResult
 
 
 @pytest.fixture(scope="session")
@@ -26,5 +26,5 @@ def split(samples: Samples) -> Split:
 
 
 @pytest.fixture(scope="session")
-def trained(samples: Samples, split: Split, quick: NetworkSettings) -> Trial:
+def trained(samples: Samples, split: Split, quick: NetworkSettings) -> TrainingResult:
     return train_one(samples, Job("quick", quick, split, np.random.SeedSequence(7)))

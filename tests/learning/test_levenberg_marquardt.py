@@ -11,11 +11,11 @@ import torch
 from wristctl.config.learning import DataSettings, NetworkSettings, TrainSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning import levenberg_marquardt
+from wristctl.learning.angle_errors import error_map
 from wristctl.learning.dataset import draw_samples, split_samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt
-from wristctl.learning.metrics import error_map
 from wristctl.learning.training import train_one
-from wristctl.learning.trial import Job
+from wristctl.learning.training_result import Job
 
 
 def linear(seed: int) -> tuple[torch.nn.Linear, torch.Tensor, torch.Tensor]:

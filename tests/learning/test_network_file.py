@@ -12,13 +12,13 @@ from wristctl.config.errors import UserError
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.network_file import load_network, save_network, training_record
-from wristctl.learning.trial import Trial
+from wristctl.learning.training_result import TrainingResult
 
 RECORD: dict[str, object] = {"seed": 3, "settings": {"epochs": 5, "hidden": [24, 16]}, "data_sha256": "ab12"}
 
 
 @pytest.fixture
-def network(trained: Trial) -> Network:
+def network(trained: TrainingResult) -> Network:
     return trained.network
 
 

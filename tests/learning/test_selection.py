@@ -7,11 +7,11 @@ from wristctl.config.errors import UserError
 from wristctl.config.learning import PRESETS, NetworkSettings, TrainSettings
 from wristctl.learning.dataset import split_samples
 from wristctl.learning.ranking import holm, mean_interval, rank
-from wristctl.learning.selection import Candidate, choose, fold_jobs, grid_points
+from wristctl.learning.selection import CrossValidated, choose, fold_jobs, grid_points
 
 
-def candidate(cost: int, rmse: list[float]) -> Candidate:
-    return Candidate(NetworkSettings(), 3, cost, np.array(rmse))
+def candidate(cost: int, rmse: list[float]) -> CrossValidated:
+    return CrossValidated(NetworkSettings(), 3, cost, np.array(rmse))
 
 
 def test_the_cheapest_network_within_one_standard_error_of_the_best_is_chosen() -> None:

@@ -11,20 +11,22 @@ from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning import training
+from wristctl.learning.angle_errors import AngleErrors, angle_errors
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
-from wristctl.learning.metrics import AngleErrors, angle_errors
 from wristctl.learning.processes import train_all
 from wristctl.learning.training import train_one
-from wristctl.learning.trial import Epoch, Job, Trial, best_of
+from wristctl.learning.training_result import Epoch, Job, TrainingResult, best_of
 
 SEED = np.random.SeedSequence(7)
 
 
-def trained_on(samples: Samples, split: Split, settings: NetworkSettings, seed: np.random.SeedSequence = SEED) -> Trial:
+def trained_on(
+    samples: Samples, split: Split, settings: NetworkSettings, seed: np.random.SeedSequence = SEED
+) -> TrainingResult:
     return train_one(samples, Job("one", settings, split, seed))
 
 
-def errors(trial: Trial, samples: Samples, split: Split) -> AngleErrors:
+def errors(trial: TrainingResult, samples: Samples, split: Split) -> AngleErrors:
     return angle_errors(trial.network.angle(samples.tip[split.test]), samples.theta[split.test])
 
 
@@ -35,7 +37,7 @@ def paper(**changes: object) -> AngleErrors:
     return errors(trained_on(samples, split, NetworkSettings.model_validate(changes)), samples, split)
 
 
-def same_bytes(a: Trial, b: Trial) -> bool:
+def same_bytes(a: TrainingResult, b: TrainingResult) -> bool:
     pairs = zip((*a.network.weights, *a.network.biases), (*b.network.weights, *b.network.biases), strict=True)
     return a.epochs == b.epochs and all(x.tobytes() == y.tobytes() for x, y in pairs)
 
@@ -50,12 +52,12 @@ def test_t1s_sigmoid_as_printed_collapses_to_the_mean() -> None:
     assert abs(collapsed.r2) < 0.1, "C11: coupled weight decay of 0.01 leaves nothing but the mean"
 
 
-def test_quick_network_learns(trained: Trial, samples: Samples, split: Split) -> None:
+def test_quick_network_learns(trained: TrainingResult, samples: Samples, split: Split) -> None:
     assert errors(trained, samples, split).r2 > 0.998
 
 
 def test_losses_are_mean_squared_angles(
-    trained: Trial, samples: Samples, split: Split, quick: NetworkSettings
+    trained: TrainingResult, samples: Samples, split: Split, quick: NetworkSettings
 ) -> None:
     error = trained.network.angle(samples.tip[split.validation]) - samples.theta[split.validation]
     assert trained.validation_loss == pytest.approx(float(np.mean(error**2)), rel=1e-9)
@@ -119,7 +121,7 @@ CHANGES: tuple[dict[str, object], ...] = (
 )
 
 
-def interrupted_at(last: int, samples: Samples, job: Job, checkpoints: Path | None = None) -> Trial:
+def interrupted_at(last: int, samples: Samples, job: Job, checkpoints: Path | None = None) -> TrainingResult:
     def stop(epoch: Epoch) -> None:
         if epoch.epoch == last:
             raise KeyboardInterrupt

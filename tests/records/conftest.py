@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from wristctl.config.study import Study
-from wristctl.runs import Run, start_run
+from wristctl.records import Run, start_run
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,7 +45,7 @@ def process() -> Iterator[Callable[[str, Path], subprocess.Popen[str]]]:
     def start(code: str, out: Path) -> subprocess.Popen[str]:
         head = (
             "import sys, time; from pathlib import Path; from wristctl.config.study import Study\n"
-            "from wristctl.runs import start_run\n"
+            "from wristctl.records import start_run\n"
             f"out = Path({str(out)!r})\n"
             "def begun(run): print(run.id, flush=True)\n"
         )

@@ -15,8 +15,8 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import list_runs, start_run
-from wristctl.runs.query import entries
+from wristctl.records import list_runs, start_run
+from wristctl.records.query import entries
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run, list_runs, open_run, require, start_run
-from wristctl.runs.index import INDEX, indexed
+from wristctl.records import Run, list_runs, open_run, require, start_run
+from wristctl.records.index import INDEX, indexed
 
 Make = Callable[..., Run]
 

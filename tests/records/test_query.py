@@ -12,10 +12,10 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run, open_run, start_run
-from wristctl.runs.index import INDEX
-from wristctl.runs.query import entries, in_order, select
-from wristctl.runs.tags import change_tags
+from wristctl.records import Run, open_run, start_run
+from wristctl.records.index import INDEX
+from wristctl.records.query import entries, in_order, select
+from wristctl.records.tags import change_tags
 
 Make = Callable[..., Run]
 COUNT = 10_000 if os.environ.get("WRISTCTL_THOROUGH") else 1_000
@@ -85,6 +85,7 @@ def test_many_runs_list_in_the_time_a_person_waits(make: Make, results: Path) ->
         path.mkdir()
         for name, text in texts.items():
             (path / name).write_text(text)
+
     def seconds(ask: Callable[[Path], object]) -> float:
         began = time.process_time()
         found = ask(results)

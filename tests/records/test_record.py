@@ -18,7 +18,7 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
-from wristctl.runs import InputRun, Run, start_run, stream
+from wristctl.records import InputRun, Run, start_run, stream
 
 Make = Callable[..., Run]
 
@@ -184,7 +184,7 @@ def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "all"]):
         subprocess.run([*git, *command], check=True, capture_output=True)
     ask = (
-        "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.runs.code import code_state; "
+        "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.records.code import code_state; "
         "code, patch, _ = code_state(); print(code.commit, code.dirty); sys.stdout.write(patch.decode())"
     )
 

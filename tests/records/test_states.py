@@ -14,7 +14,7 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run, list_runs, start_run
+from wristctl.records import Run, list_runs, start_run
 
 Start = Callable[[str, Path], subprocess.Popen[str]]
 
@@ -82,15 +82,13 @@ def test_a_failed_run_says_why_and_raises_again(results: Path) -> None:
     first.check()
 
 
-def test_runs_of_the_same_second_have_directories_of_their_own(
-    results: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_runs_of_the_same_second_have_directories_of_their_own(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Stopped(datetime):
         @classmethod
         def now(cls, tz: tzinfo | None = None) -> Stopped:
             return cls(2026, 1, 1, tzinfo=tz)
 
-    monkeypatch.setattr("wristctl.runs.start.datetime", Stopped)
+    monkeypatch.setattr("wristctl.records.start.datetime", Stopped)
     for _ in range(3):
         with start_run("tune", Study(), "", results):
             pass

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.runs import Run
+from wristctl.records import Run
 
 Make = Callable[..., Run]
 

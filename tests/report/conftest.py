@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wristctl.benchmark.compare import Result
+from wristctl.comparison.comparison import ComparedRow
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
-from wristctl.hardware.vision.marker import Sighting, Verdict
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.loop_figures import angles, errors, tensions
 from wristctl.report.track_figures import angle
@@ -23,9 +22,10 @@ from wristctl.report.trial_figures import errors as trial_errors
 from wristctl.report.trial_figures import tensions as trial_tensions
 from wristctl.report.tuning_figures import convergence, gain_history
 from wristctl.report.wrist_drawing import directions, stroboscope
-from wristctl.simulation.simulate import Simulation
+from wristctl.simulation.closed_loop import Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.tuning.search import Search
+from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.kinematics import chain_tip
 
 WRIST = WristParameters()
@@ -55,14 +55,14 @@ def late() -> Trajectory:
     return replace(one, seen=np.roll(one.theta, 3), acting=0.5 * one.tension)
 
 
-def result(row: str, reference: str, rmse: float, failed: bool = False) -> Result:
+def result(row: str, reference: str, rmse: float, failed: bool = False) -> ComparedRow:
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
     done = Simulation(course(row, 1.0, failed), metrics, failed)
-    return Result("default", reference, "exact", controller, gains, done)
+    return ComparedRow("default", reference, "exact", controller, gains, done)
 
 
-def results() -> list[Result]:
+def results() -> list[ComparedRow]:
     """RMSE 1e-5, 2e-5, ... in the order of rows and references; smc/exchanged diverged on the step."""
     pairs = [(row, reference) for row in ROWS for reference in REFERENCES]
     return [result(*pair, rmse=1e-5 * (k + 1), failed=k == 3) for k, pair in enumerate(pairs)]
@@ -90,11 +90,11 @@ def trials() -> list[Trial]:
 
 def sightings() -> list[Sighting]:
     """A marker that swings, hidden now and then and blurred once."""
-    kinds = {7: Verdict.NO_BASE, 8: Verdict.NO_BASE, 20: Verdict.NO_TIP}
-    found = [(kinds.get(k, Verdict.OK), 0.02 * k) for k in range(50)]
+    kinds = {7: SightingVerdict.NO_BASE, 8: SightingVerdict.NO_BASE, 20: SightingVerdict.NO_TIP}
+    found = [(kinds.get(k, SightingVerdict.OK), 0.02 * k) for k in range(50)]
     corners = np.zeros((2, 4, 2))
     return [
-        Sighting(time, k, np.sin(time) if verdict is Verdict.OK else np.nan, verdict, corners)
+        Sighting(time, k, np.sin(time) if verdict is SightingVerdict.OK else np.nan, verdict, corners)
         for k, (verdict, time) in enumerate(found)
     ]
 
@@ -143,7 +143,7 @@ def course_maker() -> Callable[..., Trajectory]:
 
 
 @pytest.fixture(name="results", scope="session")
-def results_of_a_comparison() -> list[Result]:
+def results_of_a_comparison() -> list[ComparedRow]:
     return results()
 
 

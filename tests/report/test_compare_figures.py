@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from wristctl.benchmark.compare import Result
-from wristctl.benchmark.paper import T2
+from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 
 
@@ -21,7 +21,7 @@ def tick_labels(axes: Axes) -> list[str]:
     return [label.get_text() for label in axes.get_yticklabels()]
 
 
-def test_grid_has_a_row_for_each_controller_and_a_column_for_each_reference(results: list[Result]) -> None:
+def test_grid_has_a_row_for_each_controller_and_a_column_for_each_reference(results: list[ComparedRow]) -> None:
     axes = np.array(angle_grid(results).axes).reshape(6, 3)
     assert axes[0, 0].get_title("left") == "step 30 deg"
     assert texts(axes[3, 2]) == ["pid/\ntuned"]
@@ -31,7 +31,7 @@ def test_grid_has_a_row_for_each_controller_and_a_column_for_each_reference(resu
     assert "diverged" in texts(axes[1, 0]) and "diverged" not in texts(axes[1, 1])
 
 
-def test_map_prints_every_rmse_and_marks_what_failed(results: list[Result]) -> None:
+def test_map_prints_every_rmse_and_marks_what_failed(results: list[ComparedRow]) -> None:
     ours, paper, _ = rmse_map(results).axes
     wanted = ["x" if r.simulation.failed else f"{r.simulation.metrics['rmse']:.2g}" for r in results]
     assert sorted(texts(ours)) == sorted(wanted)
@@ -39,20 +39,20 @@ def test_map_prints_every_rmse_and_marks_what_failed(results: list[Result]) -> N
     assert texts(paper) == [f"{T2[name].rmse:.2g}" for name in ("smc", "smc", "smc", "pid")]
 
 
-def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results: list[Result]) -> None:
+def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results: list[ComparedRow]) -> None:
     for value in (0.0, np.nan):
         bad = [dataclasses.replace(r.simulation, metrics={"rmse": value}) for r in results]
         (ours, *_) = rmse_map([dataclasses.replace(r, simulation=s) for r, s in zip(results, bad, strict=True)]).axes
         assert texts(ours) == ["0" if value == 0.0 else "x"] * len(results)
 
 
-def test_several_inverses_are_rows_of_their_own(results: list[Result]) -> None:
+def test_several_inverses_are_rows_of_their_own(results: list[ComparedRow]) -> None:
     both = [*results, *(dataclasses.replace(result, inverse="network") for result in results)]
     names = tick_labels(rmse_map(both).axes[0])
     assert len(names) == 12 and {"smc/tuned, exact", "smc/tuned, network"} <= set(names)
 
 
-def test_bars_are_medians_over_the_references(results: list[Result]) -> None:
+def test_bars_are_medians_over_the_references(results: list[ComparedRow]) -> None:
     (axes,) = chattering_bars(results).axes
     bars = [bar.get_width() for bar in axes.patches]  # type: ignore[attr-defined]
     assert bars == pytest.approx([10.0 * (3 * row + 2) for row in range(6)])

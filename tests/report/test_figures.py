@@ -14,7 +14,7 @@ from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from wristctl.runs.formats import write_figure
+from wristctl.records.formats import write_figure
 
 
 def tick_labels(axis: Axis) -> list[Text]:

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.learning.angle_errors import error_map
 from wristctl.learning.dataset import Samples, draw_samples
-from wristctl.learning.metrics import error_map
 from wristctl.report.learning_figures import coverage, error_over_workspace, learning_curves, predicted_angles
 from wristctl.report.learning_tables import predictions_table, samples_table
 

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.hardware.trial.log import LOG
 from wristctl.report.live_figure import newest_rows, recent
+from wristctl.trial.log import LOG
 
 PERIOD = 0.005
 
@@ -32,7 +32,7 @@ def test_the_last_seconds_are_read_but_for_a_row_that_is_being_written(tmp_path:
 
 def test_the_picture_shows_angle_and_reference_up_to_now() -> None:
     above, below = recent(rows(100)).axes
-    angle, = (each for each in above.lines if each.get_label() == "angle")
+    (angle,) = (each for each in above.lines if each.get_label() == "angle")
     assert np.asarray(angle.get_xdata())[-1] == 0.0
     np.testing.assert_allclose(angle.get_ydata(), np.degrees(0.1 * PERIOD * np.arange(100)))
     assert [each.get_label() for each in below.lines] == [f"tendon {number}" for number in (1, 2, 4, 5)]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.benchmark.compare import Result, frame, series
+from wristctl.comparison.comparison import ComparedRow, frame, series
 from wristctl.config.study import Study
+from wristctl.records import InputRun, Run, start_run
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.report.comparison_page import several_page
 from wristctl.report.page import page
-from wristctl.report.several import several_page
-from wristctl.runs import InputRun, Run, start_run
 
 HERE = Path(__file__).parent
 KEPT = HERE.parents[1] / "build" / "screenshots"
@@ -32,7 +32,7 @@ MARKUP = "</script><b>bold</b>"
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory: pytest.TempPathFactory, results: list[Result]) -> Run:
+def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow]) -> Run:
     """A comparison of six rows on three references, one of which diverged, with the run it was made from."""
     out = tmp_path_factory.mktemp("page") / "results"
     found = [_complete(result) for result in results]
@@ -56,7 +56,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory, results: list[Result]) ->
     return Run(run.path)
 
 
-def _complete(result: Result) -> Result:
+def _complete(result: ComparedRow) -> ComparedRow:
     metrics = {"settling": 1.0, "steady_state": 1e-4} | result.simulation.metrics
     return replace(result, simulation=replace(result.simulation, metrics=metrics))
 
@@ -108,8 +108,10 @@ def test_a_browser_shows_the_page_without_an_error_or_a_request(
 ) -> None:
     file = compared.file("report.html")
     browser.open(file, width, dark)
-    browser.run("document.getElementById('instant').value = 300;"
-                "document.getElementById('instant').dispatchEvent(new Event('input'))")
+    browser.run(
+        "document.getElementById('instant').value = 300;"
+        "document.getElementById('instant').dispatchEvent(new Event('input'))"
+    )
     browser.screenshot(KEPT / f"compare-{width}-{'dark' if dark else 'light'}.png")
     assert browser.console() == []
     assert set(browser.requests()) == {file.as_uri()}

@@ -13,7 +13,7 @@ from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS
 from wristctl.wrist.kinematics import chain_tip
-from wristctl.wrist.shape import backbone, beside, discs
+from wristctl.wrist.shape import backbone, discs, offset_points
 
 WRIST = WristParameters()
 L, C = WRIST.length, WRIST.tendon_offset
@@ -42,7 +42,7 @@ def test_backbone_keeps_its_length_and_its_tangent() -> None:
 def test_drawn_tendons_have_the_models_length(theta: float) -> None:
     frames = discs(np.array([theta]), L, 5)
     for sign in (1, -1):
-        drawn = np.abs(np.diff(beside(frames, sign * C))).sum()
+        drawn = np.abs(np.diff(offset_points(frames, sign * C))).sum()
         assert drawn == pytest.approx(2 * 4 * (L / theta - sign * C) * np.sin(theta / 8), rel=1e-12)
 
 

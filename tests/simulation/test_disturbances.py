@@ -12,7 +12,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
-from wristctl.wrist.model import linearised
+from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()

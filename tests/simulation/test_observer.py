@@ -14,12 +14,12 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.camera import frames
+from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.frames import frames
 from wristctl.simulation.observer import stationary_gain
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
-from wristctl.simulation.simulate import simulate
-from wristctl.wrist.model import linearised, terms
+from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()

@@ -15,7 +15,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout, sample_period
 from wristctl.simulation.stream import stream
-from wristctl.wrist.model import linearised
+from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()

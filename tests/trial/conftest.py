@@ -11,17 +11,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.board import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.board import Board
-from wristctl.hardware.trial.calibration import Calibration
-from wristctl.hardware.trial.experiment import Experiment
-from wristctl.hardware.trial.homing import Zero
-from wristctl.hardware.trial.log import TrialLog
-from wristctl.hardware.trial.stands import EmulatedStand
-from wristctl.hardware.trial.trials import trials_of
-from wristctl.hardware.vision.view import View
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.experiment import Experiment
+from wristctl.trial.homing import Zero
+from wristctl.trial.log import TrialLog
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.trial.trials import trials_of
+from wristctl.vision.view import View
 
 WRIST = WristParameters()
 SHORT: dict[str, Any] = {
@@ -43,7 +43,7 @@ class Done:
     """An experiment and what it left."""
 
     experiment: Experiment
-    bench: Bench
+    bench: VirtualBench
     folder: Path
     error: BaseException | None
 
@@ -60,27 +60,27 @@ def settings_of(**changes: Any) -> HwRunSettings:
 
 
 @pytest.fixture(scope="session")
-def at_zero() -> Calibration:
+def at_zero() -> WristCalibration:
     """A calibration that holds for the bench at power-on without slack."""
-    bench = Bench(settings_of().bench, WRIST, 0)
+    bench = VirtualBench(settings_of().bench, WRIST, 0)
     nonce = Board(bench.transport).connect().boot_nonce
     zero = Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4)
-    return Calibration(zero, "ulnar", nonce, (0, 0, 0, 0))
+    return WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
 
 
 @pytest.fixture
-def experiment(tmp_path: Path, at_zero: Calibration) -> Run:
+def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
     """Performs the short experiment, changed, and keeps what stopped it."""
 
     def run(shown: Callable[[dict[str, Any]], None] | None = None, **changes: Any) -> Done:
         settings = settings_of(**changes)
-        bench = Bench(settings.bench, WRIST, 0, settings.markers)
+        bench = VirtualBench(settings.bench, WRIST, 0, settings.markers)
         log = TrialLog(tmp_path, settings.bench.segments, settings.control_period)
         trials = trials_of(settings, np.random.default_rng(0))
         performed = Experiment(settings, WRIST, trials, log, calibration=at_zero)
         error = None
         try:
-            performed.run(EmulatedStand(bench, settings, View(), None), shown)
+            performed.run(EmulatedTestbed(bench, settings, View(), None), shown)
         except BaseException as raised:
             error = raised
         log.close()

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.hardware.trial.conftest import Run
+from tests.trial.conftest import Run
+from wristctl.board.messages import State
 from wristctl.config.errors import UserError
-from wristctl.hardware.messages import State
-from wristctl.hardware.trial.log import LOG
+from wristctl.trial.log import LOG
 
 
 def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:

@@ -7,28 +7,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.hardware.trial.conftest import WRIST, settings_of
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.board import Board
-from wristctl.hardware.trial.homing import Zero, find_zero
-from wristctl.hardware.trial.prepare import prepare
-from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.spools import spools_of
-from wristctl.hardware.trial.stands import EmulatedStand
-from wristctl.hardware.vision.view import View
+from tests.trial.conftest import WRIST, settings_of
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.board import Board
+from wristctl.trial.homing import Zero, find_zero
+from wristctl.trial.prepare import prepare
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import spools_of
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.vision.view import View
 
 QUICK = {"move": 1e-4, "rest": 0.08, "frames": 2, "slack": 5e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, Bench]:
+def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, VirtualBench]:
     settings = settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
-    bench = Bench(settings.bench, WRIST, 0)
-    eye = EmulatedStand(bench, settings, View(), None).eye()
+    bench = VirtualBench(settings.bench, WRIST, 0)
+    tracking = EmulatedTestbed(bench, settings, View(), None).tracking()
     board = Board(bench.transport)
     board.connect()
     prepare(board, settings)
-    return find_zero(board, eye, spools_of(settings.actuator), settings.homing, "ulnar", signs), bench
+    return find_zero(board, tracking, spools_of(settings.actuator), settings.homing, "ulnar", signs), bench
 
 
 def test_slack_senses_and_steps_per_radian_are_found() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.hardware.trial.log import FRAMES, LOG, Disk, Stream, TrialLog, truth_columns
+from wristctl.trial.log import FRAMES, LOG, Disk, Stream, TrialLog, truth_columns
 
 
 def test_rows_read_back_exactly_and_nan_is_empty(tmp_path: Path) -> None:

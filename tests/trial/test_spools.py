@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.trial.spools import Paths, on_plus_side, spools_of
+from wristctl.trial.spools import Paths, on_plus_side, spools_of
 from wristctl.wrist.directions import ACTIVE
 
 WRIST, ACTUATOR = WristParameters(), Actuator(level="tendon")

@@ -10,11 +10,11 @@ import pytest
 
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.trial.eye import InlineEye, ThreadedEye
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.marker import Sighting, Tracker, Verdict
-from wristctl.hardware.vision.scene import Scene
-from wristctl.hardware.vision.view import View
+from wristctl.trial.tracking import InlineTracking, ThreadedTracking
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
+from wristctl.vision.scene import Scene
+from wristctl.vision.view import View
 
 
 class Shown:
@@ -35,15 +35,20 @@ class Shown:
 def test_the_same_bytes_again_are_no_angle_and_another_picture_of_the_same_wrist_is() -> None:
     scene, rng = Scene(SceneSettings(), WristParameters()), np.random.default_rng(0)
     first, second = (scene.render(np.full((1, 4), 0.05), rng) for _ in range(2))
-    eye = InlineEye(Shown([first, first.copy(), second, second.copy()]), Tracker(Markers(), View(), Gates()))
-    seen = [eye.look()[0] for _ in range(4)]
-    assert [each.verdict for each in seen] == [Verdict.OK, Verdict.FROZEN, Verdict.OK, Verdict.FROZEN]
+    tracking = InlineTracking(Shown([first, first.copy(), second, second.copy()]), Tracker(Markers(), View(), Gates()))
+    seen = [tracking.look()[0] for _ in range(4)]
+    assert [each.verdict for each in seen] == [
+        SightingVerdict.OK,
+        SightingVerdict.FROZEN,
+        SightingVerdict.OK,
+        SightingVerdict.FROZEN,
+    ]
     assert [math.isnan(each.theta) for each in seen] == [False, True, False, True]
-    assert eye.look() == []
+    assert tracking.look() == []
 
 
-@pytest.mark.parametrize("kind", [InlineEye, ThreadedEye])
-def test_what_is_kept_of_a_frame_is_what_the_loop_is_told(kind: type[InlineEye | ThreadedEye]) -> None:
+@pytest.mark.parametrize("kind", [InlineTracking, ThreadedTracking])
+def test_what_is_kept_of_a_frame_is_what_the_loop_is_told(kind: type[InlineTracking | ThreadedTracking]) -> None:
     """The angle from zero, not from wherever the markers were glued on."""
     scene, kept, done = Scene(SceneSettings(), WristParameters()), [], threading.Event()
 
@@ -52,12 +57,12 @@ def test_what_is_kept_of_a_frame_is_what_the_loop_is_told(kind: type[InlineEye |
         done.set()
 
     camera = Shown([])
-    eye = kind(camera, Tracker(Markers(), View(), Gates()), keep)
-    eye.zero = 0.1
+    tracking = kind(camera, Tracker(Markers(), View(), Gates()), keep)
+    tracking.zero = 0.1
     camera._frames.append(Frame(scene.render(np.full((1, 4), 0.05), np.random.default_rng(0)), 0.0, 0))
-    told = eye.look()
+    told = tracking.look()
     assert done.wait(30.0)
-    told = told or eye.look()
-    eye.close()
+    told = told or tracking.look()
+    tracking.close()
     assert [each.theta for each in kept] == [each.theta for each in told]
     assert told[0].theta == pytest.approx(0.1, abs=0.01)

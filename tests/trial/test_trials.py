@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.hardware.trial.conftest import settings_of
-from wristctl.hardware.trial.trials import push_seen, recovery, trials_of
+from tests.trial.conftest import settings_of
+from wristctl.trial.trials import push_seen, recovery, trials_of
 
 TIME = np.arange(0.0, 5.0, 5e-3)
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.scene import Scene
+from wristctl.vision.camera import Frame
+from wristctl.vision.scene import Scene
 
 FRAME_RATE = 60.0
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from wristctl.config.vision import Device
-from wristctl.hardware.vision.camera import (
+from wristctl.vision.camera import (
     CameraError,
     DeviceCamera,
     FolderCamera,

@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from tests.hardware.vision.conftest import bent
+from tests.vision.conftest import bent
 from wristctl.config.errors import UserError
-from wristctl.config.vision import Board, CalibrateCameraSettings, Gates, Markers, SceneSettings
+from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard, Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.board_shots import board_shots
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.charuco import Album, BoardFinder, Calibration, calibrate, least_seen, plane_tilt
-from wristctl.hardware.vision.marker import Tracker, Verdict
-from wristctl.hardware.vision.pinhole import Pinhole
-from wristctl.hardware.vision.scene import Scene
-from wristctl.hardware.vision.view import FILE, View
+from wristctl.vision.board_shots import board_shots
+from wristctl.vision.camera import Frame
+from wristctl.vision.charuco import Album, BoardFinder, CameraCalibration, calibrate, least_seen, plane_tilt
+from wristctl.vision.marker import SightingVerdict, Tracker
+from wristctl.vision.pinhole import Pinhole
+from wristctl.vision.scene import Scene
+from wristctl.vision.view import FILE, View
 
 SCENE = SceneSettings(tilt_deg=10.0, pan_deg=-4.0)
 SETTINGS = CalibrateCameraSettings(scene=SCENE, views=10)
@@ -26,23 +26,23 @@ SIZE = SCENE.width, SCENE.height
 
 @pytest.fixture(scope="module")
 def shots() -> list[Frame]:
-    return list(board_shots(SCENE, Board(), SETTINGS.views, np.random.default_rng(0)))
+    return list(board_shots(SCENE, CharucoBoard(), SETTINGS.views, np.random.default_rng(0)))
 
 
 @pytest.fixture(scope="module")
 def album(shots: list[Frame]) -> Album:
-    made = Album(Board())
+    made = Album(CharucoBoard())
     for frame in shots:
         made.look(frame, str(frame.number))
     return made
 
 
 @pytest.fixture(scope="module")
-def found(album: Album) -> Calibration:
+def found(album: Album) -> CameraCalibration:
     return calibrate(album.views, album.last, SIZE, SETTINGS)
 
 
-def test_lens_is_found_within_four_standard_deviations(found: Calibration) -> None:
+def test_lens_is_found_within_four_standard_deviations(found: CameraCalibration) -> None:
     true = Pinhole(SCENE, "right")
     values = [*found.view.camera_matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *found.view.distortion]
     expected = np.array([*true.matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *true.distortion])
@@ -50,24 +50,24 @@ def test_lens_is_found_within_four_standard_deviations(found: Calibration) -> No
     assert found.deviation[0] < 2.0 and found.error < 0.2
 
 
-def test_tilt_of_the_bending_plane_is_found(found: Calibration) -> None:
+def test_tilt_of_the_bending_plane_is_found(found: CameraCalibration) -> None:
     true = math.acos(math.cos(math.radians(10.0)) * math.cos(math.radians(4.0)))
     assert plane_tilt(found.view) == pytest.approx(true, abs=math.radians(0.3))
     assert plane_tilt(Scene(SCENE, WristParameters()).view) == pytest.approx(true, abs=1e-9)
     assert found.plane_error < 3e-4
 
 
-def test_a_calibrated_camera_corrects_its_tilt_to_a_seventh_of_a_degree(found: Calibration) -> None:
+def test_a_calibrated_camera_corrects_its_tilt_to_a_seventh_of_a_degree(found: CameraCalibration) -> None:
     scene = Scene(SCENE, WristParameters())
     tracker, rng, off = Tracker(Markers(), found.view, Gates()), np.random.default_rng(0), []
     for number, degrees in enumerate(np.linspace(-45.0, 45.0, 30)):
         seen = tracker.see(Frame(scene.render(bent(degrees), rng), number / 60.0, number))
-        assert seen.verdict is Verdict.OK
+        assert seen.verdict is SightingVerdict.OK
         off.append(math.degrees(seen.theta) - degrees)
     assert np.sqrt(np.mean(np.square(off))) <= 0.15
 
 
-def test_a_saved_view_reads_back_exactly(found: Calibration, tmp_path: object) -> None:
+def test_a_saved_view_reads_back_exactly(found: CameraCalibration, tmp_path: object) -> None:
     file = tmp_path / FILE.split("/")[-1]  # type: ignore[operator]
     found.view.save(file, note="more")
     again = View.load(file)
@@ -78,7 +78,7 @@ def test_a_saved_view_reads_back_exactly(found: Calibration, tmp_path: object) -
         View.load(file)
 
 
-def test_residuals_are_what_the_error_is_made_of(found: Calibration, album: Album) -> None:
+def test_residuals_are_what_the_error_is_made_of(found: CameraCalibration, album: Album) -> None:
     squares = np.concatenate(found.residuals)
     assert np.sqrt((squares**2).sum(axis=1).mean()) == pytest.approx(found.error, rel=1e-4)
     assert [len(each) for each in found.residuals] == [len(view.corners) for view in album.views]
@@ -110,7 +110,7 @@ def test_a_large_reprojection_error_is_refused_and_the_worst_view_named(album: A
 
 
 def test_only_new_views_are_kept_and_only_so_many(shots: list[Frame]) -> None:
-    kept = Album(Board(), most=2)
+    kept = Album(CharucoBoard(), most=2)
     assert [kept.look(shots[k], str(k)) for k in (0, 0, 1, 2)] == [True, False, True, False]
     assert kept.last is not None and kept.last.name == "2"
 
@@ -121,7 +121,7 @@ def test_pictures_of_different_size_are_refused(album: Album) -> None:
 
 
 def test_no_board_is_seen_in_a_picture_of_the_wrist(scene: Scene) -> None:
-    assert BoardFinder(Board()).find(scene.render(bent(0.0), np.random.default_rng(0)), "wrist") is None
+    assert BoardFinder(CharucoBoard()).find(scene.render(bent(0.0), np.random.default_rng(0)), "wrist") is None
 
 
 def test_the_least_seen_part_is_named() -> None:

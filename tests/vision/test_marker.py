@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.hardware.vision.conftest import FRAME_RATE, Array, bent, frames
+from tests.vision.conftest import FRAME_RATE, Array, bent, frames
 from wristctl.config.errors import UserError
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.camera import Frame, Image
-from wristctl.hardware.vision.detector import askew, square_angle
-from wristctl.hardware.vision.marker import MEANING, Sighting, Tracker, Verdict
-from wristctl.hardware.vision.scene import Scene
-from wristctl.hardware.vision.view import View
+from wristctl.vision.camera import Frame, Image
+from wristctl.vision.detector import askew, square_angle
+from wristctl.vision.marker import MEANING, Sighting, SightingVerdict, Tracker
+from wristctl.vision.scene import Scene
+from wristctl.vision.view import View
 
 COUNT = 200 if os.environ.get("WRISTCTL_THOROUGH") else 30
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -28,7 +28,7 @@ def errors(scene: Scene, view: View, degrees: Array) -> Array:
     """Errors [deg] of one frame after the other, all of which must be usable."""
     tracker = Tracker(Markers(), view, Gates())
     seen = [tracker.see(frame) for frame in frames(scene, degrees)]
-    assert {each.verdict for each in seen} == {Verdict.OK}
+    assert {each.verdict for each in seen} == {SightingVerdict.OK}
     return np.degrees([each.theta for each in seen]) - degrees
 
 
@@ -116,12 +116,12 @@ def without(image: Image, corners: Array) -> Image:
 
 
 def test_a_covered_tip_is_said_and_found_again(story: Story) -> None:
-    assert story.see(story.picture()).verdict is Verdict.OK
+    assert story.see(story.picture()).verdict is SightingVerdict.OK
     covered = story.see(story.picture(covered=True))
-    assert covered.verdict is Verdict.NO_TIP and np.isnan(covered.theta)
+    assert covered.verdict is SightingVerdict.NO_TIP and np.isnan(covered.theta)
     assert np.isfinite(covered.corners[0]).all() and np.isnan(covered.corners[1]).all()
     again = story.see(story.picture(), wait=0.3)
-    assert again.verdict is Verdict.OK and np.degrees(again.theta) == pytest.approx(10.0, abs=0.5)
+    assert again.verdict is SightingVerdict.OK and np.degrees(again.theta) == pytest.approx(10.0, abs=0.5)
 
 
 def test_a_clamped_base_is_believed_for_a_while_and_then_no_more(story: Story) -> None:
@@ -129,65 +129,63 @@ def test_a_clamped_base_is_believed_for_a_while_and_then_no_more(story: Story) -
     base = story.see(image).corners[0]
     hidden = without(image, base)
     shortly = story.see(hidden, wait=0.4)
-    assert shortly.verdict is Verdict.OK and np.isnan(shortly.corners[0]).all()
-    assert story.see(hidden, wait=0.2).verdict is Verdict.NO_BASE
+    assert shortly.verdict is SightingVerdict.OK and np.isnan(shortly.corners[0]).all()
+    assert story.see(hidden, wait=0.2).verdict is SightingVerdict.NO_BASE
 
 
 def test_without_a_base_from_the_start_there_is_no_angle(story: Story, scene: Scene) -> None:
     image = story.picture()
     base = Story(scene).see(image).corners[0]
-    assert story.see(without(image, base)).verdict is Verdict.NO_BASE
+    assert story.see(without(image, base)).verdict is SightingVerdict.NO_BASE
 
 
 @pytest.mark.parametrize("seen_before", [True, False])
 def test_swapped_markers_are_told_from_moved_ones(story: Story, seen_before: bool) -> None:
     if seen_before:
-        assert story.see(story.picture()).verdict is Verdict.OK
-    assert story.see(story.picture(swapped=True)).verdict is Verdict.SWAPPED
-    assert story.see(story.picture(swapped=True), wait=1.0).verdict is Verdict.SWAPPED
-    assert story.see(story.picture(), wait=1.0).verdict is Verdict.OK
+        assert story.see(story.picture()).verdict is SightingVerdict.OK
+    assert story.see(story.picture(swapped=True)).verdict is SightingVerdict.SWAPPED
+    assert story.see(story.picture(swapped=True), wait=1.0).verdict is SightingVerdict.SWAPPED
+    assert story.see(story.picture(), wait=1.0).verdict is SightingVerdict.OK
 
 
 def test_a_tips_marker_where_the_base_was_is_refused_though_no_base_is_seen(story: Story) -> None:
     tip = story.see(story.picture()).corners[1]
-    assert story.see(without(story.picture(swapped=True), tip)).verdict is Verdict.SWAPPED
+    assert story.see(without(story.picture(swapped=True), tip)).verdict is SightingVerdict.SWAPPED
 
 
 def test_a_knocked_camera_is_said_and_then_learnt(story: Story) -> None:
     image = story.picture()
     story.see(image)
     knocked = np.roll(image, 12, axis=1)
-    assert story.see(knocked).verdict is Verdict.BASE_MOVED
-    assert story.see(knocked, wait=0.6).verdict is Verdict.OK
+    assert story.see(knocked).verdict is SightingVerdict.BASE_MOVED
+    assert story.see(knocked, wait=0.6).verdict is SightingVerdict.OK
 
 
 def test_a_marker_seen_twice_is_refused(story: Story) -> None:
     image = story.picture()
-    (left, top), (right, bottom) = (
-        edge(story.see(image).corners[1], axis=0).astype(int) for edge in (np.min, np.max)
-    )
+    (left, top), (right, bottom) = (edge(story.see(image).corners[1], axis=0).astype(int) for edge in (np.min, np.max))
     pad = 8
     patch = image[top - pad : bottom + pad, left - pad : right + pad]
     image[20 : 20 + patch.shape[0], 20 : 20 + patch.shape[1]] = patch
-    assert Tracker(Markers(), View(), Gates()).see(Frame(image, 0.0, 0)).verdict is Verdict.TWICE
+    assert Tracker(Markers(), View(), Gates()).see(Frame(image, 0.0, 0)).verdict is SightingVerdict.TWICE
 
 
 def test_a_marker_that_is_no_square_is_refused(story: Story) -> None:
     image = story.picture(0.0)
     squeezed = cv2.resize(image, None, fx=1.0, fy=0.8, interpolation=cv2.INTER_AREA)
-    assert story.see(np.asarray(squeezed, np.uint8)).verdict is Verdict.SHAPE
+    assert story.see(np.asarray(squeezed, np.uint8)).verdict is SightingVerdict.SHAPE
 
 
 def test_a_jump_is_refused_until_there_was_time_for_it(story: Story) -> None:
-    assert story.see(story.picture(0.0)).verdict is Verdict.OK
-    assert story.see(story.picture(30.0)).verdict is Verdict.JUMP  # 30 deg in a 60th of a second
+    assert story.see(story.picture(0.0)).verdict is SightingVerdict.OK
+    assert story.see(story.picture(30.0)).verdict is SightingVerdict.JUMP  # 30 deg in a 60th of a second
     late = story.see(story.picture(30.0))
-    assert late.verdict is Verdict.OK and np.degrees(late.theta) == pytest.approx(30.0, abs=0.5)
+    assert late.verdict is SightingVerdict.OK and np.degrees(late.theta) == pytest.approx(30.0, abs=0.5)
 
 
 def test_a_tip_that_leaves_its_surroundings_is_found_in_the_whole_picture(story: Story) -> None:
-    assert story.see(story.picture(-40.0)).verdict is Verdict.OK
-    assert story.see(story.picture(40.0), wait=0.2).verdict is Verdict.OK
+    assert story.see(story.picture(-40.0)).verdict is SightingVerdict.OK
+    assert story.see(story.picture(40.0), wait=0.2).verdict is SightingVerdict.OK
 
 
 def test_pictures_of_another_size_than_calibrated_are_an_error() -> None:
@@ -197,7 +195,7 @@ def test_pictures_of_another_size_than_calibrated_are_an_error() -> None:
 
 
 def test_every_verdict_is_explained() -> None:
-    assert set(MEANING) == set(Verdict)
+    assert set(MEANING) == set(SightingVerdict)
 
 
 # --- the angle of a square -------------------------------------------------------------------------------------------

@@ -7,13 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from tests.hardware.vision.conftest import Array, frames
+from tests.vision.conftest import Array, frames
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.detector import square_angle
-from wristctl.hardware.vision.marker import Tracker
-from wristctl.hardware.vision.outline import outlined
-from wristctl.hardware.vision.scene import Scene
+from wristctl.vision.detector import square_angle
+from wristctl.vision.marker import Tracker
+from wristctl.vision.outline import outlined
+from wristctl.vision.scene import Scene
 
 SIZE, CELLS = 80, 6
 

@@ -12,10 +12,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from wristctl.config.errors import UserError
-from wristctl.config.vision import Board, Markers
-from wristctl.hardware.vision.charuco import BoardFinder
-from wristctl.hardware.vision.detector import Detector
+from wristctl.config.vision import CharucoBoard, Markers
 from wristctl.report.print_sheet import PAPERS, board_page, marker_page, write_sheets
+from wristctl.vision.charuco import BoardFinder
+from wristctl.vision.detector import Detector
 
 POINT = 25.4 / 72.0
 DPI = 200
@@ -31,12 +31,12 @@ def scanned(page: object) -> np.ndarray:
 @pytest.fixture(scope="module")
 def sheets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("sheets") / "a4.pdf"
-    write_sheets(file, "a4", Board(), Markers())
+    write_sheets(file, "a4", CharucoBoard(), Markers())
     return file
 
 
 def test_the_pdf_has_two_pages_of_the_papers_size(sheets: Path, tmp_path: Path) -> None:
-    write_sheets(tmp_path / "letter.pdf", "letter", Board(), Markers())
+    write_sheets(tmp_path / "letter.pdf", "letter", CharucoBoard(), Markers())
     for file in (sheets, tmp_path / "letter.pdf"):
         boxes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", file.read_bytes())
         assert len(boxes) == 2
@@ -61,7 +61,7 @@ def test_squares_ruler_and_markers_in_the_pdf_measure_what_they_should(sheets: P
 
 @pytest.mark.parametrize("paper", PAPERS)
 def test_a_scan_of_the_board_is_a_board_of_that_size(paper: str) -> None:
-    board = Board(square=0.0245, marker=0.017)
+    board = CharucoBoard(square=0.0245, marker=0.017)
     seen = BoardFinder(board).find(scanned(board_page(paper, board)), "scan")  # type: ignore[arg-type]
     assert seen is not None and len(seen.corners) == (board.columns - 1) * (board.rows - 1)
     assert (seen.corners - seen.corners[0]) * 25.4e-3 / DPI == pytest.approx(seen.places - seen.places[0], abs=1e-4)
@@ -84,4 +84,4 @@ def test_a_scan_of_the_markers_finds_both_at_their_size_with_a_white_rim() -> No
 
 def test_a_board_larger_than_the_paper_is_refused() -> None:
     with pytest.raises(UserError, match="does not fit on letter"):
-        board_page("letter", Board(square=0.03, marker=0.02))
+        board_page("letter", CharucoBoard(square=0.03, marker=0.02))

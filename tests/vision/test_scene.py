@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hardware.vision.conftest import bent
+from tests.vision.conftest import bent
 from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.scene import Scene
-from wristctl.hardware.vision.scene_parts import FACE, THICK
+from wristctl.vision.scene import Scene
+from wristctl.vision.scene_parts import FACE, THICK
 from wristctl.wrist.shape import discs
 
 WRIST = WristParameters()

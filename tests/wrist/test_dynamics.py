@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist import augmented
-from wristctl.wrist.model import integrate, linearised, terms
+from wristctl.wrist.compiled_model import integrate, linearised, terms
 from wristctl.wrist.segments import Segments, segments
 
 WRIST = WristParameters()

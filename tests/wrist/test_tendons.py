@@ -12,7 +12,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach, torque_of
-from wristctl.wrist.model import integrate, terms
+from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.statics import equilibrium, least_stiffness
 

@@ -8,15 +8,15 @@ import os
 import time
 from pathlib import Path
 
-from wristctl.hardware.bench.line import FaultyLine
-from wristctl.hardware.bench.spools import PERIOD
-from wristctl.hardware.bench.wrist import BenchWrist
+from wristctl.bench.bench_wrist import BenchWrist
+from wristctl.bench.line import FaultyLine
+from wristctl.bench.motors import PERIOD
 
 SCHEMA = "wristctl.bench/1"
 _LEAST_INTERVAL = 0.05
 
 
-class Record:
+class BenchRecord:
     """A JSON file, written anew when motors have moved or been switched, at most 20 times a second.
 
     Times are of `time.monotonic`; lists are by axis.

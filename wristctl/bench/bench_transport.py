@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.emulator.atmega2560 import Atmega2560
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.emulator.virtual import VirtualTransport
-from wristctl.hardware.errors import PortLost
+from wristctl.bench.fault_injection import Faults
+from wristctl.board.board_errors import PortLost
+from wristctl.board.emulator.atmega2560 import Atmega2560
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.emulator.virtual import VirtualTransport
 
 _USB_FRAME = FREQUENCY // 1000
 """Cycles between two times at which a board's USB chip hands over what has come."""

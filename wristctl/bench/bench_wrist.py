@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.bench.motors import CYCLES, PERIOD, follow, motor_of, spool_state_of
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.spools import CYCLES, PERIOD, follow, motor_of, spools_of
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.messages import AXES
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.disturbances import course
 from wristctl.simulation.plant import plant_of
@@ -41,7 +41,7 @@ class Truth(NamedTuple):
     straight wrist"""
 
 
-class Motion(NamedTuple):
+class MotorMotion(NamedTuple):
     """What the board made of its motors, axis by axis."""
 
     steps: tuple[int, ...]
@@ -59,7 +59,7 @@ class BenchWrist:
         assert drive is not None
         self._settings, self._wrist, self._n = settings, wrist, settings.segments
         self._tendon = drive._replace(stiffness=settings.actuator.tendon_stiffness)
-        self._motor, self._spools = motor_of(settings), spools_of(settings)
+        self._motor, self._spools = motor_of(settings), spool_state_of(settings)
         self._state = np.zeros(2 * self._n)
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
@@ -73,11 +73,11 @@ class BenchWrist:
         return self._periods * PERIOD
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> MotorMotion:
         """What the board made of its motors up to `time`."""
         spools = self._spools
         last = tuple(None if cycle < 0 else float(cycle) / FREQUENCY for cycle in spools.stepped)
-        return Motion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
+        return MotorMotion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
 
     def face(self, direction: str) -> None:
         """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.vision.camera import Frame, Image
+from wristctl.vision.camera import Frame, Image
 
 Array = NDArray[np.float64]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from wristctl.config.bench import Fault, FaultKind
+from wristctl.config.bench import FaultKind, InjectedFault
 
 
 class Faults:
     """Which faults are on at a time of the board's clock [s]; none before a trial begins."""
 
-    def __init__(self, faults: Sequence[Fault]) -> None:
+    def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = tuple(faults)
         self._start = math.inf
 
@@ -33,5 +33,5 @@ class Faults:
         begins = (self._start + fault.at for fault in self._faults if fault.kind == kind)
         return min((time for time in begins if time > after), default=math.inf)
 
-    def _is_on(self, fault: Fault, time: float) -> bool:
+    def _is_on(self, fault: InjectedFault, time: float) -> bool:
         return 0.0 <= time - self._start - fault.at < (fault.duration or math.inf)

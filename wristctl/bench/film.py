@@ -11,11 +11,11 @@ from pathlib import Path
 
 import cv2
 
+from wristctl.bench.exposure import Exposure, picture
+from wristctl.bench.frame_memory import FrameMemory
 from wristctl.config.bench import RenderedCamera
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.exposure import Exposure, picture
-from wristctl.hardware.bench.frame_memory import FrameMemory
 
 
 def start_film(
@@ -40,7 +40,7 @@ def _develop(
 ) -> None:
     """Draw each exposure and show it when it arrives; late, leave pictures out. Ctrl-C is others' affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from wristctl.hardware.vision.scene import Scene
+    from wristctl.vision.scene import Scene
 
     cv2.setNumThreads(1)
     painter, memory = Scene(settings.scene, wrist, markers), FrameMemory(pictures)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wristctl.hardware.vision.camera import Frame
+from wristctl.vision.camera import Frame
 
 _HEAD = np.dtype([*((name, np.int64) for name in ("writes", "number", "height", "width")), ("time", np.float64)])
 

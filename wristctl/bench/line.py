@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.emulator.serve import Line
+from wristctl.bench.fault_injection import Faults
+from wristctl.board.emulator.serve import Line
 
 
 class FaultyLine:

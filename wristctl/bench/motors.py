@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.messages import AXES
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
@@ -53,7 +53,7 @@ def motor_of(settings: BenchSettings) -> Motor:
     )
 
 
-class Spools(NamedTuple):
+class SpoolState(NamedTuple):
     """State of the four axes, (4,); `latch` holds port A as last heard of.
 
     `reeled` [m] counts from where the tendon of the straight wrist is taut without pulling.
@@ -70,11 +70,11 @@ class Spools(NamedTuple):
     pull: Any
 
 
-def spools_of(settings: BenchSettings) -> Spools:
+def spool_state_of(settings: BenchSettings) -> SpoolState:
     """The axes at power-on: released, each tendon with its slack."""
     slack = np.array(settings.motors.slack)
     none = np.zeros(AXES, np.int64)
-    return Spools(
+    return SpoolState(
         counted=none.copy(),
         slipped=none.copy(),
         energised=none.copy(),

@@ -13,17 +13,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.film import start_film
+from wristctl.bench.frame_memory import SharedCamera
+from wristctl.board.board_errors import BoardError
+from wristctl.board.messages import BAUD
+from wristctl.board.transport import SerialTransport
 from wristctl.config.bench import BenchSettings
 from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.film import start_film
-from wristctl.hardware.bench.frame_memory import SharedCamera
-from wristctl.hardware.bench.wrist import Motion, Truth
-from wristctl.hardware.errors import BoardError
-from wristctl.hardware.messages import BAUD
-from wristctl.hardware.transport import SerialTransport
 
 _END = 5.0
 
@@ -61,9 +61,9 @@ class RealTimeBench:
         truth: Truth = self._ask("truth", since)
         return truth
 
-    def motion(self) -> Motion:
+    def motion(self) -> MotorMotion:
         """As `Bench.motion`."""
-        motion: Motion = self._ask("motion")
+        motion: MotorMotion = self._ask("motion")
         return motion
 
     def close(self) -> None:
@@ -122,9 +122,9 @@ def _serve(
 ) -> None:
     """The bench's process: Ctrl-C is the client's affair. It takes the camera's folder with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from wristctl.hardware.bench.rig import Rig
-    from wristctl.hardware.bench.server import BenchServer
-    from wristctl.hardware.emulator.serve import PtyLine
+    from wristctl.bench.rig import Rig
+    from wristctl.bench.server import BenchServer
+    from wristctl.board.emulator.serve import PtyLine
 
     try:
         line = PtyLine()

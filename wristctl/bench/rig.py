@@ -7,15 +7,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.bench.bench_wrist import BenchWrist
+from wristctl.bench.fault_injection import Faults
+from wristctl.bench.shutter import Shutter
+from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.bench.shutter import Shutter
-from wristctl.hardware.bench.wrist import BenchWrist
-from wristctl.hardware.emulator.atmega2560 import Atmega2560
-from wristctl.hardware.vision.scene import Scene
+from wristctl.vision.scene import Scene
 
 
 class Rig:

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.bench.bench_record import BenchRecord
+from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.line import FaultyLine
+from wristctl.bench.motors import PERIOD
+from wristctl.bench.rig import Rig
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.emulator.serve import Line, serve
 from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
-from wristctl.hardware.bench.line import FaultyLine
-from wristctl.hardware.bench.record import Record
-from wristctl.hardware.bench.rig import Rig
-from wristctl.hardware.bench.spools import PERIOD
-from wristctl.hardware.bench.wrist import Motion, Truth
-from wristctl.hardware.emulator.chip import FREQUENCY
-from wristctl.hardware.emulator.serve import Line, serve
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +41,7 @@ class BenchServer:
     ) -> None:
         self._rig, self._film, self._control = rig, film, control
         self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY)
-        self._record = None if record is None else Record(record, rig.wrist, self._line)
+        self._record = None if record is None else BenchRecord(record, rig.wrist, self._line)
         self._start, self._until = time.monotonic(), math.inf
         self._taken, self._reset = -1, -math.inf
         self._energised = False
@@ -76,7 +76,7 @@ class BenchServer:
         truth = self._rig.wrist.truth(since - self._start)
         return truth._replace(time=truth.time + self._start)
 
-    def motion(self) -> Motion:
+    def motion(self) -> MotorMotion:
         """As `Bench.motion`."""
         motion = self._rig.wrist.motion
         return motion._replace(last_step=tuple(at if at is None else at + self._start for at in motion.last_step))

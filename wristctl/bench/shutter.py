@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from wristctl.bench.bench_wrist import BenchWrist
+from wristctl.bench.exposure import Exposure, stream
+from wristctl.bench.fault_injection import Faults
 from wristctl.config.bench import RenderedCamera
-from wristctl.hardware.bench.exposure import Exposure, stream
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.bench.wrist import BenchWrist
 
 _SMEAR, _MOST_INSTANTS, _WITHIN = np.deg2rad(0.25), 8, 8
 """Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from wristctl.bench.bench_transport import BenchTransport
+from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.rig import Rig
+from wristctl.bench.virtual_camera import VirtualCamera
 from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.rig import Rig
-from wristctl.hardware.bench.transport import BenchTransport
-from wristctl.hardware.bench.virtual_camera import VirtualCamera
-from wristctl.hardware.bench.wrist import Motion, Truth
 
 
-class Bench:
+class VirtualBench:
     """A wrist pulled by the step pulses of an emulated board, and a camera that sees it.
 
     Time passes while `transport` is waited on, and is of its clock.
@@ -38,7 +38,7 @@ class Bench:
         self._rig.catch_up()
         return self._rig.wrist.truth(since)
 
-    def motion(self) -> Motion:
+    def motion(self) -> MotorMotion:
         """What the board has made of its motors so far."""
         self._rig.catch_up()
         return self._rig.wrist.motion

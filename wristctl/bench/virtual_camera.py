@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.bench.exposure import picture
-from wristctl.hardware.bench.rig import Rig
-from wristctl.hardware.vision.camera import Frame
+from wristctl.bench.exposure import picture
+from wristctl.bench.rig import Rig
+from wristctl.vision.camera import Frame
 
 
 class VirtualCamera:

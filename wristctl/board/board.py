@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from wristctl.hardware.errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.hardware.framing import Decoder, encode
-from wristctl.hardware.messages import (
+from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
+from wristctl.board.framing import Decoder, encode
+from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
     COMMAND_OF,
@@ -34,7 +34,7 @@ from wristctl.hardware.messages import (
     State,
     Status,
 )
-from wristctl.hardware.transport import Transport
+from wristctl.board.transport import Transport
 
 Axes = tuple[float, float, float, float]
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import errno
 
-from wristctl.config.errors import UserError
-from wristctl.hardware.messages import (
+from wristctl.board.messages import (
     FAULT_FIX,
     FAULT_MEANING,
     RESULT_FIX,
@@ -14,6 +13,7 @@ from wristctl.hardware.messages import (
     Fault,
     Result,
 )
+from wristctl.config.errors import UserError
 
 HARDWARE, SAFETY_STOP = 4, 5
 """Exit codes."""

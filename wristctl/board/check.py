@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wristctl.hardware.board import Board
-from wristctl.hardware.messages import Command, Status
+from wristctl.board.board import Board
+from wristctl.board.messages import Command, Status
 
 WIRING_STEPS = 160
 """A twentieth of a turn at 1/16 step."""

@@ -2,8 +2,8 @@
 
 Standard library only, so that the firmware builds with nothing but Python and avr-gcc installed:
 
-    python3 wristctl/hardware/dictionary.py c > messages.h
-    python3 wristctl/hardware/dictionary.py python > wristctl/hardware/messages.py
+    python3 wristctl/board/dictionary.py c > messages.h
+    python3 wristctl/board/dictionary.py python > wristctl/board/messages.py
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ _KINDS = {
 }
 MARK = "Made from messages.toml by dictionary.py: change that file, not this one."
 
-Table = dict[str, Any]
+MessageTable = dict[str, Any]
 
 
-def load(path: Path = TABLE) -> Table:
+def load(path: Path = TABLE) -> MessageTable:
     """Return the message table as plain dictionaries, in the file's order."""
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
-def dictionary_hash(table: Table) -> int:
+def dictionary_hash(table: MessageTable) -> int:
     """Return 32 bits that change with all that two sides must agree on: names, codes, types, ranges; not the prose."""
 
     def bare(node: Any) -> Any:
@@ -50,7 +50,7 @@ def dictionary_hash(table: Table) -> int:
     return int.from_bytes(digest[:4], "little")
 
 
-def c_header(table: Table) -> str:
+def c_header(table: MessageTable) -> str:
     """Return messages.h: constants, codes, what each command needs, packed structures, range checks."""
     protocol, commands = table["protocol"], table["commands"]
     lines = [f"/* {MARK} */", "#ifndef MESSAGES_H", "#define MESSAGES_H"]
@@ -88,13 +88,13 @@ def c_header(table: Table) -> str:
     return "\n".join([*lines, "  }", "  return true;", "}", "", "#endif", ""])
 
 
-def _estop_frame(table: Table) -> bytes:
+def _estop_frame(table: MessageTable) -> bytes:
     body = bytes([table["commands"]["ESTOP"]["code"], table["constants"]["ESTOP_SEQ"]["value"]])
     body += binascii.crc_hqx(body, 0xFFFF).to_bytes(2, "big")
     return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")) + b"\0"
 
 
-def _number(entry: Table) -> int:
+def _number(entry: MessageTable) -> int:
     return int(entry["code"]) if "code" in entry else 1 << int(entry["bit"])
 
 
@@ -102,14 +102,14 @@ def _c_number(value: int) -> str:
     return f"{value}L" if value < 2**31 else f"{value}UL"
 
 
-def _c_struct(tag: str, entry: Table) -> list[str]:
+def _c_struct(tag: str, entry: MessageTable) -> list[str]:
     lines = [f"struct {tag} {{ /* {entry['meaning']} */"]
     for name, (kind, count, *_) in entry["fields"].items():
         lines += [f"  {C_TYPE[kind]} {name}{f'[{count}]' if count > 1 else ''};"]
     return [*lines, "} __attribute__((packed));"]
 
 
-def _c_checks(entry: Table) -> list[str]:
+def _c_checks(entry: MessageTable) -> list[str]:
     lines = []
     for name, (kind, count, scale, _unit, lowest, highest) in entry["fields"].items():
         least, past = WIRE_RANGE[kind]
@@ -123,12 +123,12 @@ def _c_checks(entry: Table) -> list[str]:
     return lines
 
 
-def python_module(table: Table) -> str:
+def python_module(table: MessageTable) -> str:
     """Return messages.py: constants, codes with their meanings, and one named tuple per message with its layout."""
     protocol, commands = table["protocol"], table["commands"]
     out = [f'"""What host and board say to each other. {MARK}"""', "", "from __future__ import annotations", ""]
     out += ["from enum import IntEnum, IntFlag", "from typing import NamedTuple", ""]
-    out += ["from wristctl.hardware.layout import Field, Layout", ""]
+    out += ["from wristctl.board.layout import Field, Layout", ""]
     out += [f"PROTOCOL_VERSION = {protocol['version']}", f"FIRMWARE_VERSION = {tuple(protocol['firmware'])}"]
     out += [f"DICTIONARY_HASH = {dictionary_hash(table):#010X}".replace("0X", "0x"), f"BAUD = {protocol['baud']}"]
     for name, entry in table["constants"].items():
@@ -161,7 +161,7 @@ def _enumeration(unit: str) -> str | None:
     return unit if unit in CODES | BITS else None
 
 
-def _named_tuple(name: str, entry: Table, defaults: Table) -> list[str]:
+def _named_tuple(name: str, entry: MessageTable, defaults: MessageTable) -> list[str]:
     out = ["", "", f"class {name}(NamedTuple):", f'    """{entry["meaning"][0].upper()}{entry["meaning"][1:]}."""', ""]
     for field, (_kind, count, scale, unit, *span) in entry["fields"].items():
         scalar = _enumeration(unit) or ("float" if scale > 1 else "int")

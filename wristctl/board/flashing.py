@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from wristctl.hardware.errors import BoardError
+from wristctl.board.board_errors import BoardError
 
 IMAGE = Path(__file__).with_name("firmware") / "wrist.hex"
 _BOOT_LOADER_BAUD = 115_200

@@ -13,7 +13,7 @@ LONGEST = 254
 """Bytes that code, sequence, payload and CRC may have together."""
 
 
-class Frame(NamedTuple):
+class WireFrame(NamedTuple):
     """One message."""
 
     code: int
@@ -65,13 +65,13 @@ class Decoder:
         self.bad_frames = self.bad_crc = 0
         self._part = bytearray()
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[WireFrame]:
         """The frames that these bytes complete."""
         *whole, rest = (bytes(self._part) + data).split(b"\0")
         self._part[:] = rest[-2 * LONGEST :]
         return [frame for each in whole if each and (frame := self._frame(each))]
 
-    def _frame(self, stuffed: bytes) -> Frame | None:
+    def _frame(self, stuffed: bytes) -> WireFrame | None:
         try:
             body = unstuff(stuffed)
         except ValueError:
@@ -82,4 +82,4 @@ class Decoder:
         if crc(body[:-2]) != int.from_bytes(body[-2:], "big"):
             self.bad_crc += 1
             return None
-        return Frame(body[0], body[1], body[2:-2])
+        return WireFrame(body[0], body[1], body[2:-2])

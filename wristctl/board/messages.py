@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
-from wristctl.hardware.layout import Field, Layout
+from wristctl.board.layout import Field, Layout
 
 PROTOCOL_VERSION = 1
 FIRMWARE_VERSION = (1, 0, 0)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import serial
 from serial.tools import list_ports
 
-from wristctl.hardware.errors import BoardError, PortLost, PortUnusable
+from wristctl.board.board_errors import BoardError, PortLost, PortUnusable
 
 BOOT_TIME = 2.0
 """Seconds that a Mega's boot loader waits for a program after a reset, and some more."""
@@ -129,7 +129,7 @@ def open_transport(port: str | None, baud: int, exclusive: bool = True) -> Trans
     Raises PortUnusable, and BoardError where None finds no board or several.
     """
     if port == EMULATED:
-        from wristctl.hardware.emulator.virtual import VirtualTransport
+        from wristctl.board.emulator.virtual import VirtualTransport
 
         return VirtualTransport()
     return SerialTransport(port or only_board(), baud, exclusive)

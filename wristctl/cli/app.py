@@ -11,7 +11,7 @@ import typer
 from typer.main import get_command
 
 from wristctl import __version__
-from wristctl.cli.on_call import on_call
+from wristctl.cli.lazy_commands import lazy_group
 from wristctl.config.errors import UserError
 from wristctl.interrupt import interrupts
 
@@ -51,7 +51,7 @@ wristctl runs show latest:compare
 """
 
 
-app = typer.Typer(cls=on_call(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
+app = typer.Typer(cls=lazy_group(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
 
 
 @app.callback(invoke_without_command=True)

@@ -8,18 +8,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
-    from wristctl.benchmark.audit import Judgement
+    from wristctl.comparison.ledger import Judgement
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """What will be run; no claims, or a train run that cannot show them, are errors here."""
-    from wristctl.benchmark.audit import TRAININGS, check_trainings
+    from wristctl.comparison.ledger import TRAININGS, check_trainings
     from wristctl.config.loop import LOOPS
 
     claims = study.audit.claims
@@ -33,11 +33,11 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
 def audit(session: Session) -> list[Table]:
     """Judge every claim of the paper by rollouts, its own words, or what is still open."""
-    from wristctl.benchmark.audit import evidence_study, judge, ledger_frame
     from wristctl.cli.compare import compare
+    from wristctl.comparison.ledger import evidence_study, judge, ledger_frame
     from wristctl.config.loop import LOOPS
     from wristctl.control.table import CONTROLLERS
-    from wristctl.runs import open_run, start_run
+    from wristctl.records import open_run, start_run
 
     run, claims = session.run, session.settings.claims
     known = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
@@ -88,7 +88,7 @@ def _number(value: float | None) -> str:
 
 
 def _ours(low: float, high: float) -> str:
-    from wristctl.benchmark.audit import interval
+    from wristctl.comparison.ledger import interval
 
     return "" if low != low else interval(low, high)
 
@@ -97,7 +97,7 @@ app = study_command(
     "audit",
     work=audit,
     plan=plan,
-    inputs=(Input("table1", kind="train", optional=True), Input("selection", kind="train", optional=True)),
+    inputs=(EarlierRun("table1", kind="train", optional=True), EarlierRun("selection", kind="train", optional=True)),
     examples=(
         "wristctl audit experiments/claims.yaml",
         "wristctl audit experiments/claims.yaml --table1 RUN --selection RUN",

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 from wristctl.cli.command import Session, Table, study_command
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.hardware.vision.camera import DeviceCamera, Frame
-    from wristctl.hardware.vision.charuco import Album, Calibration
+    from wristctl.vision.camera import DeviceCamera, Frame
+    from wristctl.vision.charuco import Album, CameraCalibration
 
 log = logging.getLogger(__name__)
 
@@ -51,9 +51,9 @@ def calibrate_camera(session: Session) -> list[Table]:
     import cv2
     import numpy as np
 
-    from wristctl.hardware.vision.charuco import calibrate, plane_tilt
-    from wristctl.hardware.vision.view import FILE
     from wristctl.report.camera_figures import lens, plane, reprojection
+    from wristctl.vision.charuco import calibrate, plane_tilt
+    from wristctl.vision.view import FILE
 
     cv2.setNumThreads(1)
     run, settings = session.run, session.settings
@@ -99,8 +99,8 @@ def look(session: Session) -> Album:
     """The views. Raises UserError where a source gives no pictures, or shows no board where it must."""
     import cv2
 
-    from wristctl.hardware.vision.camera import FolderCamera, is_device, open_recording
-    from wristctl.hardware.vision.charuco import Album
+    from wristctl.vision.camera import FolderCamera, is_device, open_recording
+    from wristctl.vision.charuco import Album
 
     settings, run, names = session.settings, session.run, []
     frames: Iterable[Frame]
@@ -137,7 +137,7 @@ def look(session: Session) -> Album:
 def _rendered(session: Session) -> Iterator[Frame]:
     import numpy as np
 
-    from wristctl.hardware.vision.board_shots import board_shots
+    from wristctl.vision.board_shots import board_shots
 
     settings = session.settings
     rng = np.random.default_rng(session.run.stream("board shots"))
@@ -148,8 +148,8 @@ def _live(session: Session, album: Album) -> Iterator[Frame]:
     """Frames of a device until the album is full; then, after Enter, until the board is seen in the bending plane."""
     import typer
 
-    from wristctl.hardware.vision.camera import DeviceCamera
-    from wristctl.hardware.vision.charuco import least_seen
+    from wristctl.vision.camera import DeviceCamera
+    from wristctl.vision.charuco import least_seen
 
     settings = session.settings
     camera = DeviceCamera(str(settings.camera), settings.device)
@@ -180,7 +180,7 @@ def _newest(camera: DeviceCamera) -> Iterator[Frame]:
         yield frame
 
 
-def _corners(album: Album, found: Calibration) -> pd.DataFrame:
+def _corners(album: Album, found: CameraCalibration) -> pd.DataFrame:
     import numpy as np
     import pandas as pd
 
@@ -192,7 +192,7 @@ def _corners(album: Album, found: Calibration) -> pd.DataFrame:
 
 
 def _true(session: Session) -> list[float]:
-    from wristctl.hardware.vision.pinhole import Pinhole
+    from wristctl.vision.pinhole import Pinhole
 
     camera = Pinhole(session.settings.scene, "right")
     return [*camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), *camera.distortion.tolist()]

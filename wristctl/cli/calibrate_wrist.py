@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 
-from wristctl.cli.command import Input, Session, Table, study_command
-from wristctl.cli.stands_on import stands_on
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
+from wristctl.cli.rig_description import rig_described
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """What would be done; opens nothing."""
     settings = study.calibrate_wrist
     slack = 1e3 * settings.homing.slack
-    return f"{stands_on(settings)}\neach motor reels in by at most {slack:g} mm until its tendon bends the wrist"
+    return f"{rig_described(settings)}\neach motor reels in by at most {slack:g} mm until its tendon bends the wrist"
 
 
 def calibrate_wrist(session: Session) -> Table:
@@ -23,21 +23,21 @@ def calibrate_wrist(session: Session) -> Table:
     The wrist stands straight, its tendons slack, both markers in the camera's picture. Later runs reuse what is
     durable: senses of turning and the marker's zero; positions only until the board restarts.
     """
-    session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
+    session.console.print(rig_described(session.settings), markup=False, highlight=False, soft_wrap=True)
     import numpy as np
 
     from wristctl.cli.operator import operator
-    from wristctl.hardware.trial.calibration import FILE, calibrated
-    from wristctl.hardware.trial.stands import open_stand
-    from wristctl.hardware.vision.view import View
+    from wristctl.trial.calibration import FILE, calibrated
+    from wristctl.trial.testbeds import open_testbed
+    from wristctl.vision.view import View
     from wristctl.wrist.directions import ACTIVE
 
     run, settings, study = session.run, session.settings, session.study
     view = View.of(session.inputs.get("optics"))
     with session.progress("opening board and camera"):
-        stand = open_stand(settings, study.wrist, study.seed, view, operator(session))
+        testbed = open_testbed(settings, study.wrist, study.seed, view, operator(session))
     with session.progress("homing"):
-        found = calibrated(stand, settings)
+        found = calibrated(testbed, settings)
     run.file(FILE).write_text(json.dumps(found.plain(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     zero = found.zero
     run.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
@@ -57,7 +57,7 @@ app = study_command(
     "calibrate-wrist",
     work=calibrate_wrist,
     plan=plan,
-    inputs=(Input("optics", kind="calibrate-camera", optional=True),),
+    inputs=(EarlierRun("optics", kind="calibrate-camera", optional=True),),
     shortcuts=("port", "camera", "plane", "real_time"),
     flags={"yes": "Ask nobody before the motors of real hardware move."},
     examples=(

@@ -27,15 +27,15 @@ from wristctl.config.keys import section_keys
 from wristctl.config.load import read_study
 from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
-from wristctl.runs import InputRun, LiveRun, Run, open_run, require, start_run
-from wristctl.runs.journal import plain
-from wristctl.runs.manifest import TABLES, Manifest
+from wristctl.records import InputRun, LiveRun, Run, open_run, require, start_run
+from wristctl.records.journal import jsonable
+from wristctl.records.manifest import TABLES, Manifest
 
-__all__ = ["Input", "Session", "Table", "study_command"]
+__all__ = ["EarlierRun", "Session", "Table", "study_command"]
 
 
 @dataclass(frozen=True)
-class Input:
+class EarlierRun:
     """An earlier run that a command reads: the leaf of a section that names it, and the kind it must be.
 
     `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. A leaf
@@ -75,7 +75,7 @@ class _Command:
     kind: str
     work: Work
     plan: Plan | None
-    inputs: Sequence[Input]
+    inputs: Sequence[EarlierRun]
 
     def section(self, study: Study) -> Any:
         return getattr(study, self.kind.replace("-", "_"))
@@ -85,7 +85,7 @@ def study_command(
     kind: str,
     work: Work,
     plan: Plan | None = None,
-    inputs: Sequence[Input] = (),
+    inputs: Sequence[EarlierRun] = (),
     shortcuts: Sequence[str] = (),
     flags: Mapping[str, str] = MappingProxyType({}),
     examples: Sequence[str] = (),
@@ -170,7 +170,7 @@ def _opened(command: _Command, study: Study, out: Path) -> dict[str, Run]:
     return runs
 
 
-def _stopped(ref: str, wanted: Input, out: Path) -> Run:
+def _stopped(ref: str, wanted: EarlierRun, out: Path) -> Run:
     run = open_run(ref, out)
     if run.kind != wanted.kind:
         raise UserError(f"a {run.kind} run where a {wanted.kind} run is needed", str(run.path), "name another")
@@ -212,7 +212,7 @@ def _worked(command: _Command, session: Session) -> Sequence[Table]:
 
 
 def _as_data(tables: Sequence[Table]) -> Any:
-    return plain([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
+    return jsonable([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
 
 
 def _page(path: Path, manifest: Manifest) -> str:
@@ -245,7 +245,7 @@ def _print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
             "metrics": run.metrics,
             "tables": _as_data(tables),
         }
-        print(json.dumps(plain(result), indent=2, allow_nan=False))
+        print(json.dumps(jsonable(result), indent=2, allow_nan=False))
         return
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for table in tables:

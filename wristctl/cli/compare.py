@@ -6,14 +6,14 @@ import json
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import under
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
-    from wristctl.benchmark.compare import Result
-    from wristctl.benchmark.cost import StepTime
+    from wristctl.comparison.comparison import ComparedRow
+    from wristctl.comparison.step_cost import StepTime
 
 _DETAILED = 3
 """Comparisons of more loops than this draw the details of the first only."""
@@ -24,9 +24,9 @@ _HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chatte
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.benchmark.compare import refuse_tuned_scenarios
     from wristctl.cli.loops import check_row, tuned_of, tuned_study
     from wristctl.cli.tune import check_search
+    from wristctl.comparison.comparison import refuse_tuned_scenarios
 
     settings, earlier, tuned = study.compare, tuned_study(inputs), tuned_of(inputs)
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -46,11 +46,11 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
 
 def compare(session: Session) -> list[Table]:
     """Compare controllers on loops and references, beside the paper's numbers."""
-    from wristctl.benchmark.compare import compare as run_comparison
-    from wristctl.benchmark.compare import frame, series
-    from wristctl.benchmark.cost import step_time
     from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
     from wristctl.cli.tune import search_all
+    from wristctl.comparison.comparison import compare as run_comparison
+    from wristctl.comparison.comparison import frame, series
+    from wristctl.comparison.step_cost import step_time
     from wristctl.control.table import controller, gains_of
 
     run, settings = session.run, session.settings
@@ -78,10 +78,10 @@ def compare(session: Session) -> list[Table]:
     return [*chain.from_iterable(tables), _cost_table(cost)]
 
 
-def _draw(session: Session, results: list[Result]) -> None:
+def _draw(session: Session, results: list[ComparedRow]) -> None:
     """Over the loops RMSE for each reference, and angles; for each loop (of many only the first) the same over the
     references, chattering, and the errors over time of each of the paper's controllers."""
-    from wristctl.benchmark.paper import T2
+    from wristctl.comparison.paper import T2
     from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
     from wristctl.report.loop_figures import errors
 
@@ -119,7 +119,7 @@ def _units() -> dict[str, str]:
     return own | extra | paper
 
 
-def _table(loop: str, results: list[Result]) -> list[Table]:
+def _table(loop: str, results: list[ComparedRow]) -> list[Table]:
     """A table for each reference on one loop."""
     tables = []
     for reference in dict.fromkeys(result.reference for result in results):
@@ -129,7 +129,7 @@ def _table(loop: str, results: list[Result]) -> list[Table]:
     return tables
 
 
-def _row(result: Result) -> tuple[str | float, ...]:
+def _row(result: ComparedRow) -> tuple[str | float, ...]:
     metrics = result.simulation.metrics
     never = "diverged" if result.simulation.failed else "never"
     settling = metrics["settling"] if metrics["settling"] == metrics["settling"] else never
@@ -142,8 +142,8 @@ def _cost_table(cost: dict[str, StepTime]) -> Table:
     return Table("Control step of one wrist on this machine", ("controller", "median [us]", "p99 [us]"), rows)
 
 
-def _paper(result: Result) -> tuple[str, str]:
-    from wristctl.benchmark.paper import T2, verdict
+def _paper(result: ComparedRow) -> tuple[str, str]:
+    from wristctl.comparison.paper import T2, verdict
 
     if result.controller not in T2:
         return "", ""
@@ -156,7 +156,7 @@ app = study_command(
     "compare",
     work=compare,
     plan=plan,
-    inputs=(Input("network", kind="train", optional=True), Input("tuned", kind="tune", optional=True)),
+    inputs=(EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
     shortcuts=("horizon",),
     examples=(
         "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     from wristctl.learning.dataset import Samples
@@ -35,8 +35,8 @@ def gen_data(session: Session) -> Table:
     """Sample tip positions and bending angles: constant curvature, equilibria under load, or earlier runs."""
     import numpy as np
 
+    from wristctl.learning.angle_errors import angle_errors
     from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE
-    from wristctl.learning.metrics import angle_errors
     from wristctl.report.learning_figures import coverage
     from wristctl.report.learning_tables import MEANING, UNITS, samples_table
     from wristctl.wrist.kinematics import exact_angle
@@ -80,7 +80,7 @@ def drawn(study: Study, entropy: tuple[int, int], inputs: dict[str, Run]) -> Sam
     if settings.source == "run":
         return samples_of_courses(_courses(_source(inputs)), settings.samples, rng)
     if settings.source == "plant":
-        from wristctl.learning.plant import draw_equilibria
+        from wristctl.learning.equilibria import draw_equilibria
 
         return draw_equilibria(settings, study.wrist, rng)
     return draw_samples(settings, study.wrist, rng)
@@ -96,7 +96,7 @@ def _courses(run: Run) -> list[Array]:
     """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
     import numpy as np
 
-    from wristctl.runs.formats import read_arrays, read_table
+    from wristctl.records.formats import read_arrays, read_table
 
     wanted = ("tip_x", "tip_y", "theta")
     folder = run.path / "data"
@@ -121,7 +121,7 @@ app = study_command(
     "gen-data",
     work=gen_data,
     plan=plan,
-    inputs=(Input("run", kind=None, optional=True),),
+    inputs=(EarlierRun("run", kind=None, optional=True),),
     shortcuts=("samples", "source"),
     examples=(
         "wristctl gen-data experiments/paper.yaml",

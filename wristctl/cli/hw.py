@@ -47,7 +47,7 @@ def ports(
     debug: Debug = False,
 ) -> None:
     """List the serial ports of this computer, those that may be a board first."""
-    from wristctl.hardware.transport import ports as serial_ports
+    from wristctl.board.transport import ports as serial_ports
 
     found = serial_ports()
     if find:
@@ -81,10 +81,10 @@ def check(
     debug: Debug = False,
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring."""
-    from wristctl.hardware.board import Board
-    from wristctl.hardware.check import move_a_little, round_trips
-    from wristctl.hardware.messages import Command
-    from wristctl.hardware.transport import EMULATED, open_transport
+    from wristctl.board.board import Board
+    from wristctl.board.check import move_a_little, round_trips
+    from wristctl.board.messages import Command
+    from wristctl.board.transport import EMULATED, open_transport
 
     with listening(quiet, False) as console:
         if port == EMULATED:
@@ -127,10 +127,10 @@ def flash(
     port: Port = None, image: Image = None, as_json: Json = False, quiet: Quiet = False, debug: Debug = False
 ) -> None:
     """Write the firmware into the board, read it back, and see that it answers."""
-    from wristctl.hardware.board import Board
-    from wristctl.hardware.flashing import IMAGE
-    from wristctl.hardware.flashing import flash as write
-    from wristctl.hardware.transport import BOOT_TIME, SerialTransport, only_board
+    from wristctl.board.board import Board
+    from wristctl.board.flashing import IMAGE
+    from wristctl.board.flashing import flash as write
+    from wristctl.board.transport import BOOT_TIME, SerialTransport, only_board
 
     with listening(quiet, False) as console:
         place = port or only_board()
@@ -167,8 +167,8 @@ def emulate(
     """Serve the emulated board for any serial client, in real time; its port is the only line on stdout."""
     with listening(quiet, False) as console:
         with progress(console, _no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
-            from wristctl.hardware.emulator.atmega2560 import FIRMWARE, Atmega2560
-            from wristctl.hardware.emulator.serve import PtyLine, TcpLine, serve
+            from wristctl.board.emulator.atmega2560 import FIRMWARE, Atmega2560
+            from wristctl.board.emulator.serve import PtyLine, TcpLine, serve
 
             chip = Atmega2560(image or FIRMWARE, boot_loader=boot_loader)
         line = PtyLine() if tcp is None else TcpLine(tcp)
@@ -189,11 +189,11 @@ def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
     with TemporaryDirectory(prefix="wristctl-bench-") as folder:
         pictures = Path(folder) / "frame"
         with progress(console, _no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+            from wristctl.bench.film import start_film
+            from wristctl.bench.rig import Rig
+            from wristctl.bench.server import BenchServer
             from wristctl.config.bench import BenchSettings
             from wristctl.config.wrist import WristParameters
-            from wristctl.hardware.bench.film import start_film
-            from wristctl.hardware.bench.rig import Rig
-            from wristctl.hardware.bench.server import BenchServer
 
             settings, its = BenchSettings(), WristParameters()
             camera, film = start_film(settings.camera, its, None, pictures)
@@ -210,8 +210,8 @@ def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
 @app.command("stop")
 def stop(port: Port = None, baud: Baud = _BAUD, debug: Debug = False) -> None:
     """Emergency stop: no further step, drives released. Works beside a running program."""
-    from wristctl.hardware.board import Board
-    from wristctl.hardware.transport import open_transport
+    from wristctl.board.board import Board
+    from wristctl.board.transport import open_transport
 
     transport = open_transport(port, baud, exclusive=False)
     try:

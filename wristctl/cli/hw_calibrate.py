@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from wristctl.cli.on_call import on_call
+from wristctl.cli.lazy_commands import lazy_group
 
 COMMANDS = {
     "board-pdf": ("wristctl.cli.board_pdf", None, "Write the board and the markers as a PDF, to print at true scale."),
@@ -12,7 +12,9 @@ COMMANDS = {
     "wrist": ("wristctl.cli.calibrate_wrist", None, "Find zero, senses of turning and steps per radian."),
 }
 
-app = typer.Typer(cls=on_call(COMMANDS), help="Calibrate camera and wrist.", no_args_is_help=True, add_completion=False)
+app = typer.Typer(
+    cls=lazy_group(COMMANDS), help="Calibrate camera and wrist.", no_args_is_help=True, add_completion=False
+)
 
 
 @app.callback()

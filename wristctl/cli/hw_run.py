@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from wristctl.cli.command import Input, Session, Table, study_command
-from wristctl.cli.stands_on import stands_on
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
+from wristctl.cli.rig_description import rig_described
 from wristctl.config.errors import under
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
@@ -20,12 +20,12 @@ def plan(study: Study, inputs: dict[str, Run]) -> str:
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest
-    return f"{stands_on(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
+    return f"{rig_described(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
 
 
 def hw_run(session: Session) -> list[Table]:
     """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
-    session.console.print(stands_on(session.settings), markup=False, highlight=False, soft_wrap=True)
+    session.console.print(rig_described(session.settings), markup=False, highlight=False, soft_wrap=True)
     from wristctl.cli.hw_tables import reported
     from wristctl.cli.hw_trials import performed
     from wristctl.cli.loops import identified
@@ -39,11 +39,11 @@ app = study_command(
     work=hw_run,
     plan=plan,
     inputs=(
-        Input("calibration", kind="calibrate-wrist", optional=True),
-        Input("optics", kind="calibrate-camera", optional=True),
-        Input("from_identified", kind="identify", optional=True),
-        Input("tuned", kind="tune", optional=True),
-        Input("network", kind="train", optional=True),
+        EarlierRun("calibration", kind="calibrate-wrist", optional=True),
+        EarlierRun("optics", kind="calibrate-camera", optional=True),
+        EarlierRun("from_identified", kind="identify", optional=True),
+        EarlierRun("tuned", kind="tune", optional=True),
+        EarlierRun("network", kind="train", optional=True),
     ),
     shortcuts=("port", "camera", "repetitions", "real_time", "video"),
     flags={"yes": "Ask nobody before the motors of real hardware move."},

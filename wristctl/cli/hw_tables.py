@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wristctl.benchmark.paper import EXPERIMENT
 from wristctl.cli.command import Session, Table
 from wristctl.cli.loops import network_of, tuned_of
-from wristctl.hardware.trial.trials import Trial
-from wristctl.hardware.trial.twin import twin
+from wristctl.comparison.paper import EXPERIMENT
 from wristctl.report import trial_figures
-from wristctl.simulation.simulate import Simulation
+from wristctl.simulation.closed_loop import Simulation
+from wristctl.trial.trials import Trial
+from wristctl.trial.twin import twin
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 
 Twins = dict[int, Simulation]

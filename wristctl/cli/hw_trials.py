@@ -11,20 +11,20 @@ import numpy as np
 import pandas as pd
 
 from wristctl.cli.command import Session, Table
-from wristctl.cli.hw_view import trials_shown
 from wristctl.cli.loops import network_of, tuned_of
 from wristctl.cli.operator import operator
+from wristctl.cli.trial_panel import trials_shown
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.trial.calibration import Calibration
-from wristctl.hardware.trial.evaluation import JUDGED, evaluated
-from wristctl.hardware.trial.experiment import Experiment
-from wristctl.hardware.trial.log import TrialLog
-from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.stands import open_stand
-from wristctl.hardware.trial.trials import Trial, trials_of
-from wristctl.hardware.vision.annotate import AnnotatedVideo
-from wristctl.hardware.vision.view import View
 from wristctl.simulation.metrics import METRICS
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.experiment import Experiment
+from wristctl.trial.log import TrialLog
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.testbeds import open_testbed
+from wristctl.trial.trial_metrics import JUDGED, evaluated
+from wristctl.trial.trials import Trial, trials_of
+from wristctl.vision.annotate import AnnotatedVideo
+from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     settings, run, study = session.settings, session.run, session.study
     cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(run.stream("order")))
-    calibration = Calibration.load(session.inputs["calibration"]) if "calibration" in session.inputs else None
+    calibration = WristCalibration.load(session.inputs["calibration"]) if "calibration" in session.inputs else None
     segments = settings.bench.segments if settings.port is None else None
     trial_log = TrialLog(run.file("data/log.csv").parent, segments, settings.control_period)
     experiment = Experiment(
@@ -64,9 +64,9 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
             view, keep = View.of(session.inputs.get("optics")), film.add if film else None
-            stand = open_stand(settings, bench, study.seed, view, operator(session), keep)
+            testbed = open_testbed(settings, bench, study.seed, view, operator(session), keep)
         with trials_shown(session, trials) as shown:
-            experiment.run(stand, shown)
+            experiment.run(testbed, shown)
     except BaseException as error:
         stopped = error
     try:

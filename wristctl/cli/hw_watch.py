@@ -11,9 +11,9 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Out
+from wristctl.cli.runs.run_options import RESULTS, Debug, Out
 from wristctl.config.errors import UserError
-from wristctl.runs import Run, open_run
+from wristctl.records import Run, open_run
 
 Seconds = Annotated[float, typer.Option("--last", help="Seconds to show.", min=0.5)]
 Every = Annotated[float, typer.Option("--every", help="Seconds between two pictures.", min=0.1)]
@@ -28,8 +28,8 @@ def watch(
     debug: Debug = False,
 ) -> None:
     """Draw angle, reference and tensions of the trials that go on, until their run ends."""
+    from wristctl.records.files import replacing
     from wristctl.report.live_figure import newest_rows, recent
-    from wristctl.runs.files import replacing
 
     run = open_run(ref, out) if ref else _newest(out)
     if run.kind != "hw-run":
@@ -50,7 +50,7 @@ def watch(
 
 
 def _newest(results: Path) -> Run:
-    from wristctl.runs.index import indexed
+    from wristctl.records.index import indexed
 
     found = [each.id for each in indexed(results, renew=False) if each.kind == "hw-run"]
     if not found:

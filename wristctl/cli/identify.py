@@ -6,10 +6,10 @@ import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.cli.progress import PLAIN
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     from wristctl.identification.fit import Fit, Problem
@@ -68,7 +68,7 @@ def identify(session: Session) -> list[Table]:
 def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
     """The trials of all runs, and where the search for the parameters begins: at what the first run's study says."""
     from wristctl.identification.fit import Problem
-    from wristctl.identification.trials import trials_of
+    from wristctl.identification.measured_trials import measured_trials
 
     settings, trials = study.identify, []
     start: dict[str, float] = {}
@@ -80,7 +80,7 @@ def _problem(study: Study, inputs: Mapping[str, Run]) -> Problem:
         if exposure is None:
             exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
         length = actuator.step_length
-        trials += trials_of(run.id, wrist, length, settings.step, ticks, frames, kinds, exposure)
+        trials += measured_trials(run.id, wrist, length, settings.step, ticks, frames, kinds, exposure)
         own = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
         known = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction, "delay": 0.0}
         start = start or own | known
@@ -180,7 +180,7 @@ app = study_command(
     "identify",
     work=identify,
     plan=plan,
-    inputs=(Input("runs", kind="hw-run"),),
+    inputs=(EarlierRun("runs", kind="hw-run"),),
     argument="runs",
     examples=(
         "wristctl identify latest:hw-run",

@@ -9,7 +9,7 @@ from typing import Any
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-Entry = tuple[str, str | None, str]
+LazyEntry = tuple[str, str | None, str]
 """Module (its `app` is a typer.Typer), panel and line in the help."""
 
 
@@ -26,7 +26,7 @@ class _OnCall(TyperCommand):
         return real.make_context(info_name, args, parent=parent, **extra)
 
 
-def on_call(commands: Mapping[str, Entry]) -> type[TyperGroup]:
+def lazy_group(commands: Mapping[str, LazyEntry]) -> type[TyperGroup]:
     """A group of these commands, for `typer.Typer(cls=...)`."""
 
     class Commands(TyperGroup):

@@ -13,7 +13,7 @@ from wristctl.config.control import Row, SimulateSettings
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import under
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
@@ -23,8 +23,8 @@ def simulate(session: Session) -> Table:
     from wristctl.cli.loops import identified, network_of, tuned_of, warn_if_it_buckles, warn_if_outside
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import stroboscope
+    from wristctl.simulation.closed_loop import simulate as run_simulation
     from wristctl.simulation.metrics import METRICS
-    from wristctl.simulation.simulate import simulate as run_simulation
     from wristctl.simulation.trajectory import COLUMNS
 
     session = identified(session, "simulate")
@@ -64,9 +64,9 @@ app = study_command(
     work=simulate,
     plan=plan,
     inputs=(
-        Input("network", kind="train", optional=True),
-        Input("tuned", kind="tune", optional=True),
-        Input("from_identified", kind="identify", optional=True),
+        EarlierRun("network", kind="train", optional=True),
+        EarlierRun("tuned", kind="tune", optional=True),
+        EarlierRun("from_identified", kind="identify", optional=True),
     ),
     shortcuts=("controller", "gains"),
     examples=(

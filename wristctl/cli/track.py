@@ -10,18 +10,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
     from numpy.typing import NDArray
 
-    from wristctl.hardware.vision.marker import Sighting
-    from wristctl.hardware.vision.view import View
+    from wristctl.vision.marker import Sighting
+    from wristctl.vision.view import View
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ _MEANING = {
 
 def plan(study: Study, inputs: dict[str, Run]) -> str:
     """See that the recording can be read, and what it is."""
-    from wristctl.hardware.vision.camera import open_recording
+    from wristctl.vision.camera import open_recording
 
     if study.track.video is None:
         raise UserError("track needs a video", "track.video", "wristctl track trial.mp4, or a folder of pictures")
@@ -59,9 +59,9 @@ def track(session: Session) -> list[Table]:
     """
     import cv2
 
-    from wristctl.hardware.vision.marker import MEANING, Verdict
-    from wristctl.hardware.vision.view import View
     from wristctl.report.track_figures import angle, frames
+    from wristctl.vision.marker import MEANING, SightingVerdict
+    from wristctl.vision.view import View
 
     cv2.setNumThreads(1)
     run, settings = session.run, session.settings
@@ -74,9 +74,9 @@ def track(session: Session) -> list[Table]:
         run.figure("angle", angle(sightings))
         run.figure("frames", frames(pictures))
     counts = Counter(each.verdict for each in sightings)
-    usable, total = counts[Verdict.OK], len(sightings)
+    usable, total = counts[SightingVerdict.OK], len(sightings)
     run.metric("usable", usable / total, "", "higher", total, meaning="share of frames with an angle")
-    thetas = [math.degrees(each.theta) for each in sightings if each.verdict is Verdict.OK]
+    thetas = [math.degrees(each.theta) for each in sightings if each.verdict is SightingVerdict.OK]
     if not thetas:
         verdict = counts.most_common(1)[0][0]
         what = f"no frame can be used: {verdict} in {counts[verdict]} of {total}: {MEANING[verdict]}"
@@ -108,9 +108,9 @@ def track(session: Session) -> list[Table]:
 
 def _see(session: Session, view: View) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
     """What each frame tells, and annotated pictures of some."""
-    from wristctl.hardware.vision.annotate import AnnotatedVideo, Picked
-    from wristctl.hardware.vision.camera import open_recording
-    from wristctl.hardware.vision.marker import Tracker, Verdict
+    from wristctl.vision.annotate import AnnotatedVideo, Picked
+    from wristctl.vision.camera import open_recording
+    from wristctl.vision.marker import SightingVerdict, Tracker
 
     settings = session.settings
     tracker = Tracker(settings.markers, view, settings.gates)
@@ -122,7 +122,7 @@ def _see(session: Session, view: View) -> tuple[list[Sighting], list[NDArray[np.
         with session.progress("frames") as done:
             for frame in recording:
                 seen = tracker.see(frame)
-                if zero and seen.verdict is Verdict.OK:
+                if zero and seen.verdict is SightingVerdict.OK:
                     tracker.zero, zero, seen = seen.theta, False, seen._replace(theta=0.0)
                 sightings.append(seen)
                 picked.offer(frame, seen)
@@ -140,7 +140,7 @@ def _askew(view: View, sightings: Sequence[Sighting]) -> float:
     """How far off [deg] an angle may be, by how square the base's marker looks in the calibrated view on average."""
     import numpy as np
 
-    from wristctl.hardware.vision.detector import askew
+    from wristctl.vision.detector import askew
 
     seen = np.array([each.corners[0] for each in sightings if math.isfinite(each.theta)])
     return math.degrees(askew(view.rectify(np.nanmean(seen, axis=0))))
@@ -158,7 +158,7 @@ def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:
 
 def _digest(source: Path) -> str:
     """SHA-256 of a file, or of the list of a folder's files."""
-    from wristctl.runs.files import files_below, sha256_of, sha256_of_list
+    from wristctl.records.files import files_below, sha256_of, sha256_of_list
 
     if source.is_file():
         return sha256_of(source)
@@ -178,7 +178,7 @@ app = study_command(
     "track",
     work=track,
     plan=plan,
-    inputs=(Input("calibration", kind="calibrate-camera", optional=True),),
+    inputs=(EarlierRun("calibration", kind="calibrate-camera", optional=True),),
     shortcuts=("zero", "annotate"),
     argument="video",
     examples=(

@@ -7,15 +7,15 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     from wristctl.learning.dataset import Samples, Split
     from wristctl.learning.selection import Choice
-    from wristctl.learning.trial import Job, Trial
+    from wristctl.learning.training_result import Job, TrainingResult
 
 CHECKPOINTS = "checkpoints"
 
@@ -98,11 +98,11 @@ def train(session: Session) -> list[Table]:
 
 def _trained(
     session: Session, samples: Samples, split: Split, wanted: dict[str, NetworkSettings]
-) -> dict[str, list[Trial]]:
+) -> dict[str, list[TrainingResult]]:
     """Every network from every seed; a seed begins all networks alike."""
     import numpy as np
 
-    from wristctl.learning.trial import Job
+    from wristctl.learning.training_result import Job
 
     count, run = session.settings.seeds, session.run
     seeds = [np.random.SeedSequence(run.stream(f"training {trial}")) for trial in range(count)]
@@ -112,7 +112,7 @@ def _trained(
         for trial, seed in enumerate(seeds)
     ]
     trials = _done(session, "training", samples, jobs)
-    found: dict[str, list[Trial]] = {}
+    found: dict[str, list[TrainingResult]] = {}
     for trial in trials:
         found.setdefault(trial.job.name.rpartition("-")[0], []).append(trial)
     return found
@@ -132,14 +132,14 @@ def _searched(session: Session, samples: Samples, split: Split) -> Choice:
     return choose(candidates(trials, folds))
 
 
-def _done(session: Session, what: str, samples: Samples, jobs: list[Job]) -> list[Trial]:
+def _done(session: Session, what: str, samples: Samples, jobs: list[Job]) -> list[TrainingResult]:
     """The jobs' trials, with progress and checkpoints."""
     import numpy as np
     import torch
 
     from wristctl.lanes.cores import cores
     from wristctl.learning.processes import train_all
-    from wristctl.learning.trial import Epoch
+    from wristctl.learning.training_result import Epoch
 
     settings, run = session.settings, session.run
     device = settings.device
@@ -163,8 +163,8 @@ app = study_command(
     work=train,
     plan=plan,
     inputs=(
-        Input("data", kind="gen-data", optional=True),
-        Input("resume", kind="train", optional=True, unfinished=True),
+        EarlierRun("data", kind="gen-data", optional=True),
+        EarlierRun("resume", kind="train", optional=True, unfinished=True),
     ),
     shortcuts=("search", "preset", "epochs", "seeds", "device"),
     examples=(

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from wristctl.learning.evaluation import Place
     from wristctl.learning.network import Network
     from wristctl.learning.selection import Choice
-    from wristctl.learning.trial import Trial
+    from wristctl.learning.training_result import TrainingResult
 
 
 def write_results(
     session: Session,
-    trials: dict[str, list[Trial]],
+    trials: dict[str, list[TrainingResult]],
     samples: Samples,
     split: Split,
     seconds: float,
@@ -28,7 +28,7 @@ def write_results(
     """Everything about the trained networks, by name; `reason` says why the one network was chosen."""
     from wristctl.cli.train_ranking import write_rows
     from wristctl.learning.evaluation import places
-    from wristctl.learning.trial import best_of
+    from wristctl.learning.training_result import best_of
 
     name, own = min(trials.items(), key=lambda item: min(_losses(item[1])))
     kept, where = best_of(own), places(samples, split)
@@ -58,7 +58,7 @@ def write_choice(session: Session, choice: Choice) -> list[Table]:
     return [Table(f"Cross-validation: {choice.reason}", heads, rows), *write_depths(session, choice)]
 
 
-def _losses(trials: list[Trial]) -> list[float]:
+def _losses(trials: list[TrainingResult]) -> list[float]:
     from math import inf, isfinite
 
     return [trial.validation_loss if isfinite(trial.validation_loss) else inf for trial in trials]
@@ -66,7 +66,7 @@ def _losses(trials: list[Trial]) -> list[float]:
 
 def _write_network(session: Session, network: Network, name: str, reason: str) -> None:
     from wristctl.learning.network_file import save_network
-    from wristctl.runs.files import sha256_of
+    from wristctl.records.files import sha256_of
 
     # The data is named by its hash: a run's id would make the same training give other bytes each time.
     data = session.inputs.get("data")
@@ -81,7 +81,7 @@ def _write_network(session: Session, network: Network, name: str, reason: str) -
     save_network(network, session.run.file("models/network.safetensors"), record)
 
 
-def _write_curves(session: Session, trials: list[Trial], kept: Trial) -> Table:
+def _write_curves(session: Session, trials: list[TrainingResult], kept: TrainingResult) -> Table:
     import numpy as np
 
     from wristctl.report.learning_figures import learning_curves
@@ -109,9 +109,9 @@ def _write_curves(session: Session, trials: list[Trial], kept: Trial) -> Table:
     return Table("Trials", ("trial", "epochs", "training RMSE [deg]", "validation RMSE [deg]", "kept"), rows)
 
 
-def _write_errors(session: Session, kept: Trial, samples: Samples, split: Split, where: list[Place]) -> Table:
+def _write_errors(session: Session, kept: TrainingResult, samples: Samples, split: Split, where: list[Place]) -> Table:
+    from wristctl.learning.angle_errors import MEASURES, angle_errors, error_map
     from wristctl.learning.evaluation import inverses
-    from wristctl.learning.metrics import MEASURES, angle_errors, error_map
     from wristctl.report.learning_figures import error_over_workspace, errors_at_samples, predicted_angles
     from wristctl.report.learning_tables import MEANING, UNITS, predictions_table
 
@@ -154,7 +154,7 @@ def _write_errors(session: Session, kept: Trial, samples: Samples, split: Split,
     return Table("Errors of the bending angle", (*columns, "multiply-adds"), rows)
 
 
-def _write_times(session: Session, kept: Trial, samples: Samples, split: Split, seconds: float) -> Table:
+def _write_times(session: Session, kept: TrainingResult, samples: Samples, split: Split, seconds: float) -> Table:
     from wristctl.learning.baseline import Polynomial
     from wristctl.learning.inference import compiled_exact, compiled_network, compiled_polynomial, microseconds
 

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.learning.evaluation import Place
-    from wristctl.learning.selection import Candidate, Choice
-    from wristctl.learning.trial import Trial
+    from wristctl.learning.selection import Choice, CrossValidated
+    from wristctl.learning.training_result import TrainingResult
 
 
-def write_rows(session: Session, trials: dict[str, list[Trial]], where: list[Place]) -> list[Table]:
+def write_rows(session: Session, trials: dict[str, list[TrainingResult]], where: list[Place]) -> list[Table]:
     """Mean and 95 % interval of every measure over the seeds of each network, and what ranking they support."""
     import pandas as pd
 
@@ -63,7 +63,7 @@ def write_depths(session: Session, choice: Choice) -> list[Table]:
 
     run, rows = session.run, []
     for activation in dict.fromkeys(each.settings.activation for each in choice.found):
-        least: dict[int, Candidate] = {}
+        least: dict[int, CrossValidated] = {}
         for each in (each for each in choice.found if each.settings.activation == activation):
             if each.depth not in least or each.mean < least[each.depth].mean:
                 least[each.depth] = each
@@ -97,7 +97,7 @@ def write_depths(session: Session, choice: Choice) -> list[Table]:
     return [Table("Are three hidden layers the best trade-off (C15)?", heads, rows)]
 
 
-def _groups(session: Session, trials: dict[str, list[Trial]]) -> dict[str, list[str]]:
+def _groups(session: Session, trials: dict[str, list[TrainingResult]]) -> dict[str, list[str]]:
     """Names of networks that were trained the same way, which alone can be ranked."""
     groups: dict[str, list[str]] = {}
     for name, each in trials.items():
@@ -135,7 +135,7 @@ def _ranked(session: Session, table: pd.DataFrame, label: str, names: list[str])
 
 def _printed(session: Session, name: str, measure: str) -> float | None:
     """T1's cell for a row with one of its presets."""
-    from wristctl.benchmark.paper import T1
+    from wristctl.comparison.paper import T1
 
     row = next((row for row in session.settings.rows if row.name == name), session.settings)
     column = T1.get((row.preset or "").removeprefix("t1-"))

@@ -13,8 +13,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table as Grid
 
 from wristctl.cli.command import Session
-from wristctl.hardware.trial.loop import Shown
-from wristctl.hardware.trial.trials import Trial
+from wristctl.trial.control_loop import Shown
+from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import ACTIVE
 
 _PICTURES = 8.0

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wristctl.cli.command import Input, Session, Table, study_command
+from wristctl.cli.command import EarlierRun, Session, Table, study_command
 from wristctl.config.control import TuneSettings
 from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     from wristctl.tuning.search import Search
@@ -102,8 +102,8 @@ app = study_command(
     work=tune,
     plan=plan,
     inputs=(
-        Input("network", kind="train", optional=True),
-        Input("from_identified", kind="identify", optional=True),
+        EarlierRun("network", kind="train", optional=True),
+        EarlierRun("from_identified", kind="identify", optional=True),
     ),
     shortcuts=("candidates", "iterations"),
     examples=(

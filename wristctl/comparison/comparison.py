@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.benchmark.paper import T2, verdict
+from wristctl.comparison.paper import T2, verdict
 from wristctl.config.control import CompareSettings, TuneSettings
 from wristctl.config.errors import UserError
-from wristctl.config.loop import Direction, Reference
+from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.closed_loop import Simulation, simulation
 from wristctl.simulation.reference import Motion, motion
 from wristctl.simulation.rollout import rollout, sample_period
-from wristctl.simulation.simulate import Simulation, simulation
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -29,7 +29,7 @@ Gains = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
-class Result:
+class ComparedRow:
     """One controller with one set of gains on one loop, reference and inverse."""
 
     loop: str
@@ -80,7 +80,7 @@ def compare(
     network: Inverse | None = None,
     tuned: Gains | None = None,
     progress: Callable[[float], None] | None = None,
-) -> list[Result]:
+) -> list[ComparedRow]:
     """Run every combination of the study's `compare` section.
 
     UserError for an unknown controller or gains, a missing network or tuned gains, before anything is run.
@@ -94,7 +94,7 @@ def compare(
         for direction in chosen.directions
         for wrist in [in_plane(study.wrist, direction)]
     ]
-    results: list[Result] = []
+    results: list[ComparedRow] = []
     for part, (loop_name, loop, wrist, motions) in enumerate(planned):
         labels, followed = zip(*motions, strict=True)
         for number, name in enumerate(names):
@@ -112,12 +112,12 @@ def compare(
                 row = chosen.rows[rows[index // len(followed)]]
                 (reference, inverse), course = labels[which[index]], followed[which[index]]
                 done = simulation(outcome, index, course, wrist, f"{name}/{row.gains_name}")
-                results.append(Result(loop_name, reference, inverse, name, row.gains_name, done))
+                results.append(ComparedRow(loop_name, reference, inverse, name, row.gains_name, done))
     return _in_order(results, chosen)
 
 
 def _motions(
-    study: Study, wrist: WristParameters, direction: Direction, period: float, network: Inverse | None
+    study: Study, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
 ) -> list[tuple[tuple[str, str], Motion]]:
     chosen = study.compare
     planned: list[tuple[tuple[str, str], Motion]] = []
@@ -129,12 +129,12 @@ def _motions(
     return planned
 
 
-def _course_name(reference: Reference, direction: Direction, chosen: CompareSettings) -> str:
+def _course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
     """The reference's name, with the direction where there are several."""
     return reference_name(reference) + (f", {direction}" if len(chosen.directions) > 1 else "")
 
 
-def _in_order(results: Sequence[Result], chosen: CompareSettings) -> list[Result]:
+def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[ComparedRow]:
     """By loop, reference, direction, row of the study, inverse."""
     loops = list(chosen.loops)
     references = [_course_name(r, direction, chosen) for r in chosen.references for direction in chosen.directions]
@@ -150,7 +150,7 @@ def _in_order(results: Sequence[Result], chosen: CompareSettings) -> list[Result
     )
 
 
-def series(results: Sequence[Result], every: int = 5) -> dict[str, NDArray[np.float64]]:
+def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[np.float64]]:
     """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
 
     segment_theta (results, T, segments) is for drawing, hence in single precision; nan beyond a plant's segments.
@@ -168,14 +168,13 @@ def series(results: Sequence[Result], every: int = 5) -> dict[str, NDArray[np.fl
     }
     most = max(c.segment_theta.shape[1] for c in courses)
     columns["segment_theta"] = [
-        np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan)
-        for c in courses
+        np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
     ]
     stacked = {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
     return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
 
 
-def frame(results: Sequence[Result]) -> pd.DataFrame:
+def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
     """Every metric of every result beside the paper's T2, one row each."""
     import pandas as pd
 
@@ -195,9 +194,7 @@ def frame(results: Sequence[Result]) -> pd.DataFrame:
                 "paper_rmse": printed.rmse if printed else np.nan,
                 "paper_settling": printed.settling if printed else np.nan,
                 "paper_steady_state": printed.steady_state if printed else np.nan,
-                "verdict": verdict(
-                    result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"]
-                ),
+                "verdict": verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"]),
             }
         )
     return pd.DataFrame(rows)

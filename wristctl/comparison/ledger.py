@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wristctl.benchmark.paper import FACTOR
-from wristctl.config.audit import Claim, Outcome
+from wristctl.comparison.paper import FACTOR
+from wristctl.config.audit import Claim, VerdictName
 from wristctl.config.control import CompareSettings, Row
 from wristctl.config.errors import UserError
 from wristctl.config.loop import LOOPS, Reference
 from wristctl.config.study import Study
-from wristctl.runs import Run
+from wristctl.records import Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +30,7 @@ class Judgement:
     claim: Claim
     low: float
     high: float
-    verdict: Outcome
+    verdict: VerdictName
     reason: str
     shown_by: tuple[str, ...] = ()
     """loops of a comparison, or a key of TRAININGS"""
@@ -101,7 +101,7 @@ def _by_training(claim: Claim, run: Run) -> Judgement:
     ours = np.nan if found["value"] is None else float(found["value"])
     low, high = found.get("interval") or (ours, ours)
     slack = 1.0 if claim.exact else FACTOR
-    verdict: Outcome = "reproduced" if low / slack <= claim.value <= high * slack else "not reproduced"
+    verdict: VerdictName = "reproduced" if low / slack <= claim.value <= high * slack else "not reproduced"
     said = f"{claim.metric} is {ours:.3g}" + (f" (n = {found['n']})" if found.get("n") else "")
     reason = "; ".join(part for part in (claim.reason, said) if part)
     return Judgement(claim, low, high, verdict, reason, (claim.evidence,))
@@ -113,7 +113,7 @@ def _by_loops(claim: Claim, ranges: Mapping[str, tuple[float, float]]) -> Judgem
         return Judgement(claim, np.nan, np.nan, "open", f"no controller '{claim.controller}' to run")
     holding = [loop for loop, values in ranges.items() if _holds(claim, *values)]
     shown = ", ".join(f"{loop} {interval(*values)}" for loop, values in ranges.items())
-    verdict: Outcome = "reproduced" if len(holding) == len(ranges) else "not reproduced"
+    verdict: VerdictName = "reproduced" if len(holding) == len(ranges) else "not reproduced"
     where = f"holds on {' and '.join(holding)} only" if holding and verdict == "not reproduced" else ""
     best = holding[0] if holding else next(iter(ranges))
     reason = "; ".join(part for part in (where, claim.reason, shown) if part)

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from wristctl.config.section import Section, choice, quantity
 
-Outcome = Literal["reproduced", "not reproduced", "contradictory", "not specified enough", "open", "taken over"]
+VerdictName = Literal["reproduced", "not reproduced", "contradictory", "not specified enough", "open", "taken over"]
 
 _NEEDED = {
     "comparison": ("value", "controller", "gains", "metric"),
@@ -31,7 +31,7 @@ class Claim(Section):
     controller: str | None = None
     gains: str | None = None
     metric: str | None = None
-    verdict: Outcome | None = None
+    verdict: VerdictName | None = None
     reason: str = ""
 
     @model_validator(mode="after")

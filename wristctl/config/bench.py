@@ -30,7 +30,7 @@ FaultKind = Literal[
 ]  # fmt: skip
 
 
-class Fault(Section):
+class InjectedFault(Section):
     """Something that goes wrong during each trial."""
 
     kind: FaultKind = choice("port-lost", "; ".join(f"{kind}: {what}" for kind, what in FAULTS.items()))
@@ -92,4 +92,4 @@ class BenchSettings(Section):
     actuator: StepperActuator = StepperActuator()
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
-    faults: tuple[Fault, ...] = choice((), "what goes wrong in each trial")
+    faults: tuple[InjectedFault, ...] = choice((), "what goes wrong in each trial")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from wristctl.config.loop import LOOPS, Direction, Loop, Loops, Reference, Scenario
+from wristctl.config.loop import LOOPS, DirectionName, Loop, Loops, Reference, Scenario
 from wristctl.config.section import Section, choice, quantity
 
-Gains = str | dict[str, float]
+GainsChoice = str | dict[str, float]
 
 
 class Row(Section):
     """One controller with one set of gains."""
 
     controller: str = choice("smc", "name in the table of controllers")
-    gains: Gains = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    gains: GainsChoice = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
 
     @property
     def gains_name(self) -> str:
@@ -85,7 +85,9 @@ class CompareSettings(Section):
     inverses: tuple[Literal["none", "exact", "network"], ...] = choice(
         ("network", "exact"), "how tip targets become angles; overrides the references' own", min_length=1
     )
-    directions: tuple[Direction, ...] = choice(("ulnar",), "directions of bending, each by its own plane", min_length=1)
+    directions: tuple[DirectionName, ...] = choice(
+        ("ulnar",), "directions of bending, each by its own plane", min_length=1
+    )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
@@ -96,10 +98,10 @@ class SimulateSettings(Section):
     """One closed loop."""
 
     controller: str = choice("smc", "name in the table of controllers")
-    gains: Gains = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    gains: GainsChoice = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
-    direction: Direction = choice("ulnar", "direction of bending; the reference's angle counts toward it")
+    direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")
     start: Literal["straight", "equilibrium"] = choice(
         "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
     )

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.control import Row
-from wristctl.config.loop import Direction, Loop, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
@@ -81,7 +81,7 @@ class HwRunSettings(RigSettings):
     rows: tuple[Row, ...] = choice(
         (Row(controller="smc-tracking", gains="stepper"),), "controllers and gains", min_length=1
     )
-    directions: tuple[Direction, ...] = choice(
+    directions: tuple[DirectionName, ...] = choice(
         ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1
     )
     repetitions: int = choice(1, "of each direction", ge=1, le=1000)

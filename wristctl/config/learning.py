@@ -89,9 +89,7 @@ class NetworkSettings(Section):
         "adam couples weight decay to the gradient (as printed, C11: collapses), adamw does not; levenberg-marquardt "
         "takes all samples in one step of second order: for small networks, without rate, schedule, beta1 and batch",
     )
-    standardise: bool = choice(
-        True, "scale inputs and outputs to zero mean and unit deviation; false: raw, as printed"
-    )
+    standardise: bool = choice(True, "scale inputs and outputs to zero mean and unit deviation; false: raw, as printed")
     learning_rate: float = quantity(0.003, "", "learning rate at the start", "paper T1", gt=0)
     schedule: Literal["constant", "cosine"] = choice("constant", "learning rate over the epochs; cosine falls to zero")
     beta1: float = quantity(0.90, "", "Adam's beta1, sgd's momentum", "paper T1", ge=0, lt=1)
@@ -123,7 +121,7 @@ class NetworkSettings(Section):
             )
 
 
-class Row(NetworkSettings):
+class NetworkRow(NetworkSettings):
     """One of several networks trained on the same data."""
 
     name: str = choice("", "its name in tables and metrics", pattern=r"[a-z0-9][a-z0-9-]*")
@@ -166,7 +164,7 @@ class TrainSettings(NetworkSettings):
         ge=1,
         le=100,
     )
-    rows: tuple[Row, ...] = choice((), "several networks side by side, in place of the one above")
+    rows: tuple[NetworkRow, ...] = choice((), "several networks side by side, in place of the one above")
     search: bool = choice(False, "choose layers and activation by cross-validation over the grid, then train that")
     grid: Grid = Grid()
     workers: int = choice(0, "processes at once, whose number changes no byte; 0: one for each core", ge=0, le=256)

@@ -45,9 +45,7 @@ def _read(file: Path) -> Document:
     try:
         text = file.read_bytes()
     except OSError as error:
-        raise UserError(
-            f"cannot read the configuration: {error.strerror}", str(file), "check the path"
-        ) from error
+        raise UserError(f"cannot read the configuration: {error.strerror}", str(file), "check the path") from error
     document = parse_yaml(text, str(file))
     if document.data is not None and not isinstance(document.data, dict):
         raise UserError(

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, model_validator
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import Section, choice, quantity
 
-Inverse = Literal["none", "exact", "network"]
-Direction = Literal["ulnar", "radial", "flexion", "extension"]
+InverseName = Literal["none", "exact", "network"]
+DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 
 class Loop(Section):
@@ -49,7 +49,7 @@ class Reference(Section):
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine", "assumed", gt=0)
-    inverse: Inverse = choice(
+    inverse: InverseName = choice(
         "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
     )
 

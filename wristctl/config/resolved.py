@@ -79,7 +79,5 @@ def _scalar(value: Any) -> str:
             return value
         return yaml.safe_dump(value, default_style='"', width=10**9, allow_unicode=True).strip()
     return (
-        {None: "null", True: "true", False: "false"}[value]
-        if value is None or isinstance(value, bool)
-        else repr(value)
+        {None: "null", True: "true", False: "false"}[value] if value is None or isinstance(value, bool) else repr(value)
     )

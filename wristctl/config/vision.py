@@ -57,7 +57,7 @@ class SceneSettings(Section):
     noise: float = quantity(4.0, "", "standard deviation of each pixel, of 255", "assumed", ge=0)
 
 
-class Board(Section):
+class CharucoBoard(Section):
     """The ChArUco board for calibration (dictionary 5x5_50, whose ids no wrist marker shares)."""
 
     columns: int = choice(7, "squares across", ge=3, le=12)
@@ -93,7 +93,7 @@ class CalibrateCameraSettings(Section):
     coverage: float = quantity(0.6, "", "least share of the picture in which corners were seen", "assumed", gt=0, le=1)
     tilt_deg: float = quantity(15.0, "deg", "least tilt of the most tilted view", "assumed", ge=0, lt=60)
     error: float = quantity(1.0, "px", "largest reprojection error (RMS)", "assumed", gt=0)
-    board: Board = Board()
+    board: CharucoBoard = CharucoBoard()
     device: Device = Device()
     scene: SceneSettings = SceneSettings()
 

@@ -30,5 +30,5 @@ PID = Controller(
     },
     presets={"printed": (1e4, 5e3, 2e3)},
     memory=1,
-    notes={"printed": "the paper's \"crude tuning\", read as torque (C12) with the sign turned (C7)"},
+    notes={"printed": 'the paper\'s "crude tuning", read as torque (C12) with the sign turned (C7)'},
 )

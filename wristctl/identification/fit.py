@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.forward import Candidate, angles
-from wristctl.identification.trials import Trial
+from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
 from wristctl.lanes.cores import cores
 
@@ -34,7 +34,7 @@ class Problem:
     zero angle of each run and plane, and the zero of each spool of each run.
     """
 
-    trials: Sequence[Trial]
+    trials: Sequence[MeasuredTrial]
     start: Mapping[str, float]
     settings: IdentifySettings
 
@@ -80,15 +80,15 @@ class Problem:
             held[name] = UNKNOWNS[name].value(float(at), self.start[name])
         return {name: held[name] for name in UNKNOWNS}
 
-    def candidate(self, trial: Trial, x: Array, **known: Any) -> Candidate:
+    def candidate(self, trial: MeasuredTrial, x: Array, **known: Any) -> SupposedWrist:
         """The trial's wrist and tendons at coordinates x; `known` parameters of the wrist changed."""
         values = self.values(x)
         own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")} | known
         one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
         wrist = trial.wrist.model_copy(update=own)
-        return Candidate(wrist, values["tendon_stiffness"], values["friction"], (one, two, three, four))
+        return SupposedWrist(wrist, values["tendon_stiffness"], values["friction"], (one, two, three, four))
 
-    def simulate(self, trial: Trial, candidates: Sequence[Candidate]) -> Array:
+    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist]) -> Array:
         """Angles (count, T) of the candidates in a trial."""
         return angles(candidates, trial.reeled, self.settings.step, self.settings.segments)
 
@@ -96,11 +96,11 @@ class Problem:
 _ZERO, _SPOOL = "zero", "spool"
 
 
-def _zero(trial: Trial) -> str:
+def _zero(trial: MeasuredTrial) -> str:
     return f"{_ZERO} {trial.run} {trial.plane}"
 
 
-def _spool(trial: Trial, tendon: int) -> str:
+def _spool(trial: MeasuredTrial, tendon: int) -> str:
     return f"{_SPOOL} {trial.run} {tendon}"
 
 
@@ -118,7 +118,7 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     """Expected angles and their derivatives at coordinates x; the finite differences are lanes beside the angles."""
     coordinates, delay = problem.coordinates, problem.values(x)["delay"]
 
-    def one(trial: Trial) -> tuple[Array, Array]:
+    def one(trial: MeasuredTrial) -> tuple[Array, Array]:
         moved = [name for name in problem.free if name in SIMULATED] + [_spool(trial, each) for each in trial.tendons]
         nudges = [_NUDGE_M if name.startswith(_SPOOL) else _NUDGE for name in moved]
         near = [x + nudge * (np.arange(len(x)) == coordinates[name]) for name, nudge in zip(moved, nudges, strict=True)]

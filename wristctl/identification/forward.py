@@ -27,7 +27,7 @@ SETTLE = 0.5
 """Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast."""
 
 
-class Candidate(NamedTuple):
+class SupposedWrist(NamedTuple):
     """A wrist and its tendons as they may be: stiffness of one tendon [N/m], capstan friction.
 
     `taut` is what each tendon has reeled in more [m] than its spool's count says: two of the + side, two of the -.
@@ -71,7 +71,7 @@ def _advance(models: Any, tendons: Any, reeled: Any, h: float, settle: int, stat
             omega[i] = where(alive > zero, omega[i], zero)
 
 
-def angles(candidates: Sequence[Candidate], reeled: Array, h: float, n: int) -> Array:
+def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int) -> Array:
     """Bending angles (count, T) [rad] of the candidates, cut into n segments, at steps of h [s].
 
     `reeled` (T, 4) [m] is what the spools have reeled in since the straight wrist's tendons were taut and free of

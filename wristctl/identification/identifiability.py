@@ -17,7 +17,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification.fit import Fit, Problem, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
-from wristctl.identification.trials import Trial
+from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import UNKNOWNS
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Addition:
     enough: bool
 
 
-Added = Callable[[Trial], Trial]
+Added = Callable[[MeasuredTrial], MeasuredTrial]
 
 _ACROSS = 6.94
 """Gravity across each of the two bending planes of a level forearm that is rolled by 45 deg [m/s^2]."""
@@ -70,19 +70,19 @@ _POSE = f"of a level forearm rolled by 45 deg (wrist.gravity: [0, {_ACROSS}], wr
 _MASS = "with 0.2 kg more in the hand, added to wrist.hand_mass"
 
 
-def _as_is(trial: Trial) -> Trial:
+def _as_is(trial: MeasuredTrial) -> MeasuredTrial:
     return trial
 
 
-def _fast(trial: Trial) -> Trial:
+def _fast(trial: MeasuredTrial) -> MeasuredTrial:
     return trial.faster(3.0)
 
 
-def _across(trial: Trial) -> Trial:
+def _across(trial: MeasuredTrial) -> MeasuredTrial:
     return replace(trial, wrist=trial.wrist.model_copy(update={"gravity": (0.0, _ACROSS)}))
 
 
-def _heavier(trial: Trial) -> Trial:
+def _heavier(trial: MeasuredTrial) -> MeasuredTrial:
     return replace(trial, wrist=trial.wrist.model_copy(update={"hand_mass": trial.wrist.hand_mass + 0.2}))
 
 
@@ -121,7 +121,7 @@ def _addition(fit: Fit, x: Array, what: str, move: Added, load: Added) -> Additi
     return Addition(what, widths, enough)
 
 
-def _following(problem: Problem, x: Array, trial: Trial, load: Added) -> Trial:
+def _following(problem: Problem, x: Array, trial: MeasuredTrial, load: Added) -> MeasuredTrial:
     """The trial under another load, its angle as it was: one side's spools pull more, the other's keep theirs."""
     loaded = load(trial)
     before, after = (problem.simulate(each, [problem.candidate(each, x)])[0] for each in (trial, loaded))

@@ -25,7 +25,7 @@ _INSTANTS = 5
 
 
 @dataclass(frozen=True)
-class Trial:
+class MeasuredTrial:
     """One motion of a wrist in one bending plane: T instants on a grid, F frames."""
 
     label: str
@@ -55,17 +55,17 @@ class Trial:
         found: Array = np.interp(self.captured - delay + since[:, None], self.time, course).mean(axis=0)
         return found
 
-    def faster(self, factor: float) -> Trial:
+    def faster(self, factor: float) -> MeasuredTrial:
         """The same motion in a fraction of the time, then at rest, as often seen."""
         earlier = np.minimum(self.time[0] + factor * (self.time - self.time[0]), self.time[-1])
         reeled = np.stack([np.interp(earlier, self.time, each) for each in self.reeled.T], axis=1)
         return replace(self, reeled=reeled)
 
 
-def trials_of(
+def measured_trials(
     label: str, wrist: WristParameters, step_length: float, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
     kinds: pd.DataFrame, exposure: float = 0.0,
-) -> list[Trial]:  # fmt: skip
+) -> list[MeasuredTrial]:  # fmt: skip
     """The trials of a run's tables log, frames and trials, without a person's push, on a grid [s].
 
     `step_length` is what one microstep reels in [m], `exposure` how long the shutter is open [s]. UserError where no
@@ -85,7 +85,7 @@ def trials_of(
         usable &= (captured >= time[0]) & (captured <= time[-1])
         if usable.sum() < _FEWEST:
             continue
-        trial = Trial(
+        trial = MeasuredTrial(
             f"{label}, trial {number}: {direction}", label, DIRECTIONS[direction].plane, in_plane(wrist, direction),
             time, np.empty((len(time), 4)), captured[usable], angle[usable], exposure,
         )  # fmt: skip

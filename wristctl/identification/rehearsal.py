@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.config.loop import Direction, Loop, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.identification.forward import Candidate, angles
+from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import actuate, at_rest, drive_of
@@ -35,7 +35,7 @@ _PERIOD, _LOGGED = 1e-3, 5
 
 
 @dataclass(frozen=True)
-class Truth:
+class RehearsedTruth:
     """What the bench has and its user does not know.
 
     The marker's zero angle [deg] in the ulnar and the flexion plane, and what tendons 1, 2, 4, 5 have reeled in more
@@ -75,7 +75,7 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
 
 
 def rehearse(
-    wrist: WristParameters, truth: Truth, moves: Sequence[tuple[Direction, Reference]], horizon: float,
+    wrist: WristParameters, truth: RehearsedTruth, moves: Sequence[tuple[DirectionName, Reference]], horizon: float,
     rng: np.random.Generator,
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:  # fmt: skip
     """The tables log, frames and trials of moves, each from rest, by a controller that believes in `wrist`."""
@@ -108,9 +108,9 @@ def rehearse(
     return pd.concat(logs), pd.concat(seen), pd.DataFrame(kinds)
 
 
-def _own(truth: Truth, direction: Direction) -> Candidate:
+def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
     actuator = truth.actuator
     wrist = in_plane(truth.wrist, direction)
-    return Candidate(wrist, actuator.tendon_stiffness, actuator.friction, (one, two, three, four))
+    return SupposedWrist(wrist, actuator.tendon_stiffness, actuator.friction, (one, two, three, four))

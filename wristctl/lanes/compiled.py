@@ -21,7 +21,7 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT_DAYS = 30.0
-_ABOVE = {"cli", "report", "benchmark", "tuning", "runs"}
+_ABOVE = {"cli", "report", "comparison", "tuning", "records"}
 """Packages that compiled code does not rest on."""
 
 

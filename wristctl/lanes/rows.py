@@ -161,4 +161,3 @@ def planes_like(typingctx: Any, rows: RowsType) -> Any:
 def square_like(typingctx: Any, rows: RowsType) -> Any:
     """A scratch matrix of lanes, uninitialised, with a row and a column for each of `rows`."""
     return _scratch(RowsType(LaneType(rows.element.width), rows.size, columns=rows.size or 1), rows)
-

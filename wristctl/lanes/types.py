@@ -69,9 +69,7 @@ class RowsType(types.Type):
     Rows may name their first entries: with `fields`, `rows.theta` is `rows[fields.index("theta")]`.
     """
 
-    def __init__(
-        self, element: Any, size: int | None, columns: int = 1, fields: tuple[str, ...] = ()
-    ) -> None:
+    def __init__(self, element: Any, size: int | None, columns: int = 1, fields: tuple[str, ...] = ()) -> None:
         self.element, self.size, self.columns, self.fields = element, size, columns, fields
         super().__init__(name=f"rows({element}, {size}, {columns}, {','.join(fields)})")
 
@@ -109,9 +107,7 @@ def _number_to_lane(context: Any, builder: Any, fromty: types.Type, toty: LaneTy
     return repeat(builder, context.cast(builder, value, fromty, types.float64), toty.llvm)
 
 
-def define(
-    function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide], emit: Callable[..., Any]
-) -> None:
+def define(function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide], emit: Callable[..., Any]) -> None:
     """Teach numba `function` on these types by `emit(builder, *values)`; numbers among the lanes are repeated."""
 
     def lowered(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:

@@ -13,8 +13,8 @@ import torch
 
 from wristctl.config.errors import UserError
 from wristctl.learning.dataset import Samples
-from wristctl.learning.trial import Job
-from wristctl.runs.files import replacing
+from wristctl.learning.training_result import Job
+from wristctl.records.files import replacing
 
 
 def fingerprint(samples: Samples, job: Job) -> str:

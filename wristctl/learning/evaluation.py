@@ -6,19 +6,19 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from wristctl.learning import metrics
+from wristctl.learning.angle_errors import MEASURES as OF_ANGLES
+from wristctl.learning.angle_errors import angle_errors, error_map
 from wristctl.learning.baseline import Polynomial
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
 from wristctl.learning.inference import compiled_network
-from wristctl.learning.metrics import angle_errors, error_map
-from wristctl.learning.trial import Trial
+from wristctl.learning.training_result import TrainingResult
 from wristctl.wrist.kinematics import Array, exact_angle
 
 HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
 """Names of the places where samples were held out, by why."""
 
 MEASURES: dict[str, tuple[str, str]] = {
-    **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in metrics.MEASURES.items()},
+    **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in OF_ANGLES.items()},
     "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
     "workspace_max_error_deg": ("deg", "largest error on a dense grid over the whole domain"),
     "held_out_payloads_rmse_deg": ("deg", "RMSE of the angle at payloads kept from training"),
@@ -57,7 +57,7 @@ def places(samples: Samples, split: Split) -> list[Place]:
 
 
 def inverses(
-    trial: Trial, samples: Samples, split: Split
+    trial: TrainingResult, samples: Samples, split: Split
 ) -> dict[str, tuple[Callable[[Array], Array], int, int]]:
     """The network, a polynomial of all inputs and the exact inverse: angles of inputs, parameters, multiply-adds."""
     network = trial.network
@@ -70,7 +70,7 @@ def inverses(
     }
 
 
-def measures(trial: Trial, where: Sequence[Place]) -> dict[str, float]:
+def measures(trial: TrainingResult, where: Sequence[Place]) -> dict[str, float]:
     """Every one of MEASURES, NaN for places that these data do not have."""
     columns, angle = trial.network.sizes[0], compiled_network(trial.network)
     found = {

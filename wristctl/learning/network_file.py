@@ -16,7 +16,7 @@ from wristctl.config.learning import Activation
 from wristctl.config.section import Section
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
-from wristctl.runs.files import replacing
+from wristctl.records.files import replacing
 from wristctl.wrist.kinematics import Array
 
 ENTRY = "wristctl"

@@ -16,7 +16,7 @@ from typing import Any
 from wristctl.config.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.training import train_one
-from wristctl.learning.trial import Epoch, Job, Trial
+from wristctl.learning.training_result import Epoch, Job, TrainingResult
 
 Report = Callable[[int, Epoch], None]
 """Told the job's number and its last epoch."""
@@ -31,11 +31,11 @@ def train_all(
     device: str = "cpu",
     checkpoints: Path | None = None,
     report: Report = lambda job, epoch: None,
-) -> list[Trial]:
+) -> list[TrainingResult]:
     """Do all jobs, `workers` at once, and give their trials in order; after Ctrl-C those that had begun."""
     if min(workers, len(jobs)) > 1:
         return _over_processes(samples, jobs, min(workers, len(jobs)), device, checkpoints, report)
-    trials: list[Trial] = []
+    trials: list[TrainingResult] = []
     for number, job in enumerate(jobs):
         try:
             trial = train_one(samples, job, device, checkpoints, partial(report, number))
@@ -51,7 +51,7 @@ def train_all(
 
 def _over_processes(
     samples: Samples, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
-) -> list[Trial]:
+) -> list[TrainingResult]:
     context = multiprocessing.get_context("spawn")
     told, stop = context.SimpleQueue(), context.Event()
     given = {"samples": samples, "device": device, "checkpoints": checkpoints, "told": told, "stop": stop}
@@ -59,7 +59,7 @@ def _over_processes(
     try:
         with ProcessPoolExecutor(workers, context, _begin, (given,)) as pool:
             futures = [pool.submit(_work, number, job) for number, job in enumerate(jobs)]
-            pending: set[Future[Trial | None]] = set(futures)
+            pending: set[Future[TrainingResult | None]] = set(futures)
             while pending:
                 try:
                     _, pending = wait(pending, timeout=0.2)
@@ -95,7 +95,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _work(number: int, job: Job) -> Trial | None:
+def _work(number: int, job: Job) -> TrainingResult | None:
     def report(epoch: Epoch) -> None:
         if _given["stop"].is_set():
             raise KeyboardInterrupt

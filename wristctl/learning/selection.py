@@ -11,12 +11,12 @@ import numpy as np
 from wristctl.config.errors import UserError
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.learning.dataset import Split
-from wristctl.learning.trial import Job, Trial
+from wristctl.learning.training_result import Job, TrainingResult
 from wristctl.wrist.kinematics import Array
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CrossValidated:
     """One point of the grid and what the folds said of it."""
 
     settings: NetworkSettings
@@ -40,9 +40,9 @@ class Candidate:
 class Choice:
     """The whole grid, the chosen point of it, the one with the least error, and the reason in words."""
 
-    found: Sequence[Candidate]
-    chosen: Candidate
-    best: Candidate
+    found: Sequence[CrossValidated]
+    chosen: CrossValidated
+    best: CrossValidated
     reason: str
 
 
@@ -54,8 +54,7 @@ def grid_points(settings: TrainSettings) -> list[NetworkSettings]:
     decays = grid.weight_decays or (settings.weight_decay,)
     return [
         NetworkSettings.model_validate(
-            base
-            | {"hidden": hidden, "activation": activation, "learning_rate": rate, "weight_decay": decay}
+            base | {"hidden": hidden, "activation": activation, "learning_rate": rate, "weight_decay": decay}
         )
         for activation, hidden, rate, decay in product(grid.activations, grid.layers(), rates, decays)
     ]
@@ -78,7 +77,7 @@ def fold_jobs(points: Sequence[NetworkSettings], split: Split, folds: int, seed:
     ]
 
 
-def candidates(trials: Sequence[Trial], folds: int) -> list[Candidate]:
+def candidates(trials: Sequence[TrainingResult], folds: int) -> list[CrossValidated]:
     """The grid's points out of the trials of `fold_jobs`."""
     found = []
     for first in range(0, len(trials), folds):
@@ -86,11 +85,11 @@ def candidates(trials: Sequence[Trial], folds: int) -> list[Candidate]:
         losses = np.array([trial.validation_loss for trial in own])
         rmse = np.sqrt(np.where(np.isfinite(losses), losses, np.inf))
         network = own[0].network
-        found.append(Candidate(own[0].job.settings, len(network.weights) - 1, network.multiply_adds, rmse))
+        found.append(CrossValidated(own[0].job.settings, len(network.weights) - 1, network.multiply_adds, rmse))
     return found
 
 
-def choose(found: Sequence[Candidate]) -> Choice:
+def choose(found: Sequence[CrossValidated]) -> Choice:
     """The network of the fewest multiply-adds within one standard error of the least error.
 
     Breiman et al., Classification and Regression Trees (1984), section 3.4. Raises UserError where all diverged.
@@ -109,5 +108,5 @@ def choose(found: Sequence[Candidate]) -> Choice:
     return Choice(found, chosen, best, reason)
 
 
-def _named(candidate: Candidate) -> str:
+def _named(candidate: CrossValidated) -> str:
     return f"{'-'.join(map(str, candidate.settings.hidden))} {candidate.settings.activation}"

@@ -20,7 +20,7 @@ from wristctl.learning.checkpoint import fingerprint, read_checkpoint, write_che
 from wristctl.learning.dataset import Samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt, blocks
 from wristctl.learning.network import LEAK, Network, Scaler
-from wristctl.learning.trial import Epoch, Job, Trial
+from wristctl.learning.training_result import Epoch, Job, TrainingResult
 
 DTYPE = torch.float64
 """Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding."""
@@ -43,7 +43,7 @@ def train_one(
     device: str = "cpu",
     checkpoints: Path | None = None,
     report: Callable[[Epoch], None] = lambda epoch: None,
-) -> Trial:
+) -> TrainingResult:
     """Train one network; `report` is called after each epoch and may raise KeyboardInterrupt to end it there.
 
     With a folder of checkpoints the training goes on from its checkpoint there, and leaves one now and then. Raises
@@ -72,7 +72,7 @@ def train_one(
             interrupted = True
         model, loss = course.kept()
         norm = problem.gradient_norm(model)
-        return Trial(job, problem.export(model), tuple(course.epochs), loss, norm, interrupted)
+        return TrainingResult(job, problem.export(model), tuple(course.epochs), loss, norm, interrupted)
 
 
 class _Problem:

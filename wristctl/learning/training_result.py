@@ -41,7 +41,7 @@ class Epoch:
 
 
 @dataclass(frozen=True)
-class Trial:
+class TrainingResult:
     """What came of one training."""
 
     job: Job
@@ -56,7 +56,7 @@ class Trial:
     """whether Ctrl-C ended it early; the network is then that of the last whole epoch"""
 
 
-def best_of(trials: list[Trial]) -> Trial:
+def best_of(trials: list[TrainingResult]) -> TrainingResult:
     """The trial with the least validation loss. Raises UserError where every one of them diverged."""
     finite = [trial for trial in trials if math.isfinite(trial.validation_loss)]
     if not finite:

@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 
 import wristctl
-from wristctl.runs.files import files_below, sha256_of, sha256_of_list
-from wristctl.runs.manifest import Code
+from wristctl.records.files import files_below, sha256_of, sha256_of_list
+from wristctl.records.manifest import Code
 
 _PACKAGE = Path(wristctl.__file__).resolve().parent
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wristctl.config.strict_yaml import parse_yaml
-from wristctl.runs.manifest import CONFIG, PACKAGES, SOURCES
-from wristctl.runs.run import Run
+from wristctl.records.manifest import CONFIG, PACKAGES, SOURCES
+from wristctl.records.run import Run
 
 _FACTS = ("python", "os", "machine", "cpu", "cores")
 
@@ -80,9 +80,7 @@ def _environment(a: Run, b: Run) -> list[Change]:
         {name: getattr(run.manifest.environment, name) for name in _FACTS} | run.manifest.environment.threads
         for run in (a, b)
     ]
-    packages = [
-        run.manifest.environment.packages | _listing(run.path / PACKAGES, "==", 0) for run in (a, b)
-    ]
+    packages = [run.manifest.environment.packages | _listing(run.path / PACKAGES, "==", 0) for run in (a, b)]
     return changes(*facts) + changes(*packages)
 
 

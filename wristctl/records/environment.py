@@ -8,7 +8,7 @@ import platform
 from importlib import metadata
 from pathlib import Path
 
-from wristctl.runs.manifest import Environment
+from wristctl.records.manifest import Environment
 
 _NUMERICAL = ("numpy", "scipy", "numba", "llvmlite", "torch", "pandas", "matplotlib")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")

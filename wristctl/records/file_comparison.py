@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from wristctl.runs.files import sha256_of
-from wristctl.runs.formats import read_arrays, read_table
+from wristctl.records.files import sha256_of
+from wristctl.records.formats import read_arrays, read_table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,17 +21,17 @@ _PIXELS = 0.02
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-class Likeness(NamedTuple):
+class FileComparison(NamedTuple):
     """A verdict, and where the files differ or by how much."""
 
     verdict: Literal["identical", "within tolerance", "differs"]
     detail: str = ""
 
 
-def likeness(before: Path, after: Path) -> Likeness:
+def compare_files(before: Path, after: Path) -> FileComparison:
     """Compare two files of the same name by what they hold."""
     if sha256_of(before) == sha256_of(after):
-        return Likeness("identical")
+        return FileComparison("identical")
     try:
         match before.suffix:
             case ".csv":
@@ -49,12 +49,12 @@ def likeness(before: Path, after: Path) -> Likeness:
             case _:
                 return _texts(before.read_text(encoding="utf-8"), after.read_text(encoding="utf-8"))
     except (ValueError, OSError, KeyError) as error:
-        return Likeness("differs", f"cannot be compared by content: {error}")
+        return FileComparison("differs", f"cannot be compared by content: {error}")
 
 
-def _tables(a: pd.DataFrame, b: pd.DataFrame) -> Likeness:
+def _tables(a: pd.DataFrame, b: pd.DataFrame) -> FileComparison:
     if list(a.columns) != list(b.columns) or len(a) != len(b):
-        return Likeness("differs", f"{_size(a)} before, {_size(b)} now")
+        return FileComparison("differs", f"{_size(a)} before, {_size(b)} now")
     columns = {str(name): (a[name].to_numpy(), b[name].to_numpy()) for name in a.columns}
     return _first(columns, a["time"].to_numpy() if "time" in a else None, "column")
 
@@ -63,15 +63,15 @@ def _size(frame: pd.DataFrame) -> str:
     return f"{len(frame)} rows of {len(frame.columns)} columns"
 
 
-def _arrays(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> Likeness:
+def _arrays(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> FileComparison:
     shapes = [{name: array.shape for name, array in each.items()} for each in (a, b)]
     if shapes[0] != shapes[1]:
         odd = sorted(name for name in shapes[0] | shapes[1] if shapes[0].get(name) != shapes[1].get(name))
-        return Likeness("differs", f"array {odd[0]}: {shapes[0].get(odd[0])} before, {shapes[1].get(odd[0])} now")
+        return FileComparison("differs", f"array {odd[0]}: {shapes[0].get(odd[0])} before, {shapes[1].get(odd[0])} now")
     return _first({name: (a[name], b[name]) for name in a}, a.get("time"), "array")
 
 
-def _first(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -> Likeness:
+def _first(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -> FileComparison:
     """The earliest place at which any pair of arrays differs; the first of the pairs where several do."""
     import numpy as np
 
@@ -90,30 +90,32 @@ def _first(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -> Likeness:
             row = at[0] if len(at) == 1 else list(at)
             places.append((instant, at, f"{what} {name} from " + (f"time {instant:g} s" if known else f"row {row}")))
     if not places:
-        return Likeness("within tolerance", f"largest difference {largest:.2g}")
+        return FileComparison("within tolerance", f"largest difference {largest:.2g}")
     instant, at, said = min(places, key=lambda place: place[:2])
-    return Likeness("differs", f"{said}; largest difference {largest:.2g}")
+    return FileComparison("differs", f"{said}; largest difference {largest:.2g}")
 
 
-def _pictures(a: np.ndarray, b: np.ndarray) -> Likeness:
+def _pictures(a: np.ndarray, b: np.ndarray) -> FileComparison:
     import numpy as np
 
     if a.shape != b.shape:
-        return Likeness("differs", f"{a.shape[1]} x {a.shape[0]} pixels before, {b.shape[1]} x {b.shape[0]} now")
+        return FileComparison("differs", f"{a.shape[1]} x {a.shape[0]} pixels before, {b.shape[1]} x {b.shape[0]} now")
     mean = float(np.abs(a.astype(float) - b.astype(float)).mean())
-    return Likeness("within tolerance" if mean <= _PIXELS else "differs", f"mean difference of pixels {mean:.2g} of 1")
+    return FileComparison(
+        "within tolerance" if mean <= _PIXELS else "differs", f"mean difference of pixels {mean:.2g} of 1"
+    )
 
 
-def _texts(a: str, b: str) -> Likeness:
+def _texts(a: str, b: str) -> FileComparison:
     """Text alike but for numbers within tolerance: JSON, SVG."""
     if _NUMBER.sub("0", a) != _NUMBER.sub("0", b):
         line = next((n for n, (x, y) in enumerate(zip(a.splitlines(), b.splitlines(), strict=False), 1) if x != y), 1)
-        return Likeness("differs", f"from line {line}")
+        return FileComparison("differs", f"from line {line}")
     ours, theirs = list(_NUMBER.finditer(a)), list(_NUMBER.finditer(b))
     largest = 0.0
     for x, y in zip(ours, theirs, strict=True):
         away = abs(float(x[0]) - float(y[0]))
         if away > ABSOLUTE + RELATIVE * abs(float(x[0])):
-            return Likeness("differs", f"line {a.count(chr(10), 0, x.start()) + 1}: {x[0]} before, {y[0]} now")
+            return FileComparison("differs", f"line {a.count(chr(10), 0, x.start()) + 1}: {x[0]} before, {y[0]} now")
         largest = max(largest, away)
-    return Likeness("within tolerance", f"largest difference {largest:.2g}")
+    return FileComparison("within tolerance", f"largest difference {largest:.2g}")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
-from wristctl.runs.index import RESULTS, indexed, run_names
-from wristctl.runs.manifest import MANIFEST, command_of
-from wristctl.runs.run import Run
+from wristctl.records.index import RESULTS, indexed, run_names
+from wristctl.records.manifest import MANIFEST, command_of
+from wristctl.records.run import Run
 
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
@@ -49,9 +49,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
     """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError."""
     run = open_run(ref, results)
     if kind is not None and run.kind != kind:
-        raise UserError(
-            f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
-        )
+        raise UserError(f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}")
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {command_of(run.kind)}` again")
     run.check()

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wristctl.runs.files import replacing
+from wristctl.records.files import replacing
 
 if TYPE_CHECKING:
     import numpy as np

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError
-from wristctl.runs.manifest import MANIFEST, SUMS
-from wristctl.runs.run import Run
+from wristctl.records.manifest import MANIFEST, SUMS
+from wristctl.records.run import Run
 
 RESULTS = Path("results")
 INDEX = ".index.json"
@@ -20,7 +20,7 @@ _SCHEMA = "wristctl.index/1"
 
 
 @dataclass(frozen=True)
-class Entry:
+class IndexEntry:
     """A run in one line; `note` says why it failed or is broken, `metrics` are the values by name."""
 
     id: str
@@ -52,7 +52,7 @@ def run_names(results: Path) -> list[str]:
         ) from error
 
 
-def indexed(results: Path, renew: bool = True) -> list[Entry]:
+def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
     """All runs of a results folder, oldest first, without their tags.
 
     Sealed runs do not change, so theirs are kept in the folder's `.index.json`, which may be deleted at any time; an
@@ -65,7 +65,7 @@ def indexed(results: Path, renew: bool = True) -> list[Entry]:
     for name in run_names(results):
         stamp, old = _stamp(f"{results}/{name}"), known.get(name)
         if stamp and old and old[0] == stamp:
-            entry, kept[name] = Entry(**old[1]), old
+            entry, kept[name] = IndexEntry(**old[1]), old
         else:
             entry = _entry(Run(results / name))
             if stamp and entry.state not in ("running", "broken", "crashed"):
@@ -76,16 +76,20 @@ def indexed(results: Path, renew: bool = True) -> list[Entry]:
     return found
 
 
-def _entry(run: Run) -> Entry:
+def _entry(run: Run) -> IndexEntry:
     state = run.state
     try:
         manifest = run.manifest
         metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
     except (UserError, AttributeError) as error:
-        return Entry(run.id, "-", "", "broken", "", None, getattr(error, "what", "metrics.json is no table of metrics"))
+        return IndexEntry(
+            run.id, "-", "", "broken", "", None, getattr(error, "what", "metrics.json is no table of metrics")
+        )
     note = manifest.error.what if manifest.error else ""
     timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
-    return Entry(run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs)
+    return IndexEntry(
+        run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs
+    )
 
 
 def _stamp(path: str) -> list[int] | None:
@@ -100,7 +104,7 @@ def _stamp(path: str) -> list[int] | None:
 def _read_index(results: Path) -> dict[str, Any]:
     try:
         index = json.loads((results / INDEX).read_bytes())
-        if index["schema"] == _SCHEMA and index["fields"] == list(Entry.__dataclass_fields__):
+        if index["schema"] == _SCHEMA and index["fields"] == list(IndexEntry.__dataclass_fields__):
             runs: dict[str, Any] = dict(index["runs"])
             return runs
     except (OSError, ValueError, KeyError, TypeError):
@@ -110,7 +114,7 @@ def _read_index(results: Path) -> dict[str, Any]:
 
 def _write_index(results: Path, runs: dict[str, Any]) -> None:
     """Replace the index; a folder that cannot be written does without. Several may list at once: each its own file."""
-    text = json.dumps({"schema": _SCHEMA, "fields": list(Entry.__dataclass_fields__), "runs": runs})
+    text = json.dumps({"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": runs})
     with suppress(OSError):
         descriptor, temporary = tempfile.mkstemp(prefix=".index", dir=results)
         try:

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from wristctl.runs.manifest import CONSOLE, EVENTS
+from wristctl.records.manifest import CONSOLE, EVENTS
 
 
 def now() -> str:
@@ -19,17 +19,17 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
-def plain(value: Any) -> Any:
+def jsonable(value: Any) -> Any:
     """`value` in JSON's terms: NumPy scalars and arrays become numbers and lists, NaN and infinities None."""
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [jsonable(item) for item in value]
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, str | int):
         return value
-    return plain(value.tolist()) if hasattr(value, "tolist") else str(value)
+    return jsonable(value.tolist()) if hasattr(value, "tolist") else str(value)
 
 
 class Journal(logging.Handler):
@@ -47,7 +47,7 @@ class Journal(logging.Handler):
 
     def event(self, name: str, /, **fields: Any) -> None:
         """One line of events.jsonl, on its way to the disk when this returns."""
-        line = json.dumps({"time": now(), "event": name, **plain(fields)}, allow_nan=False) + "\n"
+        line = json.dumps({"time": now(), "event": name, **jsonable(fields)}, allow_nan=False) + "\n"
         with self._writing, suppress(OSError, ValueError):  # ValueError: closed
             self._events.write(line)
             self._events.flush()

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.runs.index import indexed
-from wristctl.runs.manifest import Input
-from wristctl.runs.run import Run
+from wristctl.records.index import indexed
+from wristctl.records.manifest import Input
+from wristctl.records.run import Run
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
-from wristctl.runs import formats
-from wristctl.runs.files import files_below, replacing, sha256_of, sha256_of_list, sync, write_text
-from wristctl.runs.journal import Journal, now, plain
-from wristctl.runs.manifest import (
+from wristctl.records import formats
+from wristctl.records.files import files_below, replacing, sha256_of, sha256_of_list, sync, write_text
+from wristctl.records.journal import Journal, jsonable, now
+from wristctl.records.manifest import (
     CONFIG,
     CONSOLE,
     EVENTS,
@@ -27,12 +27,12 @@ from wristctl.runs.manifest import (
     SOURCES,
     SUMS,
     Column,
+    EndState,
     Error,
     Manifest,
-    Outcome,
     Output,
 )
-from wristctl.runs.readme import readme
+from wristctl.records.readme import readme
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,13 +121,13 @@ class LiveRun:
         meaning: str = "",
     ) -> None:
         """A number of metrics.json (None: there is none): unit, better direction, sample size, interval."""
-        self._metrics[name] = plain(
+        self._metrics[name] = jsonable(
             {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
         )
 
     def numerics(self, **facts: Any) -> None:
         """Note how numbers were computed (dtype, integrator, step, threads) in the manifest."""
-        self._manifest.numerics.update(plain(facts))
+        self._manifest.numerics.update(jsonable(facts))
 
     def volatile(self, name: str) -> None:
         """Keep an output outside the result hash because it holds wall times or the like."""
@@ -137,7 +137,7 @@ class LiveRun:
         """Add to the result in words and tables that README.md shows."""
         self._summary.append(markdown)
 
-    def end(self, state: Outcome, exit_code: int = 0, error: Error | None = None) -> Manifest:
+    def end(self, state: EndState, exit_code: int = 0, error: Error | None = None) -> Manifest:
         """Seal the run: hashes of all outputs, README, report, manifest, SHA256SUMS last. Called by `start_run`."""
         reserve = self.path / _RESERVE
         if state != "ok":

@@ -12,7 +12,7 @@ SOURCES, PATCH, PACKAGES = "code.txt", "code.patch", "environment.txt"
 TABLES = "tables.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
-Outcome = Literal["running", "ok", "failed", "interrupted"]
+EndState = Literal["running", "ok", "failed", "interrupted"]
 
 
 def command_of(kind: str) -> str:
@@ -20,13 +20,13 @@ def command_of(kind: str) -> str:
     return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
 
 
-class Record(BaseModel):
+class ManifestPart(BaseModel):
     """A part of the manifest."""
 
     model_config = ConfigDict(extra="forbid", validate_by_alias=True, validate_by_name=True)
 
 
-class Column(Record):
+class Column(ManifestPart):
     """A column of a table."""
 
     name: str
@@ -34,7 +34,7 @@ class Column(Record):
     meaning: str = ""
 
 
-class Output(Record):
+class Output(ManifestPart):
     """A file that the run wrote; volatile ones (wall times, reports) stand outside the result hash."""
 
     path: str
@@ -44,7 +44,7 @@ class Output(Record):
     columns: list[Column] = []
 
 
-class Input(Record):
+class Input(ManifestPart):
     """An earlier run that this one read; `result_sha256` says what was in it."""
 
     role: str
@@ -54,7 +54,7 @@ class Input(Record):
     result_sha256: str
 
 
-class Code(Record):
+class Code(ManifestPart):
     """The code that ran: version, state of its checkout (null outside one), hash of the package's files."""
 
     version: str
@@ -65,7 +65,7 @@ class Code(Record):
     tree_sha256: str
 
 
-class Environment(Record):
+class Environment(ManifestPart):
     """The machine and the packages that computed; `threads` are the environment's limits on threads."""
 
     python: str
@@ -78,7 +78,7 @@ class Environment(Record):
     packages_sha256: str
 
 
-class Timing(Record):
+class Timing(ManifestPart):
     """UTC times; wall and processor time [s], largest resident memory [MB]."""
 
     started: str
@@ -88,7 +88,7 @@ class Timing(Record):
     max_rss_mb: float | None = None
 
 
-class Error(Record):
+class Error(ManifestPart):
     """Why a run failed."""
 
     type: str
@@ -97,14 +97,14 @@ class Error(Record):
     fix: str = ""
 
 
-class Manifest(Record):
+class Manifest(ManifestPart):
     """Everything about one run but its results."""
 
     schema_: Literal["wristctl.run/1"] = Field(default="wristctl.run/1", alias="schema")
     id: str
     kind: str
     label: str
-    state: Outcome = "running"
+    state: EndState = "running"
     exit_code: int | None = None
     error: Error | None = None
     argv: list[str]

@@ -12,21 +12,21 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError, meant
-from wristctl.runs.index import RESULTS, Entry, indexed
-from wristctl.runs.tags import read_tags
+from wristctl.records.index import RESULTS, IndexEntry, indexed
+from wristctl.records.tags import read_tags
 
 _COMPARISONS = {"<=": le, ">=": ge, "!=": ne, "==": eq, "<": lt, ">": gt, "=": eq}
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
 
 
-def entries(results: Path = RESULTS) -> list[Entry]:
+def entries(results: Path = RESULTS) -> list[IndexEntry]:
     """All runs of a results folder, oldest first, with their tags."""
     tags = read_tags(results)
     return [replace(each, tags=tags[each.id]) if each.id in tags else each for each in indexed(results)]
 
 
 def select(
-    found: Iterable[Entry],
+    found: Iterable[IndexEntry],
     kind: str | None = None,
     label: str | None = None,
     state: str | None = None,
@@ -34,7 +34,7 @@ def select(
     where: Sequence[str] = (),
     newer: str | None = None,
     older: str | None = None,
-) -> list[Entry]:
+) -> list[IndexEntry]:
     """The entries that meet every condition: `where` like "rmse<1e-3", ages like 30m, 12h, 2d; kind and label may be
     patterns with *. Raises UserError for a condition that cannot be read, or a metric that no run has."""
     chosen = [
@@ -56,18 +56,18 @@ def select(
     return chosen
 
 
-def in_order(found: Sequence[Entry], by: str) -> list[Entry]:
+def in_order(found: Sequence[IndexEntry], by: str) -> list[IndexEntry]:
     """Sorted by a field or metric; runs that have none come last."""
     _known(by, found, f"--sort {by}")
 
-    def place(each: Entry) -> tuple[bool, Any]:
+    def place(each: IndexEntry) -> tuple[bool, Any]:
         value = each.value(by)
         return (True, "") if value in (None, "") else (False, value)
 
     return sorted(found, key=place)
 
 
-def _known(name: str, found: Sequence[Entry], where: str) -> None:
+def _known(name: str, found: Sequence[IndexEntry], where: str) -> None:
     own = {"id", "kind", "label", "state", "started", "wall_s"}
     names = {metric for each in found for metric in each.metrics} | own
     if found and name not in names:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from wristctl.runs.manifest import CONFIG, MANIFEST, PACKAGES, PATCH, SUMS, Manifest, command_of
+from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, PATCH, SUMS, Manifest, command_of
 
 
 def readme(manifest: Manifest, summary: str) -> str:

@@ -6,9 +6,9 @@ import shutil
 from collections.abc import Sequence
 
 from wristctl.config.errors import UserError
-from wristctl.runs.lineage import dependents
-from wristctl.runs.run import Run
-from wristctl.runs.tags import change_tags, read_tags
+from wristctl.records.lineage import dependents
+from wristctl.records.run import Run
+from wristctl.records.tags import change_tags, read_tags
 
 
 def removable(runs: Sequence[Run], force: bool = False) -> list[Run]:

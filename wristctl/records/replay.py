@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from wristctl.config.errors import UserError
-from wristctl.runs.difference import Change, difference
-from wristctl.runs.likeness import likeness
-from wristctl.runs.lineage import input_run
-from wristctl.runs.manifest import CONFIG
-from wristctl.runs.run import Run
+from wristctl.records.difference import Change, difference
+from wristctl.records.file_comparison import compare_files
+from wristctl.records.lineage import input_run
+from wristctl.records.manifest import CONFIG
+from wristctl.records.run import Run
 
 
-class Verdict(NamedTuple):
+class ReplayVerdict(NamedTuple):
     """What became of one file; volatile ones (wall times) are not compared."""
 
     path: str
@@ -20,20 +20,20 @@ class Verdict(NamedTuple):
     detail: str = ""
 
 
-def verdicts(original: Run, again: Run) -> list[Verdict]:
+def verdicts(original: Run, again: Run) -> list[ReplayVerdict]:
     """A verdict on each output of either run."""
     before = {each.path: each for each in original.manifest.outputs}
     after = {each.path: each for each in again.manifest.outputs}
     found = []
     for path in dict.fromkeys([*before, *after]):
         if (before.get(path) or after[path]).volatile:
-            found.append(Verdict(path, "volatile", "not compared"))
+            found.append(ReplayVerdict(path, "volatile", "not compared"))
         elif path not in after:
-            found.append(Verdict(path, "missing", "not written this time"))
+            found.append(ReplayVerdict(path, "missing", "not written this time"))
         elif path not in before:
-            found.append(Verdict(path, "added", "not written then"))
+            found.append(ReplayVerdict(path, "added", "not written then"))
         else:
-            found.append(Verdict(path, *likeness(original.path / path, again.path / path)))
+            found.append(ReplayVerdict(path, *compare_files(original.path / path, again.path / path)))
     return found
 
 

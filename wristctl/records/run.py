@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
-from wristctl.runs.files import files_below, sha256_of
-from wristctl.runs.formats import read_arrays, read_table
-from wristctl.runs.lock import is_locked
-from wristctl.runs.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
+from wristctl.records.files import files_below, sha256_of
+from wristctl.records.formats import read_arrays, read_table
+from wristctl.records.lock import is_locked
+from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ _FIX = "name a run that `wristctl runs ls` shows"
 
 ADDED = "file was added after sealing"
 
-State = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
+RunState = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
 
 
 class Run:
@@ -56,7 +56,7 @@ class Run:
         return self.manifest.kind
 
     @property
-    def state(self) -> State:
+    def state(self) -> RunState:
         """How it ended: `crashed` if running by its word but without a lock, `broken` without a manifest."""
         if is_locked(self.path):
             return "running"
@@ -99,9 +99,7 @@ class Run:
         """The path of one of its files."""
         path = self.path / name
         if not path.is_file():
-            raise UserError(
-                f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path))
-            )
+            raise UserError(f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path)))
         return path
 
     def check(self) -> None:

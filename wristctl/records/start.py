@@ -18,14 +18,25 @@ from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
 from wristctl.interrupt import interrupts, undisturbed
-from wristctl.runs.code import code_state
-from wristctl.runs.environment import environment_state
-from wristctl.runs.files import replacing, sha256_of, write_text
-from wristctl.runs.journal import now
-from wristctl.runs.live import LiveRun, Page
-from wristctl.runs.lock import RunLock
-from wristctl.runs.manifest import CONFIG, PACKAGES, PATCH, SOURCES, Code, Environment, Error, Input, Manifest, Timing
-from wristctl.runs.run import Run
+from wristctl.records.code import code_state
+from wristctl.records.environment import environment_state
+from wristctl.records.files import replacing, sha256_of, write_text
+from wristctl.records.journal import now
+from wristctl.records.live import LiveRun, Page
+from wristctl.records.lock import RunLock
+from wristctl.records.manifest import (
+    CONFIG,
+    PACKAGES,
+    PATCH,
+    SOURCES,
+    Code,
+    Environment,
+    Error,
+    Input,
+    Manifest,
+    Timing,
+)
+from wristctl.records.run import Run
 
 
 @dataclass(frozen=True)

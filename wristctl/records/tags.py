@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.runs.files import write_text
+from wristctl.records.files import write_text
 
 TAGS = "tags.json"
 

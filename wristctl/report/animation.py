@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from wristctl.config.wrist import WristParameters
-from wristctl.runs.run import Run
+from wristctl.records.run import Run
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,17 +9,17 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.hardware.vision.camera import Image
-from wristctl.hardware.vision.charuco import BoardView, Calibration
-from wristctl.hardware.vision.view import View
 from wristctl.report.style import BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title
+from wristctl.vision.camera import Image
+from wristctl.vision.charuco import BoardView, CameraCalibration
+from wristctl.vision.view import View
 
 _PARTS, _FINE = 12, 60
 _SEEN: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
 _STRAIGHT: dict[str, Any] = {"color": BLUE, "linewidth": 1.0}
 
 
-def reprojection(found: Calibration, views: Sequence[BoardView]) -> Figure:
+def reprojection(found: CameraCalibration, views: Sequence[BoardView]) -> Figure:
     """Where corners were seen, less where the calibration expects them, over the picture; RMS of each view [px]."""
     made, ((over, bars),) = figure(1, 2, width=9.0, height=4.0, width_ratios=(1.5, 1))
     width, height = found.view.size or (1, 1)

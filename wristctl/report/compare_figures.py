@@ -14,8 +14,8 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from wristctl.benchmark.compare import Result
-from wristctl.benchmark.paper import T2
+from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.paper import T2
 from wristctl.report.loop_figures import draw_desired, within_half_a_move
 from wristctl.report.style import GREY, WIDTH, PowersOfTen, colour, figure, line, logarithmic, title, undress
 
@@ -30,7 +30,7 @@ _FAILED = "///"
 """Hatch of what diverged."""
 
 
-def angle_grid(results: Sequence[Result], heading: str = "", across: Across = "reference") -> Figure:
+def angle_grid(results: Sequence[ComparedRow], heading: str = "", across: Across = "reference") -> Figure:
     """Desired and obtained angle [deg] over time [s]: rows of controllers and gains, columns as `across` says."""
     rows, columns = _names(results, across)
     size = {"width": max(WIDTH, 1.0 + 1.3 * len(columns)), "height": 1.0 + 1.05 * len(rows)}
@@ -53,7 +53,7 @@ def angle_grid(results: Sequence[Result], heading: str = "", across: Across = "r
     return made
 
 
-def rmse_map(results: Sequence[Result], heading: str = "", across: Across = "reference") -> Figure:
+def rmse_map(results: Sequence[ComparedRow], heading: str = "", across: Across = "reference") -> Figure:
     """RMSE [rad] of each controller as number and colour (log), beside the paper's T2; columns as `across` says.
 
     What diverged is hatched and marked with an x.
@@ -86,7 +86,7 @@ def rmse_map(results: Sequence[Result], heading: str = "", across: Across = "ref
     return made
 
 
-def chattering_bars(results: Sequence[Result], heading: str = "") -> Figure:
+def chattering_bars(results: Sequence[ComparedRow], heading: str = "") -> Figure:
     """Total variation of tension per second [N/s], log, of each controller: the bar is the median over the references.
 
     Dots are the single references; what diverged is hatched.
@@ -109,13 +109,13 @@ def chattering_bars(results: Sequence[Result], heading: str = "") -> Figure:
     return made
 
 
-def _row(results: Sequence[Result], result: Result) -> str:
+def _row(results: Sequence[ComparedRow], result: ComparedRow) -> str:
     """The row's name: controller and gains, and the inverse where several are compared."""
     several = len({each.inverse for each in results}) > 1
     return f"{result.label}, {result.inverse}" if several else result.label
 
 
-def _names(results: Sequence[Result], across: Across) -> tuple[list[str], list[str]]:
+def _names(results: Sequence[ComparedRow], across: Across) -> tuple[list[str], list[str]]:
     """Rows and columns in the order of the results."""
     rows = dict.fromkeys(_row(results, result) for result in results)
     return list(rows), list(dict.fromkeys(getattr(result, across) for result in results))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from wristctl.records.difference import difference
+from wristctl.records.run import Run
 from wristctl.report.page import figures, render
-from wristctl.runs.difference import difference
-from wristctl.runs.run import Run
 
 _TITLES = {
     "config": "Configuration",
@@ -19,9 +19,7 @@ _TITLES = {
 
 def several_page(runs: list[Run]) -> str:
     """The page of several runs, each of them against the first."""
-    rows = [
-        (run.id, run.kind, run.state, run.manifest.timing.started[:19], run.manifest.timing.wall_s) for run in runs
-    ]
+    rows = [(run.id, run.kind, run.state, run.manifest.timing.started[:19], run.manifest.timing.wall_s) for run in runs]
     return render(
         "several.html",
         heading=" | ".join(run.manifest.label or run.id for run in runs),

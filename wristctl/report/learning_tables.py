@@ -12,8 +12,8 @@ from wristctl.learning.dataset import Samples
 from wristctl.wrist.kinematics import Array
 
 if TYPE_CHECKING:
-    from wristctl.learning.selection import Candidate
-    from wristctl.learning.trial import Epoch
+    from wristctl.learning.selection import CrossValidated
+    from wristctl.learning.training_result import Epoch
 
 UNITS = {
     "x": "m",
@@ -78,7 +78,7 @@ def predictions_table(
     return pd.DataFrame(own | {"theta": theta} | angles)
 
 
-def grid_table(found: Sequence[Candidate]) -> pd.DataFrame:
+def grid_table(found: Sequence[CrossValidated]) -> pd.DataFrame:
     """One row per point of the grid: its settings, cost, and cross-validated RMSE with its standard error."""
     return pd.DataFrame(
         [

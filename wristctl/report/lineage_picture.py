@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from wristctl.runs.lineage import Ancestor
+from wristctl.records.lineage import Ancestor
 
 _WIDTH, _HEIGHT, _GAP, _ROW = 192, 44, 44, 60
 _WORDS = {"gen-data": "data", "train": "network", "tune": "gains", "compare": "comparison", "hw-run": "trial"}

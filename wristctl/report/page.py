@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl import __version__
+from wristctl.records.lineage import ancestry
+from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of
+from wristctl.records.run import Run
 from wristctl.report.animation import animation
 from wristctl.report.inline_svg import inline_figure
 from wristctl.report.lineage_picture import lineage_picture
-from wristctl.runs.lineage import ancestry
-from wristctl.runs.manifest import CONFIG, TABLES, Manifest, command_of
-from wristctl.runs.run import Run
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -17,10 +17,10 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
-from wristctl.config.vision import Board, Markers
-from wristctl.hardware.vision.charuco import DICTIONARY as BOARD_DICTIONARY
-from wristctl.hardware.vision.detector import print_of
+from wristctl.config.vision import CharucoBoard, Markers
 from wristctl.report.style import BLACK, GREY
+from wristctl.vision.charuco import DICTIONARY as BOARD_DICTIONARY
+from wristctl.vision.detector import print_of
 
 PAPERS = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 """Width and height [mm]."""
@@ -43,7 +43,7 @@ _MARKER_NOTES = (
 Cells = NDArray[np.bool_]
 
 
-def write_sheets(file: Path, paper: Literal["a4", "letter"], board: Board, markers: Markers) -> None:
+def write_sheets(file: Path, paper: Literal["a4", "letter"], board: CharucoBoard, markers: Markers) -> None:
     """Two pages: the board, the markers. Raises UserError where the board is larger than the paper, OSError."""
     sheets = board_page(paper, board), marker_page(paper, markers)
     with mpl.rc_context({"pdf.fonttype": 42}), PdfPages(file, metadata={"CreationDate": None}) as pages:
@@ -51,7 +51,7 @@ def write_sheets(file: Path, paper: Literal["a4", "letter"], board: Board, marke
             pages.savefig(page)
 
 
-def board_page(paper: Literal["a4", "letter"], board: Board) -> Figure:
+def board_page(paper: Literal["a4", "letter"], board: CharucoBoard) -> Figure:
     """The ChArUco board, a ruler and what to do."""
     width, height = PAPERS[paper]
     across, down, square = 1e3 * board.columns * board.square, 1e3 * board.rows * board.square, 1e3 * board.square

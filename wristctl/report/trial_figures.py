@@ -111,9 +111,7 @@ def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str,
     return made, dict(zip(names, axes.ravel().tolist(), strict=False))
 
 
-def _finished(
-    made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str
-) -> Figure:
+def _finished(made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str) -> Figure:
     for name, panel in panels.items():
         title(panel, name)
         pushes = {course.push for course in courses if course.direction == name and course.push is not None}

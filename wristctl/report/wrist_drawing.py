@@ -22,7 +22,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
-from wristctl.wrist.shape import Planar, backbone, beside, coil, discs, hand
+from wristctl.wrist.shape import Planar, backbone, coil, discs, hand, offset_points
 
 Array = NDArray[np.float64]
 
@@ -39,14 +39,14 @@ def draw_wrist(
     for outline in hand(wrist.hand_offset, edge_on) if wrist.hand_offset > 0.0 else []:
         _fill(axes, centres[-1] + normals[-1] * outline, facecolor=LIGHT)
     for offset in (-c, 0.0, c):
-        ends = beside(frames, offset)
+        ends = offset_points(frames, offset)
         for start, end in pairwise(ends):
             _line(axes, coil(complex(start), complex(end), 0.15 * c), color=GREY, linewidth=0.5)
     line, _ = backbone(segment_theta, wrist.length, np.linspace(0.0, wrist.length, 60))
     _line(axes, line, color=BLUE, linewidth=1.2, linestyle="--")
     for sign in (1, -1):
         style = {"color": VERMILLION, "linewidth": 2.2} if sign == pulling else {"color": BLACK, "linewidth": 1.2}
-        _line(axes, beside(frames, sign * c), **style)
+        _line(axes, offset_points(frames, sign * c), **style)
     half, thick = RIM * wrist.tendon_radius, 0.02 * wrist.length
     plate: Planar = np.array([-thick - 1j * half, thick - 1j * half, thick + 1j * half, -thick + 1j * half])
     for centre, normal in zip(*frames, strict=True):
@@ -85,7 +85,7 @@ def stroboscope(trajectory: Trajectory, wrist: WristParameters, count: int = 7) 
         line, _ = backbone(bent, wrist.length, np.linspace(0.0, wrist.length, 60))
         _line(axes, line, color=colour, linewidth=1.2)
         frames = discs(bent, wrist.length, wrist.discs)
-        for plate in zip(beside(frames, -rim), beside(frames, rim), strict=True):
+        for plate in zip(offset_points(frames, -rim), offset_points(frames, rim), strict=True):
             _line(axes, np.array(plate), color=colour, linewidth=2.5)
     tip, desired = (each[:, 0] + 1j * each[:, 1] for each in (trajectory.tip, trajectory.tip_desired))
     end: Any = {"markevery": [-1], "markersize": 5.0}

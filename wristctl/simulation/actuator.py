@@ -19,7 +19,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, maximum, minimum, tanh
 from wristctl.lanes.lane import floor, sqrt, where
 from wristctl.wrist.allocation import TENDONS_PER_SIDE
-from wristctl.wrist.model import terms
+from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import lengths, moment_arms
 

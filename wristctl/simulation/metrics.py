@@ -109,9 +109,7 @@ def summary(sums: Array, goals: Array, period: float) -> dict[str, Array]:
         result = {
             "rmse": np.sqrt(of["squared"] / ticks),
             "rmse_move": np.sqrt(np.where(step, of["squared"] / ticks, of["squared_move"] / of["ticks_move"])),
-            "rmse_settled": np.where(
-                settled, np.sqrt((of["squared"] - of["squared_exit"]).clip(0.0) / after), np.nan
-            ),
+            "rmse_settled": np.where(settled, np.sqrt((of["squared"] - of["squared_exit"]).clip(0.0) / after), np.nan),
             "settling": np.where(settled, of["exit_2"], np.nan),
             "settling_5": np.where(rests & (of["exit_5"] < goal["horizon"] - 1.5 * period), of["exit_5"], np.nan),
             "steady_state": of["late"] / of["late_count"],

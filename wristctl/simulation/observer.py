@@ -19,7 +19,7 @@ from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import Drive, at_rest, pulls, tendon_stiffness
-from wristctl.simulation.camera import frames
+from wristctl.simulation.frames import frames
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
 

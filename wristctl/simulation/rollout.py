@@ -138,4 +138,3 @@ def rollout(
     kept = to_rows(recorded.reshape(total, -1, *wide), count).reshape(count, samples, -1) if record else None
     metrics = summary(sums, goal_rows, loop.control_period)
     return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)
-

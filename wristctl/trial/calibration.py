@@ -6,23 +6,23 @@ import json
 from dataclasses import dataclass
 from typing import Any, Self
 
+from wristctl.board.board import Board
+from wristctl.board.board_errors import BoardError
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
-from wristctl.hardware.board import Board
-from wristctl.hardware.errors import BoardError
-from wristctl.hardware.trial.halt import halt
-from wristctl.hardware.trial.homing import Patience, Zero, find_zero, slacken
-from wristctl.hardware.trial.prepare import prepare
-from wristctl.hardware.trial.spools import spools_of
-from wristctl.hardware.trial.stands import Stand
 from wristctl.interrupt import undisturbed
-from wristctl.runs import Run
+from wristctl.records import Run
+from wristctl.trial.halt import halt
+from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.prepare import prepare
+from wristctl.trial.spools import spools_of
+from wristctl.trial.testbeds import Testbed
 
 FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
 
 
 @dataclass(frozen=True)
-class Calibration:
+class WristCalibration:
     """`zero` is durable; `position` [steps] holds only as long as the board has neither restarted nor moved since."""
 
     zero: Zero
@@ -65,21 +65,21 @@ class Calibration:
         raise BoardError("host", what, board.transport.name, fix)
 
 
-def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
+def calibrated(testbed: Testbed, settings: CalibrateWristSettings) -> WristCalibration:
     """Home a rig, slacken its tendons again, and say what was found. Closes the stand.
 
     Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
     """
-    board, spools = Board(stand.transport), spools_of(settings.actuator)
+    board, spools = Board(testbed.transport), spools_of(settings.actuator)
     try:
         hello = board.connect()
         try:
-            stand.face(settings.plane, Patience(board))
-            eye = stand.eye()
-            Patience(board).angle(eye, settings.homing.frames)  # the marker is seen, and nothing moves yet
-            stand.confirm()
+            testbed.face(settings.plane, Patience(board))
+            tracking = testbed.tracking()
+            Patience(board).angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            testbed.confirm()
             prepare(board, settings)
-            zero = find_zero(board, eye, spools, settings.homing, settings.plane)
+            zero = find_zero(board, tracking, spools, settings.homing, settings.plane)
             position = slacken(board, spools, settings.homing, zero.signs)
         except BaseException:
             with undisturbed():
@@ -87,5 +87,5 @@ def calibrated(stand: Stand, settings: CalibrateWristSettings) -> Calibration:
             raise
         board.close()
     finally:
-        stand.close()
-    return Calibration(zero, settings.plane, hello.boot_nonce, position)
+        testbed.close()
+    return WristCalibration(zero, settings.plane, hello.boot_nonce, position)

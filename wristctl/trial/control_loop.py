@@ -14,18 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.board.board import Board
+from wristctl.board.messages import AXES, Fault
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.hardware.board import Board
-from wristctl.hardware.messages import AXES, Fault
-from wristctl.hardware.trial.eye import Eye
-from wristctl.hardware.trial.faults import HostFaults
-from wristctl.hardware.trial.log import TrialLog, of_axes
-from wristctl.hardware.trial.safety import Monitor, SafetyStop, Seen
-from wristctl.hardware.trial.spools import Paths, spools_of
-from wristctl.hardware.trial.steering import Answer, Estimate, Steering
 from wristctl.simulation.reference import Motion
+from wristctl.trial.host_faults import HostFaults
+from wristctl.trial.log import TrialLog, of_axes
+from wristctl.trial.safety import Monitor, SafetyStop, Seen
+from wristctl.trial.spools import Paths, spools_of
+from wristctl.trial.steering import Answer, Estimate, Steering
+from wristctl.trial.tracking import Tracking
 
 Array = NDArray[np.float64]
 Shown = Callable[[dict[str, Any]], None]
@@ -37,7 +37,7 @@ longer [s] that takes for each step/s of all axes together, whose interrupts com
 
 
 @dataclass
-class Timing:
+class TickTiming:
     """When ticks began, against when they were due."""
 
     period: float
@@ -67,10 +67,10 @@ class ControlLoop:
     """Drives a homed, enabled board in one bending plane; `signs` say which way each motor's positive steps turn."""
 
     def __init__(
-        self, board: Board, eye: Eye, settings: RigSettings, wrist: WristParameters, plane: str,
-        signs: Sequence[int], timing: Timing, log: TrialLog, shown: Shown | None = None,
+        self, board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
+        signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None,
     ) -> None:  # fmt: skip
-        self._board, self._eye, self._log, self._timing, self._shown = board, eye, log, timing, shown
+        self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
         self._monitor = Monitor(settings.safety, self._spools)
@@ -138,7 +138,7 @@ class ControlLoop:
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
         found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
-        for seen in self._eye.look():
+        for seen in self._tracking.look():
             found["verdict"] = self._verdict = str(seen.verdict)
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time

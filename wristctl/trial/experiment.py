@@ -5,27 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from wristctl.board.board import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.hardware.board import Board
-from wristctl.hardware.trial.calibration import Calibration
-from wristctl.hardware.trial.eye import Eye
-from wristctl.hardware.trial.faults import HostFaults
-from wristctl.hardware.trial.halt import Halt, halt
-from wristctl.hardware.trial.homing import Patience, Zero, find_zero, slacken
-from wristctl.hardware.trial.log import TrialLog
-from wristctl.hardware.trial.loop import ControlLoop, Shown, Timing
-from wristctl.hardware.trial.moves import at_rest, back, motion_of
-from wristctl.hardware.trial.prepare import prepare
-from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.spools import Paths, spools_of
-from wristctl.hardware.trial.stands import Stand
-from wristctl.hardware.trial.steering import Steering
-from wristctl.hardware.trial.trials import Trial
 from wristctl.interrupt import undisturbed
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.control_loop import ControlLoop, Shown, TickTiming
+from wristctl.trial.halt import Halt, halt
+from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.host_faults import HostFaults
+from wristctl.trial.log import TrialLog
+from wristctl.trial.prepare import prepare
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import Paths, spools_of
+from wristctl.trial.steering import Steering
+from wristctl.trial.testbeds import Testbed
+from wristctl.trial.tracking import Tracking
+from wristctl.trial.trial_motions import at_rest, back, motion_of
+from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -68,7 +68,7 @@ class Experiment:
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
-        calibration: Calibration | None = None,
+        calibration: WristCalibration | None = None,
     ) -> None:  # fmt: skip
         self._settings, self._wrist, self._trials, self._log = settings, wrist, trials, kept
         self._calibration = calibration
@@ -76,27 +76,27 @@ class Experiment:
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
         self._back = controller("feedforward")
         self.motions = {each: motion_of(settings, wrist, each, network) for each in settings.directions}
-        self.timing = Timing(settings.control_period)
+        self.timing = TickTiming(settings.control_period)
         self.outcomes: dict[int, str] = {}
         self.stop: Stop | None = None
         self.zero: Zero | None = None
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
 
-    def run(self, stand: Stand, shown: Shown | None = None) -> None:
+    def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
         """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
 
         Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
         """
-        board = Board(stand.transport)
+        board = Board(testbed.transport)
         try:
             self._warm_up()
             board.connect()
             try:
-                self._all(stand, board, shown)
+                self._all(testbed, board, shown)
             except BaseException as error:
                 told = _of_the_log(error)
                 with undisturbed():
-                    self._stopped(stand, board, told)
+                    self._stopped(testbed, board, told)
                 if told is not error:
                     raise told from error
                 raise
@@ -104,7 +104,7 @@ class Experiment:
                 halt(board, self._settings.safety.watchdog)
                 board.close()
         finally:
-            stand.close()
+            testbed.close()
 
     def _warm_up(self) -> None:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
@@ -117,61 +117,62 @@ class Experiment:
             steering.expect(float(taut[0]), float(taut[0]))
         steering.see(0.0, 0.0)
 
-    def _all(self, stand: Stand, board: Board, shown: Shown | None) -> None:
+    def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
         plane = ""
         for trial in self._trials:
             if trial.plane != plane:
-                stand.face(trial.direction, Patience(board))
-                loop = self._loop(stand, board, trial.plane, shown)
+                testbed.face(trial.direction, Patience(board))
+                loop = self._loop(testbed, board, trial.plane, shown)
                 plane = trial.plane
-            self._one(stand, loop, trial)
+            self._one(testbed, loop, trial)
 
-    def _loop(self, stand: Stand, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
+    def _loop(self, testbed: Testbed, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
         """A loop at rest at zero in this plane; the first one homes the board, others read the slack wrist's marker."""
-        settings, eye = self._settings, stand.eye()
+        settings, tracking = self._settings, testbed.tracking()
         if self.zero is not None:
             slacken(board, spools_of(settings.actuator), settings.homing, self.zero.signs)
             Patience(board).wait(settings.homing.let_go)
-        marker = Patience(board).angle(eye, 4 * settings.homing.frames)
+        marker = Patience(board).angle(tracking, 4 * settings.homing.frames)
         if self.zero is None:  # the marker is seen, and nothing moves yet
-            stand.confirm()
+            testbed.confirm()
             prepare(board, settings)
-            self.zero = self._home(board, eye, plane)
+            self.zero = self._home(board, tracking, plane)
             marker = self.zero.marker
-        eye.zero = marker
+        tracking.zero = marker
         loop = ControlLoop(
-            board, eye, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log, shown,
+            board, tracking, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log,
+            shown,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
 
-    def _home(self, board: Board, eye: Eye, plane: str) -> Zero:
+    def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
         settings, known = self._settings, self._calibration
         if known is not None and settings.positions == "stored":
             known.restore(board)
             return known.zero
         signs = known.zero.signs if known else None
-        return find_zero(board, eye, spools_of(settings.actuator), settings.homing, plane, signs)
+        return find_zero(board, tracking, spools_of(settings.actuator), settings.homing, plane, signs)
 
-    def _one(self, stand: Stand, loop: ControlLoop, trial: Trial) -> None:
+    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
         settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
         law, gains = self._laws[trial.row]
         against = -DIRECTIONS[trial.direction].sign * trial.push
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        stand.begin(start, Disturbances(push=settings.push.model_copy(update={"force": against})))
-        faults = HostFaults(settings.bench.faults) if stand.emulated else None
+        testbed.begin(start, Disturbances(push=settings.push.model_copy(update={"force": against})))
+        faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         loop.follow(followed, law, gains, trial.number, faults)
-        self._trial_ended(stand, "ok")
+        self._trial_ended(testbed, "ok")
         loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
 
-    def _trial_ended(self, stand: Stand, outcome: str) -> None:
+    def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:
             number, start = self._under_way
             self.outcomes[number], self._under_way = outcome, None
-            self._log.truth(number, stand.truth(start))
+            self._log.truth(number, testbed.truth(start))
 
-    def _stopped(self, stand: Stand, board: Board, error: BaseException) -> None:
+    def _stopped(self, testbed: Testbed, board: Board, error: BaseException) -> None:
         """Stop the motors and let the board go, then note what happened."""
         decided = board.transport.now()
         halted = halt(board, self._settings.safety.watchdog)
@@ -183,7 +184,7 @@ class Experiment:
         self.stop = Stop(error, trial, None if start is None else decided - start, halted)
         self._log.disk.give_up_reserve()
         try:
-            self._trial_ended(stand, self.stop.reason)
+            self._trial_ended(testbed, self.stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wristctl.hardware.board import Board
-from wristctl.hardware.errors import BoardError
-from wristctl.hardware.messages import Command, Flag, Status
+from wristctl.board.board import Board
+from wristctl.board.board_errors import BoardError
+from wristctl.board.messages import Command, Flag, Status
 
 _PATIENCE = 0.5
 """Seconds within which motors at any speed have ramped down."""

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.board.board import Board
+from wristctl.board.messages import AXES, JOG_RATE, Flag, Target
 from wristctl.config.hw_run import Homing
-from wristctl.hardware.board import Board
-from wristctl.hardware.messages import AXES, JOG_RATE, Flag, Target
-from wristctl.hardware.trial.eye import Eye
-from wristctl.hardware.trial.safety import SafetyStop
-from wristctl.hardware.trial.spools import Spools, on_plus_side
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import Spools, on_plus_side
+from wristctl.trial.tracking import Tracking
 from wristctl.wrist.directions import ACTIVE
 
 Array = NDArray[np.float64]
@@ -68,14 +68,14 @@ class Patience:
             self._board.ping()
             self._board.transport.wait(min(left, _PULSE))
 
-    def angle(self, eye: Eye, frames: int) -> float:
+    def angle(self, tracking: Tracking, frames: int) -> float:
         """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
         found: list[float] = []
-        eye.look()
+        tracking.look()
         began, verdict = self._board.transport.now(), "no frame"
         while len(found) < frames:
             self.wait(_PULSE)
-            for seen in eye.look():
+            for seen in tracking.look():
                 verdict = str(seen.verdict)
                 if seen.time >= began and math.isfinite(seen.theta):
                     found.append(seen.theta)
@@ -88,8 +88,8 @@ class Patience:
 class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
-    def __init__(self, board: Board, eye: Eye, spools: Spools, settings: Homing, plane: str) -> None:
-        self._board, self._eye, self._patience, self._settings = board, eye, Patience(board), settings
+    def __init__(self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, plane: str) -> None:
+        self._board, self._tracking, self._patience, self._settings = board, tracking, Patience(board), settings
         self._plus = on_plus_side(plane)
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
@@ -97,7 +97,7 @@ class _Finder:
         self._start = board.read().position
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
-        self.straight = self._patience.angle(eye, 4 * settings.frames)
+        self.straight = self._patience.angle(tracking, 4 * settings.frames)
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
         """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
@@ -145,7 +145,7 @@ class _Finder:
     def _bent(self, axis: int) -> float:
         """Angle [rad] from straight. Raises SafetyStop where it is too large."""
         self._patience.wait(self._settings.rest)
-        bend = self._patience.angle(self._eye, self._settings.frames) - self.straight
+        bend = self._patience.angle(self._tracking, self._settings.frames) - self.straight
         if abs(bend) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
             what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
@@ -176,13 +176,13 @@ def slacken(board: Board, spools: Spools, settings: Homing, signs: Sequence[int]
 
 
 def find_zero(
-    board: Board, eye: Eye, spools: Spools, settings: Homing, plane: str, signs: Sequence[int] | None = None
+    board: Board, tracking: Tracking, spools: Spools, settings: Homing, plane: str, signs: Sequence[int] | None = None
 ) -> Zero:
     """Find zero of an enabled board with slack tendons, and home the board there; `signs` where they are known.
 
     Raises SafetyStop where a tendon does not bend the wrist, bends it too far or the wrong way, or the marker is lost.
     """
-    finder = _Finder(board, eye, spools, settings, plane)
+    finder = _Finder(board, tracking, spools, settings, plane)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
     taut, slopes = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from wristctl.config.bench import Fault
-from wristctl.hardware.bench.faults import Faults
-from wristctl.hardware.trial.steering import Answer
+from wristctl.bench.fault_injection import Faults
+from wristctl.config.bench import InjectedFault
+from wristctl.trial.steering import Answer
 
 
 class HostFaults:
     """Those of the bench's faults that happen in the control loop; times count from the trial's motion."""
 
-    def __init__(self, faults: Sequence[Fault]) -> None:
+    def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = Faults(faults)
         self._faults.begin(0.0)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from wristctl.board.board import Board
+from wristctl.board.messages import Configure, Limits, State
 from wristctl.config.hw_run import RigSettings
-from wristctl.hardware.board import Board
-from wristctl.hardware.messages import Configure, Limits, State
-from wristctl.hardware.trial.spools import spools_of
+from wristctl.trial.spools import spools_of
 
 
 def prepare(board: Board, settings: RigSettings) -> None:

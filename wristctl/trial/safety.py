@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.board.board_errors import SAFETY_STOP
+from wristctl.board.messages import State
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import Safety
-from wristctl.hardware.errors import SAFETY_STOP
-from wristctl.hardware.messages import State
-from wristctl.hardware.trial.spools import Spools
-from wristctl.hardware.trial.steering import Answer, Estimate
+from wristctl.trial.spools import Spools
+from wristctl.trial.steering import Answer, Estimate
 
 Array = NDArray[np.float64]
 

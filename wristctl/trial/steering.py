@@ -47,9 +47,7 @@ class Answer(NamedTuple):
 class Steering:
     """Observer and law of one bending plane. Ticks are numbered from 0, `period` [s] apart."""
 
-    def __init__(
-        self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float
-    ) -> None:
+    def __init__(self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float) -> None:
         self._drive = drive_of(actuator)
         self._model = segments(wrist, 1)
         self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])

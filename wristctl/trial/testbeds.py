@@ -9,17 +9,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.bench.real_time_bench import RealTimeBench, connect
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.transport import Transport, open_transport
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.bench.bench import Bench
-from wristctl.hardware.bench.connect import RealTimeBench, connect
-from wristctl.hardware.transport import Transport, open_transport
-from wristctl.hardware.trial.eye import Eye, InlineEye, Kept, ThreadedEye
-from wristctl.hardware.trial.homing import Patience
-from wristctl.hardware.vision.camera import DeviceCamera
-from wristctl.hardware.vision.marker import Tracker
-from wristctl.hardware.vision.view import View
+from wristctl.trial.homing import Patience
+from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
+from wristctl.vision.camera import DeviceCamera
+from wristctl.vision.marker import Tracker
+from wristctl.vision.view import View
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ BEFORE_MOTION = (
 )
 
 
-class Stand(Protocol):
+class Testbed(Protocol):
     """Board and camera with the wrist before them."""
 
     emulated: bool
@@ -44,7 +44,7 @@ class Stand(Protocol):
     def confirm(self) -> None:
         """Have a person agree to the first motion, where there is something to be hurt. Raises UserError."""
 
-    def eye(self) -> Eye:
+    def tracking(self) -> Tracking:
         """The camera with a fresh tracker."""
 
     def face(self, direction: str, patience: Patience) -> None:
@@ -60,27 +60,29 @@ class Stand(Protocol):
         """Give everything back."""
 
 
-class EmulatedStand:
+class EmulatedTestbed:
     """The emulated bench; in virtual time it looks when asked, in real time in a thread."""
 
     emulated = True
 
-    def __init__(self, bench: Bench | RealTimeBench, settings: RigSettings, view: View, keep: Kept | None) -> None:
+    def __init__(
+        self, bench: VirtualBench | RealTimeBench, settings: RigSettings, view: View, keep: Kept | None
+    ) -> None:
         self._bench, self._settings, self._view, self._keep = bench, settings, view, keep
         self.transport: Transport = bench.transport
-        self._eye: Eye | None = None
+        self._tracking: Tracking | None = None
 
     def confirm(self) -> None:
         """Nobody is near."""
 
-    def eye(self) -> Eye:
+    def tracking(self) -> Tracking:
         """The rendered camera with a fresh tracker."""
-        if self._eye is not None:
-            self._eye.close()
-        kind = ThreadedEye if isinstance(self._bench, RealTimeBench) else InlineEye
+        if self._tracking is not None:
+            self._tracking.close()
+        kind = ThreadedTracking if isinstance(self._bench, RealTimeBench) else InlineTracking
         tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
-        self._eye = kind(self._bench.camera, tracker, self._keep)
-        return self._eye
+        self._tracking = kind(self._bench.camera, tracker, self._keep)
+        return self._tracking
 
     def face(self, direction: str, patience: Patience) -> None:
         """Turn the bench."""
@@ -97,12 +99,12 @@ class EmulatedStand:
 
     def close(self) -> None:
         """End the eye and the bench."""
-        if self._eye is not None:
-            self._eye.close()
+        if self._tracking is not None:
+            self._tracking.close()
         self._bench.close()
 
 
-class RealStand:
+class RealTestbed:
     """A real board and camera; the operator turns the wrist. Raises PortUnusable and CameraError."""
 
     emulated = False
@@ -115,19 +117,19 @@ class RealStand:
         except BaseException:
             self.transport.close()
             raise
-        self._eye: Eye | None = None
+        self._tracking: Tracking | None = None
 
     def confirm(self) -> None:
         """Ask."""
         self._ask(BEFORE_MOTION)
 
-    def eye(self) -> Eye:
+    def tracking(self) -> Tracking:
         """The camera with a fresh tracker."""
-        if self._eye is not None:
-            self._eye.close()
+        if self._tracking is not None:
+            self._tracking.close()
         tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
-        self._eye = ThreadedEye(self._camera, tracker, self._keep)
-        return self._eye
+        self._tracking = ThreadedTracking(self._camera, tracker, self._keep)
+        return self._tracking
 
     def face(self, direction: str, patience: Patience) -> None:
         """Ask the operator to turn the wrist, while the board's link is kept alive."""
@@ -147,17 +149,17 @@ class RealStand:
 
     def close(self) -> None:
         """Give back camera and port."""
-        if self._eye is not None:
-            self._eye.close()
+        if self._tracking is not None:
+            self._tracking.close()
         self._camera.close()
         self.transport.close()
 
 
-def open_stand(
+def open_testbed(
     settings: RigSettings, wrist: WristParameters, seed: int, view: View, ask: Ask, keep: Kept | None = None
-) -> EmulatedStand | RealStand:
+) -> EmulatedTestbed | RealTestbed:
     """The stand of these settings. Raises BoardError and CameraError."""
     if settings.port is not None:
-        return RealStand(settings, view, keep, ask)
-    build = connect if settings.real_time else Bench
-    return EmulatedStand(build(settings.bench, wrist, seed, settings.markers), settings, view, keep)
+        return RealTestbed(settings, view, keep, ask)
+    build = connect if settings.real_time else VirtualBench
+    return EmulatedTestbed(build(settings.bench, wrist, seed, settings.markers), settings, view, keep)

@@ -11,14 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
-from wristctl.hardware.vision.camera import Camera, Frame
-from wristctl.hardware.vision.marker import Sighting, Tracker, Verdict
+from wristctl.vision.camera import Camera, Frame
+from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
 
 Kept = Callable[[Frame, Sighting], None]
 """Takes a frame and what was seen in it, to keep it."""
 
 
-class Eye(Protocol):
+class Tracking(Protocol):
     """Gives sightings to the loop."""
 
     zero: float
@@ -31,7 +31,7 @@ class Eye(Protocol):
         """Look no more; the camera stays open."""
 
 
-class InlineEye:
+class InlineTracking:
     """Looks when asked: in virtual time, where looking takes none.
 
     A sensor's noise makes every picture another, so the same bytes again tell of a stuck camera, and no angle.
@@ -50,7 +50,7 @@ class InlineEye:
             return []
         seen = self._tracker.see(frame)
         if self.frame is not None and np.array_equal(frame.image, self.frame.image):
-            seen = seen._replace(theta=math.nan, verdict=Verdict.FROZEN)
+            seen = seen._replace(theta=math.nan, verdict=SightingVerdict.FROZEN)
         self.frame, seen = frame, seen._replace(theta=seen.theta - self.zero)
         if self._keep is not None:
             self._keep(frame, seen)
@@ -60,14 +60,14 @@ class InlineEye:
         """Nothing goes on between looks."""
 
 
-class ThreadedEye:
+class ThreadedTracking:
     """Looks in a thread of its own, so that the loop waits neither for the camera nor for the tracker.
 
     A frame is kept once the loop can have its angle: drawing and encoding it takes milliseconds.
     """
 
     def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
-        self._inner, self._keep = InlineEye(camera, tracker), keep
+        self._inner, self._keep = InlineTracking(camera, tracker), keep
         self.zero = 0.0
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.plant import Push
-from wristctl.hardware.trial.spools import on_plus_side
-from wristctl.hardware.trial.trials import Trial, push_seen, recovery
 from wristctl.simulation.metrics import METRICS, metrics_of
 from wristctl.simulation.reference import Motion
+from wristctl.trial.spools import on_plus_side
+from wristctl.trial.trials import Trial, push_seen, recovery
 from wristctl.wrist.directions import ACTIVE
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.loop import Direction
+from wristctl.config.loop import DirectionName
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import Motion, minimum_jerk, motion
 from wristctl.wrist.directions import DIRECTIONS, in_plane
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def motion_of(
-    settings: HwRunSettings, wrist: WristParameters, direction: Direction, network: Inverse | None = None
+    settings: HwRunSettings, wrist: WristParameters, direction: DirectionName, network: Inverse | None = None
 ) -> Motion:
     """A trial's motion in this direction, sampled at the control period. Raises UserError for one out of reach."""
     reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()

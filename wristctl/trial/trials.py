@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.loop import Direction
+from wristctl.config.loop import DirectionName
 from wristctl.wrist.directions import DIRECTIONS
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ class Trial(NamedTuple):
     """One move and back."""
 
     number: int
-    direction: Direction
+    direction: DirectionName
     repetition: int
     push: float
     """Largest force against the bend [N], 0 without a push."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.runs.files import write_text
+from wristctl.records.files import write_text
 
 Gains = Mapping[str, Mapping[str, float]]
 

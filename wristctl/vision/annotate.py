@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.vision.camera import Frame, Image
-from wristctl.hardware.vision.marker import Sighting, Verdict
+from wristctl.vision.camera import Frame, Image
+from wristctl.vision.marker import Sighting, SightingVerdict
 
 _SPREAD, _REFUSED = 6, 3
 _BASE, _TIP, _BAD, _PAPER = (178, 114, 0), (115, 158, 0), (0, 94, 213), (255, 255, 255)
@@ -21,7 +21,7 @@ _BASE, _TIP, _BAD, _PAPER = (178, 114, 0), (115, 158, 0), (0, 94, 213), (255, 25
 def annotate(image: Image, sighting: Sighting) -> NDArray[np.uint8]:
     """A colour picture (height, width, 3, blue first): the markers' corners, the angle or why there is none."""
     made: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
-    usable = sighting.verdict is Verdict.OK
+    usable = sighting.verdict is SightingVerdict.OK
     for corners, colour in zip(sighting.corners, (_BASE, _TIP if usable else _BAD), strict=True):
         if np.isfinite(corners).all():
             cv2.polylines(made, [np.rint(8 * corners).astype(np.int32)], True, colour, 2, cv2.LINE_AA, 3)
@@ -42,7 +42,7 @@ class Picked:
 
     def __init__(self) -> None:
         self._spread: list[tuple[int, NDArray[np.uint8]]] = []
-        self._refused: dict[Verdict, tuple[int, NDArray[np.uint8]]] = {}
+        self._refused: dict[SightingVerdict, tuple[int, NDArray[np.uint8]]] = {}
         self._seen, self._every = 0, 1
 
     def offer(self, frame: Frame, sighting: Sighting) -> None:
@@ -52,7 +52,7 @@ class Picked:
             self._spread.append((number, annotate(frame.image, sighting)))
             if len(self._spread) > _SPREAD:
                 self._spread, self._every = self._spread[::2], 2 * self._every
-        if sighting.verdict is not Verdict.OK and sighting.verdict not in self._refused:
+        if sighting.verdict is not SightingVerdict.OK and sighting.verdict not in self._refused:
             self._refused[sighting.verdict] = number, annotate(frame.image, sighting)
 
     def pictures(self) -> list[NDArray[np.uint8]]:

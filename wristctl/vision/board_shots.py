@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.config.vision import Board, SceneSettings
-from wristctl.hardware.vision.camera import Frame, Image
-from wristctl.hardware.vision.charuco import board_of
-from wristctl.hardware.vision.pinhole import Pinhole
-from wristctl.hardware.vision.scene import Film
+from wristctl.config.vision import CharucoBoard, SceneSettings
+from wristctl.vision.camera import Frame, Image
+from wristctl.vision.charuco import board_of
+from wristctl.vision.pinhole import Pinhole
+from wristctl.vision.scene import Film
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _NEAR, _FAR = 0.9, 1.5
 """Range of distances: the board's longer side over the picture's height at that distance, inverted."""
 
 
-def board_shots(settings: SceneSettings, board: Board, views: int, rng: np.random.Generator) -> Iterator[Frame]:
+def board_shots(settings: SceneSettings, board: CharucoBoard, views: int, rng: np.random.Generator) -> Iterator[Frame]:
     """`views` pictures of the board, the last with the board lying in the bending plane."""
     camera, film = Pinhole(settings, "right"), Film(settings)
     rays = camera.rays(_FINE)
@@ -39,7 +39,7 @@ def board_shots(settings: SceneSettings, board: Board, views: int, rng: np.rando
         yield Frame(film.expose(total, 1, rng), float(number), number)
 
 
-def _printed(board: Board, contrast: float) -> Image:
+def _printed(board: CharucoBoard, contrast: float) -> Image:
     size = board.columns * _SQUARE, board.rows * _SQUARE
     ideal = np.asarray(board_of(board).generateImage(size, marginSize=0), float)
     return np.rint(128 + contrast * (ideal - 128)).astype(np.uint8)

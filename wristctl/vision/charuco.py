@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
-from wristctl.config.vision import Board, CalibrateCameraSettings
-from wristctl.hardware.vision.camera import Frame, Image
-from wristctl.hardware.vision.view import View
+from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard
+from wristctl.vision.camera import Frame, Image
+from wristctl.vision.view import View
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class BoardView(NamedTuple):
     """(k,) which corner of the board each is"""
 
 
-class Calibration(NamedTuple):
+class CameraCalibration(NamedTuple):
     """A camera as its views tell it."""
 
     view: View
@@ -59,7 +59,7 @@ class Calibration(NamedTuple):
     """Distance of the corners of the view in the bending plane from where its homography puts them (RMS) [m]"""
 
 
-def board_of(settings: Board) -> cv2.aruco.CharucoBoard:
+def board_of(settings: CharucoBoard) -> cv2.aruco.CharucoBoard:
     """The board in OpenCV's terms."""
     dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARY)
     return cv2.aruco.CharucoBoard((settings.columns, settings.rows), settings.square, settings.marker, dictionary)
@@ -68,7 +68,7 @@ def board_of(settings: Board) -> cv2.aruco.CharucoBoard:
 class BoardFinder:
     """Finds the board in pictures."""
 
-    def __init__(self, settings: Board) -> None:
+    def __init__(self, settings: CharucoBoard) -> None:
         board = board_of(settings)
         self._detector = cv2.aruco.CharucoDetector(board)
         self._places = np.asarray(board.getChessboardCorners(), np.float64)[:, :2]
@@ -88,7 +88,7 @@ class BoardFinder:
 class Album:
     """Views as they come: at most `most` that differ from each other are kept (None: all), and the last one seen."""
 
-    def __init__(self, settings: Board, most: int | None = None) -> None:
+    def __init__(self, settings: CharucoBoard, most: int | None = None) -> None:
         self._finder, self._most = BoardFinder(settings), most
         self.views: list[BoardView] = []
         self.last: BoardView | None = None
@@ -142,7 +142,7 @@ def least_seen(seen: NDArray[np.bool_]) -> str:
 
 def calibrate(
     views: Sequence[BoardView], plane: BoardView | None, size: tuple[int, int], settings: CalibrateCameraSettings
-) -> Calibration:
+) -> CameraCalibration:
     """Intrinsics and distortion from views of the board (Zhang 2000), and the bending plane from the view in it.
 
     Raises UserError (exit code 3) where views are too few, leave too much of the picture unseen, are all square to
@@ -169,7 +169,7 @@ def calibrate(
         raise _refused(what, "use a flat board, sharp pictures, and the board's own squares: --set board.square=...")
     lens = View(np.asarray(matrix, float), np.asarray(distortion, float).ravel()[:4], size=size)
     homography, off = _plane(lens, plane) if plane is not None else (np.eye(3), math.nan)
-    return Calibration(
+    return CameraCalibration(
         view=View(lens.camera_matrix, lens.distortion, homography, size),
         error=float(error),
         errors=np.asarray(errors, float).ravel(),

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.vision.camera import Image
-from wristctl.hardware.vision.outline import outlined
+from wristctl.vision.camera import Image
+from wristctl.vision.outline import outlined
 
 Array = NDArray[np.float64]
 Found = dict[int, list[Array]]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.vision import Gates, Markers
-from wristctl.hardware.vision.camera import Frame
-from wristctl.hardware.vision.detector import Detector, edges, square_angle
-from wristctl.hardware.vision.view import View
+from wristctl.vision.camera import Frame
+from wristctl.vision.detector import Detector, edges, square_angle
+from wristctl.vision.view import View
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
 
 
-class Verdict(StrEnum):
+class SightingVerdict(StrEnum):
     """Whether a sighting can be used, and if not why."""
 
     OK = "ok"
@@ -35,15 +35,15 @@ class Verdict(StrEnum):
 
 
 MEANING = {
-    Verdict.OK: "both markers seen, or the tip's with a base seen shortly before",
-    Verdict.NO_TIP: "the marker on the last disc is not seen",
-    Verdict.NO_BASE: "the marker on the clamp has not been seen whole for longer than base_memory",
-    Verdict.TWICE: "a marker's id is seen in two places",
-    Verdict.SHAPE: "the tip's marker is no square: a corner is hidden, or it is bent or smeared",
-    Verdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
-    Verdict.SWAPPED: "the markers have changed places",
-    Verdict.JUMP: "the angle has changed faster than the motors can move the wrist",
-    Verdict.FROZEN: "the picture is the one before, byte for byte: the camera is stuck (in trials only)",
+    SightingVerdict.OK: "both markers seen, or the tip's with a base seen shortly before",
+    SightingVerdict.NO_TIP: "the marker on the last disc is not seen",
+    SightingVerdict.NO_BASE: "the marker on the clamp has not been seen whole for longer than base_memory",
+    SightingVerdict.TWICE: "a marker's id is seen in two places",
+    SightingVerdict.SHAPE: "the tip's marker is no square: a corner is hidden, or it is bent or smeared",
+    SightingVerdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
+    SightingVerdict.SWAPPED: "the markers have changed places",
+    SightingVerdict.JUMP: "the angle has changed faster than the motors can move the wrist",
+    SightingVerdict.FROZEN: "the picture is the one before, byte for byte: the camera is stuck (in trials only)",
 }
 
 
@@ -56,7 +56,7 @@ class Sighting(NamedTuple):
     """Of the frame"""
     theta: float
     """Bending angle [rad], nan unless the verdict is ok"""
-    verdict: Verdict
+    verdict: SightingVerdict
     corners: Array
     """(2, 4, 2) [px] of the base's and the tip's marker, nan where it is not seen"""
 
@@ -89,7 +89,7 @@ class Tracker:
         found = self._find(frame)
         bases, tips = (found.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)
-        if verdict is Verdict.OK:
+        if verdict is SightingVerdict.OK:
             self._used = frame.time, theta
         shown = np.stack([each[0] if each else _UNSEEN for each in (bases, tips)])
         return Sighting(frame.time, frame.number, theta, verdict, shown)
@@ -107,33 +107,33 @@ class Tracker:
         self._last_seen = {number: each[0] for number, each in found.items()}
         return found
 
-    def _judge(self, time: float, bases: list[Array], tips: list[Array]) -> tuple[Verdict, float]:
+    def _judge(self, time: float, bases: list[Array], tips: list[Array]) -> tuple[SightingVerdict, float]:
         if len(bases) > 1 or len(tips) > 1:
-            return Verdict.TWICE, math.nan
+            return SightingVerdict.TWICE, math.nan
         base, tip = ([self._view.rectify(each) for each in corners] for corners in (bases, tips))
         base = [each for each in base if self._is_square(each)]
         if tip and not self._is_square(tip[0]):
-            return Verdict.SHAPE, math.nan
+            return SightingVerdict.SHAPE, math.nan
         if self._base is not None and time - self._base.seen > self._gates.base_memory:
             self._base = None
         moved = base and self._has_moved(base[0])
         if tip and (known := [self._base.corners] if self._base else base) and not _ahead(known[0], tip[0]):
-            return Verdict.SWAPPED, math.nan
+            return SightingVerdict.SWAPPED, math.nan
         if moved:
-            return Verdict.BASE_MOVED, math.nan
+            return SightingVerdict.BASE_MOVED, math.nan
         if base:
             self._average(time, base[0])
         if not tip:
-            return Verdict.NO_TIP, math.nan
+            return SightingVerdict.NO_TIP, math.nan
         if self._base is None:
-            return Verdict.NO_BASE, math.nan
+            return SightingVerdict.NO_BASE, math.nan
         theta = self._angle(self._base.corners, tip[0])
         if self._used is not None:
             before, last = self._used
             allowed = self._gates.rate * (time - before) + math.radians(self._gates.margin_deg)
             if abs(theta - last) > allowed:
-                return Verdict.JUMP, math.nan
-        return Verdict.OK, theta
+                return SightingVerdict.JUMP, math.nan
+        return SightingVerdict.OK, theta
 
     def _angle(self, base: Array, tip: Array) -> float:
         sign = 1.0 if self._markers.positive == "right" else -1.0

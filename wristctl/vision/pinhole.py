@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.vision import SceneSettings
-from wristctl.hardware.vision.view import View
+from wristctl.vision.view import View
 
 Array = NDArray[np.float64]
 

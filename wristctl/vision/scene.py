@@ -12,11 +12,11 @@ from scipy.special import ndtri
 
 from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.hardware.vision.camera import Image
-from wristctl.hardware.vision.detector import print_of
-from wristctl.hardware.vision.pinhole import Pinhole
-from wristctl.hardware.vision.scene_parts import BASE_AT, Stroke, clamp, fingers, last_disc, moving
-from wristctl.hardware.vision.view import View
+from wristctl.vision.camera import Image
+from wristctl.vision.detector import print_of
+from wristctl.vision.pinhole import Pinhole
+from wristctl.vision.scene_parts import BASE_AT, Stroke, clamp, fingers, last_disc, moving
+from wristctl.vision.view import View
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.shape import Planar, backbone, beside, capsule, coil, discs, hand
+from wristctl.wrist.shape import Planar, backbone, capsule, coil, discs, hand, offset_points
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def _pairs(frames: tuple[Planar, Planar], c: float, behind: bool) -> list[Stroke
     """On either side the tendon and the springs around it, behind the backbone or in front of it."""
     parts = []
     for offset in (-c, c):
-        tendon = beside(frames, offset)
+        tendon = offset_points(frames, offset)
         depth = c if behind else -c
         springs = coil(tendon[:-1, None], tendon[1:, None], 0.17 * c, turns=3)[:, ::2].ravel()
         parts.append(Stroke(_flat(springs, depth), 140 if behind else 158, "line"))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wristctl.config.errors import UserError
 
 if TYPE_CHECKING:
-    from wristctl.runs import Run
+    from wristctl.records import Run
 
 Array = NDArray[np.float64]
 

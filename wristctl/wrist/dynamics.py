@@ -48,9 +48,7 @@ def mass_matrix(segment: Any, z: Any, dz: Any, tangent: Any, mass: Any) -> None:
 
 
 @compiled
-def bias(
-    segment: Any, theta: Any, omega: Any, z: Any, dz: Any, d2z: Any, tangent: Any, pull: Any, r: Any
-) -> None:
+def bias(segment: Any, theta: Any, omega: Any, z: Any, dz: Any, d2z: Any, tangent: Any, pull: Any, r: Any) -> None:
     """r at theta'' = 0, so that M theta'' + bias = r, by Newton and Euler: forces outward to tip, torques back.
 
     `pull` holds the tendons' torque on each segment.

@@ -16,8 +16,17 @@ from wristctl.lanes.rows import planes_like
 
 @compiled
 def residual_jacobians(
-    segment: Any, omega: Any, acceleration: Any, z: Any, dz: Any, d2z: Any, d3z: Any, tangent: Any, slope: Any,
-    by_theta: Any, by_rate: Any,
+    segment: Any,
+    omega: Any,
+    acceleration: Any,
+    z: Any,
+    dz: Any,
+    d2z: Any,
+    d3z: Any,
+    tangent: Any,
+    slope: Any,
+    by_theta: Any,
+    by_rate: Any,
 ) -> None:
     """dr/d(theta) and dr/d(rate) at the given accelerations, into two n x n matrices [i, j].
 

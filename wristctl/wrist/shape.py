@@ -31,7 +31,7 @@ def discs(segment_theta: Array, length: float, count: int) -> tuple[Planar, Plan
     return backbone(segment_theta, length, np.linspace(0.0, length, count))
 
 
-def beside(frames: tuple[Planar, Planar], offset: float) -> Planar:
+def offset_points(frames: tuple[Planar, Planar], offset: float) -> Planar:
     """Points of the discs at `offset` [m] from the backbone, toward +y on the straight wrist."""
     centres, normals = frames
     return centres + 1j * offset * normals

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.allocation import TENDONS_PER_SIDE
-from wristctl.wrist.model import linearised
+from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 
 Array = NDArray[np.float64]

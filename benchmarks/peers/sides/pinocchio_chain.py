@@ -36,6 +36,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
 
     def explicit(q: np.ndarray, v: np.ndarray, drive: float) -> tuple[np.ndarray, np.ndarray]:
         """RK4 on forward dynamics."""
+
         def rates(q: np.ndarray, v: np.ndarray) -> np.ndarray:
             return pin.aba(model, data, q, v, drive - stiffness * q - damping * v).copy()
 

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.hardware.bench import MS, Bench, encode
-from wristctl.hardware.dictionary import STRUCT_CODE, WIRE_RANGE, load
-from wristctl.hardware.layout import Field
-from wristctl.hardware.messages import COMMAND_OF, ENABLE_KEY, LAYOUTS, Command, Rate, State
+from tests.board.bench import MS, Bench, encode
+from wristctl.board.dictionary import STRUCT_CODE, WIRE_RANGE, load
+from wristctl.board.layout import Field
+from wristctl.board.messages import COMMAND_OF, ENABLE_KEY, LAYOUTS, Command, Rate, State
 
 PAYLOAD_BYTES = dict.fromkeys(Command, 0) | {c: LAYOUTS[m].struct.size for m, c in COMMAND_OF.items()}
 COUNT_SPAN = {STRUCT_CODE[kind]: span for kind, span in WIRE_RANGE.items()}

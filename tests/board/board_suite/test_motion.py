@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.hardware.bench import MS, Bench
-from tests.hardware.drive_watch import CLOCK
-from wristctl.hardware.messages import (
+from tests.board.bench import MS, Bench
+from tests.board.drive_watch import CLOCK
+from wristctl.board.messages import (
     ENABLE_KEY,
     JOG_RATE,
     JOG_SPAN,

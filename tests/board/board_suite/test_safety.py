@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.hardware.bench import MS, Bench
-from tests.hardware.conftest import IMAGE
-from wristctl.hardware.messages import (
+from tests.board.bench import MS, Bench
+from tests.board.conftest import IMAGE
+from wristctl.board.messages import (
     ENABLE_KEY,
     ESTOP_SEQ,
     HEARTBEAT_MS,

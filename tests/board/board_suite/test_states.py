@@ -15,9 +15,9 @@ from hypothesis.stateful import (
 )
 from hypothesis.strategies import integers, sampled_from
 
-from tests.hardware.bench import Bench
-from tests.hardware.conftest import new_chip
-from wristctl.hardware.messages import (
+from tests.board.bench import Bench
+from tests.board.conftest import new_chip
+from wristctl.board.messages import (
     ENABLE_KEY,
     Command,
     Configure,

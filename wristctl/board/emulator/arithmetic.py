@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.instructions import Op
+from wristctl.board.emulator.instructions import Op
 from wristctl.lanes.compiled import compiled
 
 C, Z, N, V, S, H, T, I = (1 << bit for bit in range(8))  # noqa: E741 - the manual's name

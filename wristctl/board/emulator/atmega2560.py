@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.emulator import chip as state
-from wristctl.hardware.emulator.decode import decode
-from wristctl.hardware.emulator.events import EXTERNAL, POWER_ON, reset
-from wristctl.hardware.emulator.execute import run
-from wristctl.hardware.emulator.flash import self_program
-from wristctl.hardware.emulator.intel_hex import read_hex
-from wristctl.hardware.emulator.ports import LETTERS, levels
-from wristctl.hardware.emulator.registers import GLOBAL_INTERRUPT, SREG, read, write
+from wristctl.board.emulator import chip as state
+from wristctl.board.emulator.decode import decode
+from wristctl.board.emulator.events import EXTERNAL, POWER_ON, reset
+from wristctl.board.emulator.execute import run
+from wristctl.board.emulator.flash import self_program
+from wristctl.board.emulator.intel_hex import read_hex
+from wristctl.board.emulator.ports import LETTERS, levels
+from wristctl.board.emulator.registers import GLOBAL_INTERRUPT, SREG, read, write
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "wrist.hex"
 BOOT_SECTION = 0x3E000

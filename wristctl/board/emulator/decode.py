@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.hardware.emulator.chip import CONSTANTS, FLASH_WORDS
-from wristctl.hardware.emulator.instructions import PATTERNS, Op
+from wristctl.board.emulator.chip import CONSTANTS, FLASH_WORDS
+from wristctl.board.emulator.instructions import PATTERNS, Op
 
 _POINTER = {"X": 26, "Y": 28, "Z": 30}
 _RANK = "dDPrRAsKqbkhw"

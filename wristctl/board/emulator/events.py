@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.chip import NEVER, RX_BYTE, TX_BYTE, WATCHDOG, Chip
-from wristctl.hardware.emulator.registers import IO_FIRST, IO_LAST, SPH, SPL
-from wristctl.hardware.emulator.timers import BASE, LIMIT, ORIGIN, PRESCALE, TEMP, TIMERS, TOP, timer_events
-from wristctl.hardware.emulator.usart import UCSRA, UDRE, byte_arrived, byte_sent
-from wristctl.hardware.emulator.watchdog import MCUSR, WDE, WDRF, WDTCSR, restart_watchdog, watchdog_expired
+from wristctl.board.emulator.chip import NEVER, RX_BYTE, TX_BYTE, WATCHDOG, Chip
+from wristctl.board.emulator.registers import IO_FIRST, IO_LAST, SPH, SPL
+from wristctl.board.emulator.timers import BASE, LIMIT, ORIGIN, PRESCALE, TEMP, TIMERS, TOP, timer_events
+from wristctl.board.emulator.usart import UCSRA, UDRE, byte_arrived, byte_sent
+from wristctl.board.emulator.watchdog import MCUSR, WDE, WDRF, WDTCSR, restart_watchdog, watchdog_expired
 from wristctl.lanes.compiled import compiled
 
 POWER_ON, EXTERNAL = 0x01, 0x02

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.arithmetic import T, add_word, multiply, one_operand, two_operands
-from wristctl.hardware.emulator.chip import (
+from wristctl.board.emulator.arithmetic import T, add_word, multiply, one_operand, two_operands
+from wristctl.board.emulator.chip import (
     ASLEEP,
     DELAY,
     FLASH_CHANGED,
@@ -14,10 +14,10 @@ from wristctl.hardware.emulator.chip import (
     RUNNING,
     Chip,
 )
-from wristctl.hardware.emulator.events import happen
-from wristctl.hardware.emulator.instructions import Op
-from wristctl.hardware.emulator.interrupts import take_interrupt
-from wristctl.hardware.emulator.registers import (
+from wristctl.board.emulator.events import happen
+from wristctl.board.emulator.instructions import Op
+from wristctl.board.emulator.interrupts import take_interrupt
+from wristctl.board.emulator.registers import (
     EIND,
     GLOBAL_INTERRUPT,
     RAMPZ,
@@ -33,8 +33,8 @@ from wristctl.hardware.emulator.registers import (
     set_pair,
     write,
 )
-from wristctl.hardware.emulator.usart import start_line
-from wristctl.hardware.emulator.watchdog import restart_watchdog
+from wristctl.board.emulator.usart import start_line
+from wristctl.board.emulator.watchdog import restart_watchdog
 from wristctl.lanes.compiled import compiled
 
 _X, _Y, _Z = 26, 28, 30

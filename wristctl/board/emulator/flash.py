@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.hardware.emulator.chip import Chip
-from wristctl.hardware.emulator.decode import decode
-from wristctl.hardware.emulator.registers import RAMPZ, SPMCSR
+from wristctl.board.emulator.chip import Chip
+from wristctl.board.emulator.decode import decode
+from wristctl.board.emulator.registers import RAMPZ, SPMCSR
 
 PAGE_BYTES = 256
 _ENABLE, _ERASE, _WRITE, _READ_AGAIN = 0x01, 0x03, 0x05, 0x11

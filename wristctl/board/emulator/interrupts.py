@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.hardware.emulator.chip import Chip
-from wristctl.hardware.emulator.timers import TIFR, TIMERS, UNITS
-from wristctl.hardware.emulator.usart import RXC, TXC, UCSRA, UCSRB, UDRE
-from wristctl.hardware.emulator.watchdog import WDIE, WDIF, WDTCSR, watchdog_served
+from wristctl.board.emulator.chip import Chip
+from wristctl.board.emulator.timers import TIFR, TIMERS, UNITS
+from wristctl.board.emulator.usart import RXC, TXC, UCSRA, UCSRB, UDRE
+from wristctl.board.emulator.watchdog import WDIE, WDIF, WDTCSR, watchdog_served
 from wristctl.lanes.compiled import compiled
 
 _TIMSK = 0x6E

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.hardware.emulator.chip import BUFFER_FULL, Chip
+from wristctl.board.emulator.chip import BUFFER_FULL, Chip
 from wristctl.lanes.compiled import compiled
 
 LETTERS = "ABCDEFGHJKL"

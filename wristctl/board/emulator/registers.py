@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.hardware.emulator.chip import DELAY, LOOK, Chip
-from wristctl.hardware.emulator.ports import PIN, levels, write_port
-from wristctl.hardware.emulator.timers import TIFR, TIMERS, read_timer, write_timer
-from wristctl.hardware.emulator.usart import UCSRA, UCSRB, UDR, read_byte, write_byte, write_control
-from wristctl.hardware.emulator.watchdog import WDTCSR, write_watchdog
+from wristctl.board.emulator.chip import DELAY, LOOK, Chip
+from wristctl.board.emulator.ports import PIN, levels, write_port
+from wristctl.board.emulator.timers import TIFR, TIMERS, read_timer, write_timer
+from wristctl.board.emulator.usart import UCSRA, UCSRB, UDR, read_byte, write_byte, write_control
+from wristctl.board.emulator.watchdog import WDTCSR, write_watchdog
 from wristctl.lanes.compiled import compiled
 
 SPL, SPH, SREG = 0x5D, 0x5E, 0x5F

@@ -17,9 +17,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.board.emulator.atmega2560 import Atmega2560, Halted
+from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.config.errors import UserError
-from wristctl.hardware.emulator.atmega2560 import Atmega2560, Halted
-from wristctl.hardware.emulator.chip import FREQUENCY
 
 log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.hardware.emulator.chip import LOOK, NEVER, NOT_EMULATED, Chip
+from wristctl.board.emulator.chip import LOOK, NEVER, NOT_EMULATED, Chip
 from wristctl.lanes.compiled import compiled
 
 PRESCALE, TOP, BASE, ORIGIN, TEMP = range(5)

@@ -5,7 +5,7 @@ The receiver keeps a third byte in its shift register until the next start bit; 
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.chip import BUFFER_FULL, BYTE_SENT, LOOK, NEVER, RX_BYTE, TX_BYTE, Chip
+from wristctl.board.emulator.chip import BUFFER_FULL, BYTE_SENT, LOOK, NEVER, RX_BYTE, TX_BYTE, Chip
 from wristctl.lanes.compiled import compiled
 
 UCSRA, UCSRB, UBRR, UDR = 0xC0, 0xC1, 0xC4, 0xC6

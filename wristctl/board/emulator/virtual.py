@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.atmega2560 import Atmega2560
-from wristctl.hardware.emulator.chip import FREQUENCY
+from wristctl.board.emulator.atmega2560 import Atmega2560
+from wristctl.board.emulator.chip import FREQUENCY
 
 
 class VirtualTransport:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wristctl.hardware.emulator.chip import LOOK, NEVER, WATCHDOG, Chip
+from wristctl.board.emulator.chip import LOOK, NEVER, WATCHDOG, Chip
 from wristctl.lanes.compiled import compiled
 
 MCUSR, WDTCSR = 0x54, 0x60

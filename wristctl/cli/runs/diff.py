@@ -9,11 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from wristctl.cli.completion import run_ids
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out, Ref
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
 from wristctl.cli.tables import Table
-from wristctl.runs import open_run
-from wristctl.runs.difference import Difference, difference
-from wristctl.runs.journal import plain
+from wristctl.records import open_run
+from wristctl.records.difference import Difference, difference
+from wristctl.records.journal import jsonable
 
 _HEADS = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
 
@@ -33,7 +33,7 @@ def diff(
             name: {each.name: {"before": each.before, "after": each.after} for each in changes}
             for name, changes in vars(found).items()
         }
-        print(json.dumps(plain({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
+        print(json.dumps(jsonable({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
         return
     print(f"before  {a.id}\nafter   {b.id}\n")
     print("\n\n".join(table.text() for table in _tables(found)) or "nothing differs")

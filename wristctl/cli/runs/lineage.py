@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out, Ref
-from wristctl.runs import open_run
-from wristctl.runs.lineage import ancestry, dependents
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
+from wristctl.records import open_run
+from wristctl.records.lineage import ancestry, dependents
 
 
 def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:

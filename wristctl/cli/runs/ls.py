@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out
 from wristctl.cli.tables import Table
-from wristctl.runs.index import Entry
-from wristctl.runs.journal import plain
-from wristctl.runs.query import entries, in_order, select
+from wristctl.records.index import IndexEntry
+from wristctl.records.journal import jsonable
+from wristctl.records.query import entries, in_order, select
 
 
 def ls(
@@ -36,14 +36,14 @@ def ls(
     found = in_order(select(entries(out), kind, label, state, tagged, where, newer, older), sort)
     found = found[::-1] if reverse else found
     if as_json:
-        print(json.dumps(plain({"schema": "wristctl.runs/1", "runs": list(map(asdict, found))}), indent=2))
+        print(json.dumps(jsonable({"schema": "wristctl.runs/1", "runs": list(map(asdict, found))}), indent=2))
     elif found:
         print(_table(found, [sort, *where]).text())
     else:
         print(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
 
 
-def _table(found: list[Entry], asked: list[str]) -> Table:
+def _table(found: list[IndexEntry], asked: list[str]) -> Table:
     """The listing, with the metrics that were asked for and the columns that hold something."""
     metrics = sorted({name for each in found for name in each.metrics if any(text.startswith(name) for text in asked)})
     columns = ["id", "kind", "state", "wall_s", *metrics]

@@ -12,13 +12,13 @@ from typing import Annotated, Any
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out, Ref
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
 from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
-from wristctl.runs import Run, list_runs, open_run
-from wristctl.runs.lineage import input_run
-from wristctl.runs.manifest import CONFIG, command_of
-from wristctl.runs.replay import Verdict, causes, changed_inputs, verdicts
+from wristctl.records import Run, list_runs, open_run
+from wristctl.records.lineage import input_run
+from wristctl.records.manifest import CONFIG, command_of
+from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
 
 _SAME = ("identical", "within tolerance", "volatile")
 
@@ -64,7 +64,7 @@ def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
     return subprocess.run([*command, *options, "--label", "replay"], stdout=subprocess.DEVNULL).returncode
 
 
-def _conclude(run: Run, scratch: Path | None, found: list[Verdict], why: list[str], as_json: bool) -> None:
+def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
     """Print the verdicts; where there is a cause to name, fail and keep the scratch folder."""
     if as_json:
         files = [each._asdict() for each in found]

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Out, Refs
-from wristctl.runs import open_run
-from wristctl.runs.files import write_text
+from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Refs
+from wristctl.records import open_run
+from wristctl.records.files import write_text
 
 
 def report(
@@ -20,8 +20,8 @@ def report(
     debug: Debug = False,
 ) -> None:
     """Write a page about one run, or about several beside each other: one HTML file that needs no network."""
+    from wristctl.report.comparison_page import several_page
     from wristctl.report.page import page
-    from wristctl.report.several import several_page
 
     runs = [open_run(ref, out) for ref in refs]
     name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Out, Refs
+from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Refs
 from wristctl.config.errors import UserError
-from wristctl.runs import open_run
-from wristctl.runs.remove import removable, remove
+from wristctl.records import open_run
+from wristctl.records.remove import removable, remove
 
 
 def rm(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import shlex
 
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out, Ref
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
 from wristctl.cli.tables import Table
-from wristctl.runs import Run, open_run
-from wristctl.runs.journal import plain
-from wristctl.runs.tags import read_tags
+from wristctl.records import Run, open_run
+from wristctl.records.journal import jsonable
+from wristctl.records.tags import read_tags
 
 
 def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
@@ -19,7 +19,7 @@ def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = Fal
     if as_json:
         manifest = json.loads(run.manifest.model_dump_json(by_alias=True))
         shown = {**manifest, "state": run.state, "tags": tags, "metrics": run.metrics, "run": str(run.path)}
-        print(json.dumps(plain(shown), indent=2))
+        print(json.dumps(jsonable(shown), indent=2))
         return
     print("\n\n".join(table.text() for table in _tables(run, tags)), end="\n\n")
     print(run.path)
@@ -40,9 +40,7 @@ def _tables(run: Run, tags: list[str]) -> list[Table]:
         *((f"input {each.role}", f"{each.kind} run {each.run}") for each in manifest.inputs),
         *([("error", manifest.error.what)] if manifest.error else []),
     ]
-    metrics = [
-        (name, each["value"], each["unit"], each["better"], each["n"]) for name, each in run.metrics.items()
-    ]
+    metrics = [(name, each["value"], each["unit"], each["better"], each["n"]) for name, each in run.metrics.items()]
     files = [(each.path, each.bytes, each.sha256[:12]) for each in manifest.outputs]
     return [
         Table("", ("run", run.id), facts),

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.options import RESULTS, Debug, Out, Ref
-from wristctl.runs import open_run
-from wristctl.runs.tags import change_tags
+from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Ref
+from wristctl.records import open_run
+from wristctl.records.tags import change_tags
 
 
 def tag(

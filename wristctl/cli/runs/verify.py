@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from wristctl.cli.completion import run_ids
-from wristctl.cli.runs.options import RESULTS, Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out
 from wristctl.config.errors import UserError
-from wristctl.runs import Run, list_runs, open_run
+from wristctl.records import Run, list_runs, open_run
 
 
 def verify(
