@@ -14,7 +14,7 @@ import wristctl
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "cli", "studies", "report", "comparison", "tuning", "learning", "identification", "trial", "bench", "vision",
-    "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
+    "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt", "seeds",
 )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
     if name == "simulate":
         from wristctl.simulation.closed_loop import simulate
 
-        return simulate
+        return lambda *given: simulate(*given).first
     if name == "open_run":
         from wristctl.records import open_run
 

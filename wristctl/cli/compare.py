@@ -49,7 +49,7 @@ def compare(session: Session) -> list[Table]:
     from wristctl.cli.loops import network_of, tuned_of, warn_if_it_buckles
     from wristctl.cli.tune import search_all
     from wristctl.comparison.comparison import compare as run_comparison
-    from wristctl.comparison.comparison import frame, series
+    from wristctl.comparison.comparison_data import frame, series
     from wristctl.comparison.step_cost import step_time
     from wristctl.control.table import controller, gains_of
 

@@ -93,7 +93,7 @@ def warn_if_outside(share: float) -> None:
 
 def warn_if_it_buckles(session: Session, loops: Iterable[Loop]) -> None:
     """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
-    from wristctl.simulation.plant import plant_of
+    from wristctl.simulation.worlds import plant_of
     from wristctl.wrist.statics import least_stiffness
 
     wrist = session.study.wrist

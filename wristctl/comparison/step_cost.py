@@ -11,8 +11,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, wrist_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate
+from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 
 class StepTime(NamedTuple):

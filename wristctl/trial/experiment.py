@@ -114,7 +114,7 @@ class Experiment:
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(0.0, 0.0, 0.0)
-            steering.expect(float(taut[0]), float(taut[0]))
+            steering.predict(float(taut[0]), float(taut[0]))
         steering.see(0.0, 0.0)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
