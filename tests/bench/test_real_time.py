@@ -50,7 +50,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
     def start(*faults: InjectedFault) -> tuple[BenchServer, Path]:
         settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
         line, wrist = PtyLine(), WristParameters()
-        _, film = start_film(settings.camera, wrist, None, tmp_path / "frame")
+        _, film = start_film(settings, wrist, None, tmp_path / "frame")
         server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record")
         server.address = line.address  # type: ignore[attr-defined]
         thread = threading.Thread(target=server.run)

@@ -57,7 +57,14 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     segments = settings.bench.segments if settings.port is None else None
     trial_log = TrialLog(run.file("data/log.csv").parent, segments, settings.control_period)
     experiment = Experiment(
-        settings, study.wrist, trials, trial_log, network_of(session), tuned_of(session.inputs), calibration
+        settings,
+        study.wrist,
+        trials,
+        trial_log,
+        network_of(session),
+        tuned_of(session.inputs),
+        calibration,
+        study.seed,
     )
     film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
     stopped: BaseException | None = None

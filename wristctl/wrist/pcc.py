@@ -12,13 +12,13 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import turn
 from wristctl.lanes.parts import replacing
 from wristctl.lanes.rows import planes_like
-from wristctl.wrist import shape
 from wristctl.wrist.arcs import ARC_LIMIT, Chords, chords, tip
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import chain_tip
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
+from wristctl.wrist.shape import arcs_backbone
 from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendons import lengths, moment_arms
 
@@ -107,6 +107,6 @@ PCC = PlantModel(
     tip_jacobian=_tip_jacobian,
     tips=lambda wrist, theta: chain_tip(theta, wrist.length),
     taut=_taut,
-    backbone=lambda wrist, theta, at: shape.backbone(theta, wrist.length, at),
+    backbone=arcs_backbone,
     equilibrium=equilibrium,
 )

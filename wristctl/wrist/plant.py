@@ -27,6 +27,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.wrist.shape import Backbone
 
 Array = NDArray[np.float64]
 
@@ -53,8 +54,8 @@ class PlantModel:
     """Tips (T, 2) [m] at coordinates (T, q)."""
     taut: Callable[[WristParameters, Array], Array]
     """Lengths (2,) [m] of the + and the - side's taut tendons at coordinates (q,)."""
-    backbone: Callable[[WristParameters, Array, Array], tuple[Any, Any]]
-    """Points and unit tangents, complex (m,), at coordinates (q,) and arc lengths (m,) [m], for pictures."""
+    backbone: Backbone
+    """For pictures."""
     equilibrium: Callable[[WristParameters, int, tuple[float, float]], Array] | None = None
     """Coordinates (q,) at rest under tensions [N per tendon, + and - side]; None where the plant cannot tell."""
 
