@@ -28,12 +28,14 @@ _KEPT = 60_000
 
 
 class Truth(NamedTuple):
-    """What a wrist of n segments did, once a millisecond."""
+    """What a wrist did, once a millisecond."""
 
     time: Array
     """(T,) [s] on the board's clock"""
     theta: Array
     """(T, q) the plant's coordinates: segment angles [rad]"""
+    angle: Array
+    """(T,) of the last disc [rad]"""
     rate: Array
     """(T, q) [rad/s]"""
     pull: Array
@@ -127,7 +129,13 @@ class BenchWrist:
         fresh = max(0, min(self._rows, self._periods - round(since / PERIOD)))
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
-        return Truth(time, *np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1))
+        theta, rate, pull, reeled = np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1)
+        return Truth(time, theta, self._model.angle(theta), rate, pull, reeled)
+
+    def tip_angle(self, coordinates: Array) -> Array:
+        """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+        angles: Array = self._model.angle(coordinates)
+        return angles
 
     def angles(self, times: Array) -> Array:
         """Coordinates (k, q) at k times within what `truth` remembers, straight lines between milliseconds."""

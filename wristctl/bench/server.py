@@ -126,5 +126,5 @@ class BenchServer:
         energised = any(self._rig.wrist.motion.energised)
         if energised != self._energised:
             self._energised = energised
-            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).theta.sum()
+            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).angle[-1]
             log.info("drives %s, wrist at %.1f deg", "on" if energised else "off", np.rad2deg(theta))

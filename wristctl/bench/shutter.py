@@ -55,7 +55,7 @@ class Shutter:
         at = self._time(shown)
         half = 0.5 * self._settings.exposure
         ends = self._wrist.angles(np.array([at - half, at + half]))
-        turned = abs(ends.sum(axis=1) @ [-1.0, 1.0])
+        turned = abs(float(np.diff(self._wrist.tip_angle(ends))[0]))
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
         moments = at + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)

@@ -14,6 +14,7 @@ from wristctl.cli.command import Session, Table
 from wristctl.cli.loops import network_of, tuned_of
 from wristctl.cli.operator import operator
 from wristctl.cli.trial_panel import trials_shown
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.metrics import METRICS
 from wristctl.trial.calibration import WristCalibration
@@ -54,8 +55,9 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
     cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(run.stream("order")))
     calibration = WristCalibration.load(session.inputs["calibration"]) if "calibration" in session.inputs else None
-    segments = settings.bench.segments if settings.port is None else None
-    trial_log = TrialLog(run.file("data/log.csv").parent, segments, settings.control_period)
+    plant = PLANTS[settings.bench.plant.model]
+    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
+    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
     experiment = Experiment(
         settings,
         study.wrist,

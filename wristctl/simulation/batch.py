@@ -21,7 +21,7 @@ from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, plant_of
-from wristctl.wrist.plant import PlantModel, poses
+from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 
 Array = NDArray[np.float64]
@@ -164,6 +164,4 @@ def _watch(
 
 def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:
     loop, wrist = world
-    plant = plant_of(wrist, loop.plant)
-    theta = float(poses(model, plant, loop.plant_segments, q[None]).angle[0]) if q.any() else 0.0
-    return observer_of(loop.sensor, loop.actuator, wrist, loop.control_period, ticks, theta)
+    return observer_of(loop.sensor, loop.actuator, wrist, loop.control_period, ticks, float(model.angle(q)))

@@ -96,7 +96,7 @@ class EmulatedTestbed:
     def truth(self, since: float) -> Array:
         """What the emulated wrist did since then."""
         truth = self._bench.truth(since)
-        return np.column_stack([truth.time - since, truth.theta, truth.theta.sum(axis=1), truth.pull])
+        return np.column_stack([truth.time - since, truth.theta, truth.angle, truth.pull])
 
     def close(self) -> None:
         """End the eye and the bench."""

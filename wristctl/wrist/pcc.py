@@ -105,6 +105,7 @@ PCC = PlantModel(
     disturbed=_disturbed,
     tip_pose=_tip_pose,
     tip_jacobian=_tip_jacobian,
+    angle=lambda theta: theta.sum(axis=-1),
     tips=lambda wrist, theta: chain_tip(theta, wrist.length),
     taut=_taut,
     backbone=arcs_backbone,

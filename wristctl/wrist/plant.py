@@ -21,6 +21,8 @@ from numba.extending import NativeValue, models, overload, register_model, typeo
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
+from wristctl.config.tables import PLANTS as _TABLE
+from wristctl.config.tables import Table
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
 from wristctl.lanes.compiled import compiled
@@ -50,6 +52,8 @@ class PlantModel:
     disturbed: Any
     tip_pose: Any
     tip_jacobian: Any
+    angle: Callable[[Array], Array]
+    """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
     tips: Callable[[WristParameters, Array], Array]
     """Tips (T, 2) [m] at coordinates (T, q)."""
     taut: Callable[[WristParameters, Array], Array]
@@ -74,6 +78,7 @@ class PlantModel:
         return self.equilibrium(wrist, n, tensions)
 
 
+PLANTS: Table[PlantModel] = _TABLE
 _MODELS: dict[Any, PlantModel] = {}
 
 
