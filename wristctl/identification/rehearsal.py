@@ -18,7 +18,7 @@ from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import SupposedWrist, angles
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion, toward
@@ -57,7 +57,7 @@ class RehearsedTruth:
     """Name of the plant's model."""
 
 
-@compiled
+@kernel
 def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: float) -> None:
     known, motor = load_segments(rows_of(model)), rows_of(motors)
     for tick in range(commands.shape[0]):

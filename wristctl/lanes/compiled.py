@@ -1,4 +1,4 @@
-"""`compiled`: numba's njit with this project's settings and a cache in the user's own cache folder.
+"""numba's njit with this project's settings, and a cache in the user's own cache folder for what Python calls.
 
 numba renews a cached function when its own file changes, but not when a function that it calls does. So the cache
 folder's name holds a hash of the file and of all files that it imports, theirs too: other sources, another folder.
@@ -27,6 +27,7 @@ TRIED = "0.68"
 """The numba that the tests ran with. What lanes are built on (docs/lanes.md) may be another thing in the next one."""
 
 _KEPT_DAYS = 30.0
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
 _CONSTANT_FREE = ("wristctl.config", "wristctl.records")
@@ -104,11 +105,15 @@ def caching(file: Path, *others: Path) -> Iterator[bool]:
         numba.config.CACHE_DIR = before
 
 
-def compiled(function: F, *others: Path) -> F:
-    """Compile for lanes: cached, without the interpreter's lock, without fast-math.
+def compiled(function: F) -> F:
+    """Compile for code that is compiled: inlined where it is called, and kept with what calls it."""
+    return cast(F, numba.njit(**_OPTIONS)(function))
+
+
+def kernel(function: F, *others: Path) -> F:
+    """Compile for Python, which calls it, and keep it in the cache.
 
     `others` are source files beside the function's own that decide what it does, where it does not import them.
     """
     with caching(Path(function.__code__.co_filename), *others) as cached:
-        jit = numba.njit(error_model="numpy", nogil=True, forceinline=True, cache=cached)
-        return cast(F, jit(function))
+        return cast(F, numba.njit(cache=cached, **_OPTIONS)(function))

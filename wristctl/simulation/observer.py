@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import at_rest, drive_of, pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
@@ -135,7 +135,7 @@ def go_on(watch: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, 
         predict(watch.observer, drive, known, tick, plus, minus, h)
 
 
-@compiled
+@kernel
 def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
     known, x = load_segments(rows_of(model)), rows_of(state)
     zero = 0.0 * x[0]

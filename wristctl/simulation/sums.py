@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import rows_named, rows_of
@@ -67,7 +67,7 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
     sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
 
 
-@compiled
+@kernel
 def _replay(series: Any, goals: Any, sums: Any, period: float) -> None:
     goal = goals_of(goals)
     total = rows_of(sums)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import rows_of
@@ -110,14 +110,14 @@ class Paths:
         return np.where(self._plus, plus, minus)
 
 
-@compiled
+@kernel
 def _targets(tension: Any, stiffness: float, taut: Any, reeled: Any) -> None:
     pulls, shorter, out = rows_of(tension), rows_of(taut), rows_of(reeled)
     for axis in range(len(tension)):
         out[axis] = spool_target(pulls[axis], stiffness, shorter[axis], 0.0)
 
 
-@compiled
+@kernel
 def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates: Any) -> None:
     speed, acceleration = motor
     gaps, known, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
@@ -128,7 +128,7 @@ def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates:
         out[axis] = clip(wanted, last[axis] - change, last[axis] + change)
 
 
-@compiled
+@kernel
 def _paths(model: Any, theta: float, found: Any) -> None:
     known, row = load_segments(rows_of(model)), rows_of(found)
     angle = theta + 0.0 * known.length

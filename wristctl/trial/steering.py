@@ -13,7 +13,7 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.control.response import Controlled, respond
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import fuse, observer_of, predict
@@ -94,7 +94,7 @@ class Steering:
         self.tick += 1
 
 
-@compiled
+@kernel
 def _respond(control: Any, bounds: Any, now: Any, period: float, found: Any) -> None:
     known, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
     wanted, low, high, plus, minus = respond(control, known, x[0], x[1], (bound[0], bound[1]), 0.0, period)
@@ -106,14 +106,14 @@ def _respond(control: Any, bounds: Any, now: Any, period: float, found: Any) -> 
     row[5] = high
 
 
-@compiled
+@kernel
 def _fuse(observer: Any, drive: Any, model: Any, ticks: Any, since: float, theta: float, h: float) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
     fuse(observer, drive, known, ticks, since, theta + zero, 1.0 + zero, h)
 
 
-@compiled
+@kernel
 def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length

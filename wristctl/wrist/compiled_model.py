@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wristctl.lanes.blocks import spread, to_blocks, to_rows
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist import tendons
@@ -39,7 +39,7 @@ class Terms(NamedTuple):
     """+ and - side, minus the derivative of the length, (..., n, 2) [m]."""
 
 
-@compiled
+@kernel
 def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
     for block in range(states.shape[0]):
         segment = load_segments(rows_of(parameters[block]))
@@ -81,7 +81,7 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     return Terms(rows[..., :3], mass, rows[..., 3 : 3 + n], tendon[..., 0, :], tendon[..., 1, :])
 
 
-@compiled
+@kernel
 def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
     for block in range(states.shape[0]):
         segment = load_segments(rows_of(parameters[block]))
@@ -124,7 +124,7 @@ def linearised(
     return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
 
 
-@compiled
+@kernel
 def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segments: Any) -> None:
     segment, pull = load_segments(rows_of(parameters)), rows_of(pulls)
     n = len(segments)

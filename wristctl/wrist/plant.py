@@ -25,7 +25,7 @@ from wristctl.config.tables import PLANTS as _TABLE
 from wristctl.config.tables import Table
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.lane import dot, planar, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
@@ -186,9 +186,9 @@ def advance_or_stop(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any
 
 
 @cache
-def kernel_of(kernel: Any, model: PlantModel) -> Any:
-    """The kernel, a Python function, compiled to move plants of this model; its cache goes by that one's source too."""
-    return compiled(kernel, model.source)
+def kernel_of(function: Any, model: PlantModel) -> Any:
+    """A function of Python as a kernel that moves plants of this model; its cache goes by that one's source too."""
+    return kernel(function, model.source)
 
 
 class Pose(NamedTuple):
