@@ -6,7 +6,7 @@ STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	clean venv
+	clean venv mutants coverage
 
 run: .venv/run
 	@set -e; \
@@ -63,6 +63,13 @@ bench-all: .venv/run
 # Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/cli/test_replay.py tests/runs/test_query.py
+
+# Small wrong changes to a copy of the package: does a test notice each? The listed ones, or `make mutants SEED=7`.
+mutants: .venv/dev
+	$(BIN)/python tests/mutants/run.py $(if $(SEED),--seed $(SEED))
+
+coverage: .venv/dev
+	$(BIN)/pytest -n auto --maxprocesses 4 --cov=wristctl --cov-report=term --cov-report=html:build/coverage
 
 venv: .venv/dev
 

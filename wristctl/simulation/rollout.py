@@ -80,7 +80,7 @@ def rollout(
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
     groups = _by_frames(worlds, world, motions[0].horizon)
     done = [
-        _run(controller, gains[own], motions, worlds, _of(lanes, own), start, record, threads, progress)
+        _run(controller, gains[own], motions, *_of(worlds, lanes, own), start, record, threads, progress)
         for own in groups
     ]
     if len(done) == 1:
@@ -129,8 +129,10 @@ def _by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float
     return [np.flatnonzero(group == number) for number in range(len(numbers))]
 
 
-def _of(lanes: Lanes, own: NDArray[np.intp]) -> Lanes:
-    return Lanes(lanes.motion[own], lanes.world[own], [lanes.streams[each] for each in own])
+def _of(worlds: Sequence[World], lanes: Lanes, own: NDArray[np.intp]) -> tuple[list[World], Lanes]:
+    """Worlds and lanes of some of the rollouts."""
+    there, which = np.unique(lanes.world[own], return_inverse=True)
+    return [worlds[each] for each in there], Lanes(lanes.motion[own], which, [lanes.streams[each] for each in own])
 
 
 def _run(

@@ -1,0 +1,195 @@
+"""Are small wrong changes noticed? `make mutants`, or `python tests/mutants/run.py [--seed K] [--count N]`.
+
+One change at a time is made to a copy of the package, and the tests run that should notice it, the nearest first,
+until one fails. Without a seed the changes are those of known.yaml, with one they are drawn. The table says which test
+noticed each; exit code 1 if fewer than 90 % of the drawn ones, or not all of the known ones, were noticed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+from draw import COUNT, drawn
+
+ROOT = Path(__file__).parents[2]
+KNOWN = Path(__file__).with_name("known.yaml")
+LEAST = 0.9
+"""Share of drawn changes that must be noticed."""
+LIMIT = 300.0
+"""Seconds after which the tests of one stage are taken to hang: that is noticed too."""
+
+NEIGHBOURS = {
+    "arrays": ["tests/wrist"],
+    "bench": ["tests/bench", "tests/trial", "tests/cli/test_hw_run.py"],
+    "board": ["tests/board", "tests/bench", "tests/firmware"],
+    "cli": ["tests/cli"],
+    "comparison": ["tests/comparison", "tests/cli/test_audit.py", "tests/cli/test_loop_commands.py"],
+    "config": [
+        "tests/config",
+        "tests/cli/test_help.py",
+        "tests/cli/test_wrapper.py",
+        "tests/cli/test_loop_commands.py",
+    ],
+    "control": ["tests/control", "tests/simulation", "tests/lanes"],
+    "identification": ["tests/identification", "tests/cli/test_identify_command.py"],
+    "lanes": ["tests/lanes", "tests/wrist", "tests/simulation/test_rollout.py"],
+    "learning": ["tests/learning", "tests/cli/test_learning_commands.py"],
+    "records": [
+        "tests/records",
+        "tests/cli/test_runs_commands.py",
+        "tests/cli/test_replay.py",
+        "tests/cli/test_wrapper.py",
+    ],
+    "report": ["tests/report", "tests/cli/test_loop_commands.py"],
+    "simulation": ["tests/simulation", "tests/newcomers/test_plants.py", "tests/comparison", "tests/tuning"],
+    "studies": ["tests/studies", "tests/cli"],
+    "trial": ["tests/trial", "tests/cli/test_hw_run.py", "tests/cli/test_hw_run_stops.py"],
+    "tuning": ["tests/tuning", "tests/cli/test_loop_commands.py"],
+    "vision": ["tests/vision", "tests/cli/test_vision_commands.py", "tests/bench/test_camera.py"],
+    "wrist": ["tests/wrist", "tests/newcomers/test_plants.py", "tests/simulation", "tests/identification/test_fit.py"],
+}
+"""Where the tests of a package are, after those of the file's own name."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change by its texts: `old` stands once in the file from line `near` on, if that is given."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    near: int = 1
+    tests: tuple[str, ...] = ()
+    equivalent: str = ""
+    """Why it changes nothing that anybody could notice; empty where it does."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What noticed a mutant (None: nothing did), and how long that took."""
+
+    mutant: Mutant
+    noticed: str | None
+    seconds: float
+
+
+def known() -> list[Mutant]:
+    """The committed list."""
+    listed = yaml.safe_load(KNOWN.read_text(encoding="utf-8"))
+    return [Mutant(**{**each, "tests": tuple(each.get("tests", ()))}) for each in listed]
+
+
+def from_seed(seed: int, count: int) -> list[Mutant]:
+    """Drawn ones."""
+    found = []
+    for number, change in enumerate(drawn(seed, count), start=1):
+        line = (ROOT / "wristctl" / change.file).read_text(encoding="utf-8")
+        begin = line.rfind("\n", 0, change.start) + 1
+        end = line.find("\n", change.end)
+        old = line[begin:end]
+        new = old[: change.start - begin] + change.new + old[change.end - begin :]
+        name = f"{seed}-{number:02} {change.kind}"
+        found.append(Mutant(name, change.file, old, new, change.line))
+    return found
+
+
+def stages(mutant: Mutant) -> list[list[str]]:
+    """Tests to run one after the other: those named, those of the file's name, the package's, its neighbours'."""
+    if mutant.tests:
+        return [list(mutant.tests)]
+    parts = Path(mutant.file).with_suffix("").parts
+    neighbours = NEIGHBOURS.get(parts[0], ["tests/test_python_face.py"])
+    own = sorted(str(each.relative_to(ROOT)) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
+    found: list[list[str]] = [[each for each in own if each.split("/")[1] in (parts[0], *parts[1:-1])]]
+    found += [[each] for each in neighbours if (ROOT / each).exists()]
+    return [each for each in found if each]
+
+
+def mutate(mutant: Mutant, folder: Path) -> None:
+    """Copy the project and change one place. ValueError where the old text is not there."""
+    for name in ("wristctl", "tests", "experiments", "docs", "benchmarks"):
+        ignored = shutil.ignore_patterns("__pycache__", "results", "*.avi")
+        shutil.copytree(ROOT / name, folder / name, ignore=ignored)
+    for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md", "Makefile"):
+        shutil.copy(ROOT / name, folder / name)
+    if (ROOT / "build").is_dir():
+        os.symlink(ROOT / "build", folder / "build")
+    file = folder / "wristctl" / mutant.file
+    lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+    before, after = "".join(lines[: mutant.near - 1]), "".join(lines[mutant.near - 1 :])
+    if mutant.old not in after:
+        raise ValueError(f"{mutant.name}: {mutant.file} has no {mutant.old!r} from line {mutant.near} on")
+    file.write_text(before + after.replace(mutant.old, mutant.new, 1), encoding="utf-8")
+
+
+def try_out(mutant: Mutant) -> Result:
+    """Run its tests until one fails."""
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="wristctl-mutant-") as scratch:
+        folder = Path(scratch) / "project"
+        folder.mkdir()
+        mutate(mutant, folder)
+        noticed = None
+        for stage in stages(mutant):
+            noticed = _failing(folder, stage, Path(scratch) / "tmp")
+            if noticed:
+                break
+    return Result(mutant, noticed, time.monotonic() - began)
+
+
+def _failing(folder: Path, tests: list[str], scratch: Path) -> str | None:
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--basetemp", str(scratch), *tests]
+    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "WRISTCTL_MUTANT": "1"}
+    try:
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return f"{' '.join(tests)} hang"
+    if done.returncode == 0:
+        return None
+    found = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    return found[0] if found else f"{' '.join(tests)}: exit {done.returncode}"
+
+
+def main() -> None:
+    """Try all, print the table, and end with the verdict."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, help="draw changes from this seed, in place of the known ones")
+    parser.add_argument("--count", type=int, default=COUNT, help="how many to draw")
+    parser.add_argument("--only", default="", help="those whose name or file contains this")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    given = parser.parse_args()
+    mutants = known() if given.seed is None else from_seed(given.seed, given.count)
+    mutants = [each for each in mutants if given.only in each.name or given.only in each.file]
+    alive = [each for each in mutants if not each.equivalent]
+    survivors, began = [], time.monotonic()
+    with ThreadPoolExecutor(given.jobs) as pool:
+        for result in pool.map(try_out, alive):
+            told = result.noticed or "NOTHING NOTICED"
+            print(f"{result.mutant.name:28} {result.mutant.file:40} {result.seconds:4.0f} s  {told}", flush=True)
+            if result.noticed is None:
+                survivors.append(result.mutant)
+    for each in (each for each in mutants if each.equivalent):
+        print(f"{each.name:28} {each.file:40}         equivalent: {each.equivalent}")
+    for each in survivors:
+        print(f"\nsurvived: {each.name}, {each.file}\n- {each.old.strip()}\n+ {each.new.strip()}")
+    noticed, count = len(alive) - len(survivors), max(1, len(alive))
+    share, seconds = noticed / count, time.monotonic() - began
+    print(f"\n{noticed} of {count} noticed ({100.0 * share:.0f} %), {seconds:.0f} s")
+    if share < (1.0 if given.seed is None else LEAST):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
