@@ -6,10 +6,12 @@ import math
 
 import pytest
 
-from wristctl.comparison.comparison import compare
+from wristctl.comparison.comparison import compare, refuse_tuned_scenarios
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
+from wristctl.config.control import CompareSettings, TuneSettings
+from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.control.table import CONTROLLERS, controller, gains_of
@@ -20,6 +22,9 @@ SETTINGS = (
     "references=[{kind: step, angle_deg: 10}, {duration: 0.3}]",
 )  # fmt: skip
 PID, SMC = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: smc, gains: exchanged}"
+
+
+SOFT: dict[str, object] = {"plant": {"stiffness_scale": 0.8}}
 
 
 def results(rows: str):
@@ -70,3 +75,21 @@ def test_step_time_is_measured_for_every_controller() -> None:
         chosen = controller(name)
         time = step_time(chosen, gains_of(chosen, next(iter(chosen.presets))), study.wrist)
         assert 0.0 < time.median <= time.p99
+
+
+def test_gains_are_not_judged_on_the_loop_and_the_reference_that_they_were_tuned_on() -> None:
+    tuned = TuneSettings.model_validate(
+        {"loops": {"soft": SOFT, "stiff": {}}, "scenarios": ({"loop": "soft", "reference": {"kind": "step"}},)}
+    )
+
+    def judged(loops: dict[str, dict[str, object]], reference: dict[str, object]) -> CompareSettings:
+        return CompareSettings.model_validate({"loops": loops, "references": (reference,)})
+
+    with pytest.raises(UserError, match="tuned on a scenario that they would be judged on: step 30 deg on loop other"):
+        refuse_tuned_scenarios(judged({"fine": {}, "other": SOFT}, {"kind": "step"}), tuned)
+    for loops, reference in (
+        ({"soft": {}}, {"kind": "step"}),  # the same name for another loop
+        ({"other": SOFT}, {"kind": "step", "angle_deg": 20.0}),
+        ({"other": SOFT}, {"kind": "minimum-jerk"}),
+    ):
+        refuse_tuned_scenarios(judged(loops, reference), tuned)

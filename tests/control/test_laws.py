@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.law import NOW, Controller, now_of, wrist_of
 from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.compiled import compiled
@@ -32,8 +34,8 @@ def _one_segment(wrist, now, out):
     result[0], result[1] = one_segment(wrist_of(wrist), row.theta, row.rate)
 
 
-def torque(name: str, gains: tuple[float, ...], memory: np.ndarray | None = None, **now: float) -> float:
-    chosen = controller(name)
+def torque(name: str | Controller, gains: tuple[float, ...], memory: np.ndarray | None = None, **now: float) -> float:
+    chosen = controller(name) if isinstance(name, str) else name
     given_now = {"torque_low": -1e9, "torque_high": 1e9, "period": 1e-3} | now
     row = np.array([given_now.get(field, 0.0) for field in NOW])
     kept = np.zeros(max(1, chosen.memory)) if memory is None else memory
@@ -146,3 +148,33 @@ def test_unknown_names_get_the_nearest_one() -> None:
         gains_of(controller("smc"), {"P1": 1.0, "P2": 1.0})
     with pytest.raises(UserError, match="no tuned gains of smc"):
         gains_of(controller("smc"), "tuned", {"pid": {}})
+
+
+def test_pid_acts_on_the_errors_rate_so_that_a_wrist_that_moves_as_asked_gets_no_torque() -> None:
+    assert torque("pid", (10.0, 5.0, 2.0), theta=0.3, theta_ref=0.3, rate=0.7, rate_ref=0.7) == 0.0
+    behind = torque("pid", (10.0, 5.0, 2.0), theta=0.3, theta_ref=0.3, rate=0.2, rate_ref=0.7)
+    assert behind == pytest.approx(2.0 * 0.5)
+
+
+@pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"feedforward"}))
+def test_gains_in_any_order_are_the_same_gains(name: str) -> None:
+    chosen = controller(name)
+    for preset, values in chosen.presets.items():
+        backwards = dict(reversed(list(values.items())))
+        assert gains_of(chosen, backwards) == gains_of(chosen, preset) == tuple(values[key] for key in chosen.gains)
+        assert gains_of(chosen, "tuned", {name: backwards}) == gains_of(chosen, preset)
+
+
+def test_a_law_reads_its_gains_by_name_whatever_their_order_in_the_table() -> None:
+    chosen = controller("pid")
+    turned = replace(chosen, name="turned", gains=dict(reversed(list(chosen.gains.items()))))
+    at = {"theta": 0.2, "theta_ref": 0.1, "rate": 0.5}
+    gains = {"Kp": 10.0, "Ki": 5.0, "Kd": 2.0}
+    both = [torque(each, each.values(gains), **at) for each in (chosen, turned)]
+    assert both[0] == both[1] != 0.0 and turned.values(gains) == (2.0, 5.0, 10.0)
+
+
+def test_a_preset_that_leaves_a_gain_out_or_gives_values_without_names_is_refused() -> None:
+    for wrong in ({"Kp": 1.0}, (1.0, 2.0, 3.0)):
+        with pytest.raises(ValueError, match="preset default of pid must give Kp, Ki, Kd by name"):
+            replace(controller("pid"), presets={"default": wrong})  # type: ignore[dict-item]

@@ -65,3 +65,10 @@ def test_a_preset_fills_what_is_not_given(name: str) -> None:
     changed = NetworkSettings.model_validate({"preset": name, "learning_rate": 0.5})
     assert all(getattr(plain, leaf) == value for leaf, value in PRESETS[name].items())
     assert changed == plain.model_copy(update={"learning_rate": 0.5})
+
+
+def test_a_network_beyond_one_standard_error_is_not_chosen_however_cheap() -> None:
+    """Least error 0.11 with a standard error of 0.03: 0.135 lies within, 0.145 beyond one and within two."""
+    best = candidate(90, [0.08, 0.14])
+    assert choose([candidate(10, [0.14, 0.15]), candidate(50, [0.13, 0.14]), best]).chosen.multiply_adds == 50
+    assert choose([candidate(10, [0.14, 0.15]), best]).chosen is best

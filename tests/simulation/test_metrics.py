@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.simulation.metrics import METRICS, metrics_of, summed
+from wristctl.simulation.metrics import METRICS, metrics_of, of_trajectory, summed
+from wristctl.simulation.trajectory import Trajectory
 
 PERIOD, HORIZON = 1e-4, 5.0
 TIME = np.arange(round(HORIZON / PERIOD)) * PERIOD
@@ -89,3 +90,28 @@ def test_nothing_settles_or_overshoots_where_the_last_angle_is_where_it_began() 
     found = metrics_of(1e-3, swing, swing, np.full((5000, 2), 2.0), final=1e-17, rest=1.0)
     assert all(math.isnan(found[name]) for name in ("settling", "settling_5", "overshoot", "rmse_settled"))
     assert found["rmse"] == 0.0
+
+
+def test_the_steady_state_is_that_of_the_last_tenth_of_the_horizon() -> None:
+    """|e| = t: its mean over the last tenth is 0.95 T."""
+    found = metrics_of(PERIOD, TIME, 0.0 * TIME, STILL, 5.0, 0.0)
+    assert found["steady_state"] == pytest.approx(0.95 * HORIZON, rel=1e-4)
+
+
+def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_angle() -> None:
+    """The tip 3 mm off, in the last tenth 5 mm; the angle 0.02 rad off what was wanted."""
+    time = np.arange(1000) * 1e-3
+    away = np.where(time < 0.9 - 1e-9, 3e-3, 5e-3)
+    wanted = np.tile((0.08, 0.0), (1000, 1))
+    still = {name: np.zeros(1000) for name in ("rate", "theta_ref", "torque_wanted", "torque")}
+    course = Trajectory(
+        label="", time=time, theta=np.full(1000, 0.12), theta_desired=np.full(1000, 0.10), tip_desired=wanted,
+        tip=wanted + away[:, None] * np.array([0.6, -0.8]), segment_theta=np.zeros((1000, 4)),
+        tension=np.zeros((1000, 2)), outside=0.25, **still,
+    )  # fmt: skip
+    assert of_trajectory(course) == {
+        "rmse_desired": pytest.approx(0.02),
+        "tip_rmse_mm": pytest.approx(math.sqrt(0.9 * 9.0 + 0.1 * 25.0)),
+        "tip_steady_mm": pytest.approx(5.0),
+        "outside_domain": 0.25,
+    }

@@ -109,3 +109,23 @@ def test_every_target_of_a_path_must_be_within_reach() -> None:
         evaluated(kind="tip-path", tips=((0.078, 0.014), (0.0, 0.08)), inverse="exact")
     with pytest.raises(ValidationError, match="needs inverse"):
         Reference(kind="tip-path")
+
+
+@pytest.mark.parametrize(
+    "reference",
+    [
+        Reference(kind="step", angle_deg=25.0),
+        Reference(tip=(0.078, 0.014), inverse="exact"),
+        Reference(kind="sine", angle_deg=15.0),
+        Reference(kind="multi-step", angles_deg=(20.0, -10.0, 5.0), duration=0.3),
+        Reference(kind="tip-path", inverse="exact", duration=0.3),
+    ],
+    ids=lambda reference: reference.kind if reference.tip is None else "tip",
+)
+def test_a_mirrored_reference_is_the_same_motion_to_the_other_side(reference: Reference) -> None:
+    one, other = (motion(each, WRIST, 1.5, 1e-3) for each in (reference, reference.mirrored()))
+    for name in ("theta_ref", "rate_ref", "acceleration_ref", "theta_desired"):
+        np.testing.assert_allclose(getattr(other, name), -getattr(one, name), atol=1e-12)
+    np.testing.assert_allclose(other.tip_desired, one.tip_desired * [1.0, -1.0], atol=1e-15)
+    assert (other.move, other.begin, other.rest) == (pytest.approx(-one.move), one.begin, one.rest)
+    assert reference.mirrored().mirrored() in (reference, reference.model_copy(update={"angle_deg": reference.end_deg}))

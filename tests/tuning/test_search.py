@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wristctl.config.control import Objective
 from wristctl.config.load import load_study
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.tuning.gains_file import read_gains, write_gains
-from wristctl.tuning.search import Evaluator, Search, history, search
+from wristctl.tuning.search import Evaluator, Search, history, objective, search
 from wristctl.tuning.space import GainSpace
 
 SETTINGS = (
@@ -79,3 +80,23 @@ def test_gains_read_back_exactly(tmp_path) -> None:
     gains = {"pid": {"Kp": 1 / 3, "Ki": 1e-300, "Kd": 2.0**0.5}}
     write_gains(tmp_path / "gains.json", gains)
     assert read_gains(tmp_path / "gains.json") == gains
+
+
+def test_every_weight_counts_and_what_never_settles_counts_the_whole_horizon() -> None:
+    metrics = {
+        "rmse": np.array([0.1, 0.2, 0.3]),
+        "settling": np.array([1.0, np.nan, 2.0]),
+        "chattering": np.array([50.0, 60.0, 70.0]),
+        "saturation": np.array([0.5, 0.25, 0.0]),
+        "iae": np.array([4.0, np.nan, 6.0]),
+    }
+    failed = np.array([False, False, True])
+    for weights, expected in (
+        ({"rmse": 2.0, "settling": 0.0, "chattering": 0.0}, [0.2, 0.4]),
+        ({"rmse": 0.0, "settling": 3.0, "chattering": 0.0}, [3.0, 15.0]),
+        ({"rmse": 0.0, "settling": 0.0, "chattering": 0.1}, [5.0, 6.0]),
+        ({"rmse": 0.0, "settling": 0.0, "chattering": 0.0, "saturation": 8.0}, [4.0, 2.0]),
+        ({"rmse": 1.0, "settling": 0.0, "chattering": 0.0, "iae": 1.0}, [4.1, np.inf]),
+    ):
+        found = objective(metrics, failed, Objective.model_validate(weights), 5.0)
+        np.testing.assert_allclose(found, [*expected, np.inf], rtol=1e-14)

@@ -14,7 +14,7 @@ from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach, torque_of
 from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.statics import equilibrium, least_stiffness
+from wristctl.wrist.statics import equilibrium, least_stiffness, stiffness
 
 WRIST = WristParameters()
 
@@ -87,3 +87,19 @@ def test_a_buckling_wrist_has_no_equilibrium_to_offer() -> None:
     assert least_stiffness(heavy, 4) < 0.0
     with pytest.raises(UserError, match="buckles"):
         equilibrium(heavy, 4, (2.0, 2.0))
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 8])
+def test_without_gravity_and_tension_a_wrist_is_as_stiff_as_its_springs_however_finely_it_is_cut(n: int) -> None:
+    """Springs in series: a torque at the tip bends n of them, each n times as stiff, by 1/n of the angle."""
+    free = WRIST.model_copy(update={"gravity": (0.0, 0.0), "pretension": 0.0})
+    assert least_stiffness(free, n) == pytest.approx(free.stiffness, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_the_least_stiffness_bounds_what_a_torque_at_the_tip_meets(n: int) -> None:
+    """1/compliance of the tip angle under a torque at the tip is never below the least stiffness."""
+    tangent = stiffness(WRIST, n, np.zeros(n), (WRIST.pretension, WRIST.pretension))
+    compliance = np.ones(n) @ np.linalg.solve(tangent, np.ones(n))
+    least = least_stiffness(WRIST, n)
+    assert 0.5 / compliance < least <= 1.0 / compliance * (1.0 + 1e-12)
