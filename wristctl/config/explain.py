@@ -11,9 +11,10 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.keys import field_at, keys_of, unit_of
 from wristctl.config.strict_yaml import KeyPath
+from wristctl.config.wording import Phrase
 
 
-def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserError:
+def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     """The most telling of the errors found; `origins` says the file and line (or override) of each key."""
     details = error.errors(include_url=False)
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
@@ -22,11 +23,11 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserErr
     for key in detail["loc"]:
         if (*path, key) in origins:  # a location also names the alternatives of a union, which no file does
             path = (*path, key)
-    where = f"{origins[path]}: {'.'.join(map(str, path))}" if path else ""
+    where = (origins[path], f": {'.'.join(map(str, path))}") if path else ""
     return UserError(_what(detail), where, _fix(detail))
 
 
-def located(error: UserError, origins: Mapping[KeyPath, str]) -> UserError:
+def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     """The error with the file and line (or override) of the key path that it names; as it is where it names none."""
     path: KeyPath = ()
     for key in error.where.split("."):
@@ -34,7 +35,7 @@ def located(error: UserError, origins: Mapping[KeyPath, str]) -> UserError:
         if at not in origins:
             break
         path = at
-    return UserError(error.what, f"{origins[path]}: {error.where}", error.fix, error.exit_code) if path else error
+    return error.at((origins[path], f": {error.where}")) if path else error
 
 
 def _what(detail: Any) -> str:
