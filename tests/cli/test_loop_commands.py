@@ -132,6 +132,18 @@ def test_a_dry_run_writes_nothing(call, tmp_path: Path, command: str) -> None:
     assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())
 
 
+def test_a_dry_run_of_compare_counts_the_directions_too(call) -> None:
+    code, out, _ = call("compare", "--dry-run", "--set", "directions=[ulnar, radial, flexion, extension]",
+                        "--set", "inverses=[none]", "--set", "rows=[{controller: feedforward}]")  # fmt: skip
+    assert code == 0 and "# 36 rollouts of 5 s\n" in out
+
+
+def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call) -> None:
+    search = "tuning={controllers: [smc, pid], candidates: 3, iterations: 5, horizon: 0.2}"
+    code, out, _ = call("compare", "--dry-run", "--set", search, "--set", "rows=[{controller: smc, gains: tuned}]")
+    assert code == 0 and "# a search first: 30 rollouts of 0.2 s for each of smc, pid\n" in out
+
+
 def test_a_buckling_wrist_is_a_warning_and_a_mark_in_the_manifest(call) -> None:
     code, _, err = call("simulate", "--set", "wrist.hand_mass=0.8", "--set", "horizon=0.1")
     assert code == 0 and "warning: the straight wrist buckles" in err

@@ -12,9 +12,11 @@ import typer
 
 from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_watch import watch
+from wristctl.cli.options import Debug, Json, Quiet
 from wristctl.cli.progress import listening, progress
-from wristctl.cli.tables import Table
 from wristctl.config.errors import UserError
+from wristctl.report.tables import Table
+from wristctl.studies.counting import no_event
 
 log = logging.getLogger(__name__)
 
@@ -32,9 +34,6 @@ Port = Annotated[
     typer.Option("--port", help="Serial port, socket://host:port, or emulated; without it the only board found."),
 ]
 Baud = Annotated[int, typer.Option("--baud", help="Of the serial line.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
 Image = Annotated[Path | None, typer.Option("--image", help="Another program than the packaged firmware (Intel hex).")]
 
 _BAUD = 250_000
@@ -88,7 +87,7 @@ def check(
 
     with listening(quiet, False) as console:
         if port == EMULATED:
-            with progress(console, _no_event, "preparing the emulated board", None, "", quiet):
+            with progress(console, no_event, "preparing the emulated board", None, "", quiet):
                 transport = open_transport(port, baud)
         else:
             transport = open_transport(port, baud)
@@ -134,7 +133,7 @@ def flash(
 
     with listening(quiet, False) as console:
         place = port or only_board()
-        with progress(console, _no_event, f"flashing the board at {place}", None, "", quiet):
+        with progress(console, no_event, f"flashing the board at {place}", None, "", quiet):
             write(place, image or IMAGE, log.info)
         if image is not None:
             return
@@ -166,7 +165,7 @@ def emulate(
 ) -> None:
     """Serve the emulated board for any serial client, in real time; its port is the only line on stdout."""
     with listening(quiet, False) as console:
-        with progress(console, _no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
+        with progress(console, no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
             from wristctl.board.emulator.atmega2560 import FIRMWARE, Atmega2560
             from wristctl.board.emulator.serve import PtyLine, TcpLine, serve
 
@@ -188,7 +187,7 @@ def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
 
     with TemporaryDirectory(prefix="wristctl-bench-") as folder:
         pictures = Path(folder) / "frame"
-        with progress(console, _no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+        with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
             from wristctl.bench.film import start_film
             from wristctl.bench.rig import Rig
             from wristctl.bench.server import BenchServer
@@ -231,7 +230,3 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
     """Names for states, faults and flags; the dictionary in hex."""
     named = {key: value.name or "none" if hasattr(value, "name") else value for key, value in values.items()}
     return {**named, "dictionary": f"{values['dictionary']:08x}", "firmware": ".".join(map(str, values["firmware"]))}
-
-
-def _no_event(*_kind: object, **_fields: object) -> None:
-    """These commands keep no journal."""

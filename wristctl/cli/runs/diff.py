@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import typer
 
 from wristctl.cli.completion import run_ids
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
-from wristctl.cli.tables import Table
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import open_run
 from wristctl.records.difference import Difference, difference
 from wristctl.records.journal import jsonable
+from wristctl.report.tables import Table
 
 _HEADS = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
 
