@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,6 +21,32 @@ LAYERS = (
 )  # fmt: skip
 
 
+FACE = {
+    "audit", "compare", "gen_data", "identify", "load_study", "open_run", "runs", "simulate", "train", "tune",
+}  # fmt: skip
+
+SMALL = """
+seed: 1
+gen-data: {samples: 40}
+train: {hidden: [4], epochs: 2, workers: 1}
+tune:
+  controllers: [smc, pid]
+  candidates: 2
+  iterations: 1
+  horizon: 0.2
+  loops: {fast: {plant_segments: 1}}
+  scenarios: [{loop: fast, reference: {kind: step, angle_deg: 20}}]
+compare:
+  horizon: 0.2
+  loops: {fast: {plant_segments: 1}}
+  references: [{duration: 0.1}]
+  inverses: [network]
+  rows: [{controller: pid, gains: tuned}]
+simulate: {horizon: 0.2}
+"""
+"""As README's study, in a moment."""
+
+
 def test_a_notebook_can_simulate_from_overrides() -> None:
     study = wristctl.load_study(None, "simulate.controller=computed-torque", "simulate.gains=default")
     done = wristctl.simulate(study)
@@ -26,10 +55,41 @@ def test_a_notebook_can_simulate_from_overrides() -> None:
     assert frame["theta"].iloc[-1] == pytest.approx(frame["theta_desired"].iloc[-1], abs=1e-3)
 
 
+def test_the_readmes_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    file = tmp_path / "experiments" / "paper.yaml"
+    file.parent.mkdir()
+    file.write_text(SMALL)
+    assert re.findall(r"experiments/[\w-]+\.yaml", code) == ["experiments/paper.yaml"]
+    monkeypatch.chdir(tmp_path)
+    wristctl.train(wristctl.load_study(file), out="results")
+    known: dict[str, Any] = {}
+    exec(code, known)
+    assert wristctl.runs()["kind"].tolist() == ["train", "tune"] and known["tuned"].run.state == "ok"
+    assert known["done"].trajectory.label == "smc/tuned" and (tmp_path / "angle.png").is_file()
+    assert known["compared"].rows[0].inverse == "network"
+
+
+def test_dir_shows_the_face_and_every_function_of_it_is_explained() -> None:
+    assert (
+        {name for name in dir(wristctl) if not name.startswith("_")} == FACE == set(wristctl.__all__) - {"__version__"}
+    )
+    for name in FACE:
+        function = getattr(wristctl, name)
+        text, given = inspect.getdoc(function), inspect.signature(function).parameters
+        assert text and "Raises UserError" in " ".join(text.split()), name
+        missing = [each for each in given if f"`{each}" not in text and each not in ("study", "file")]
+        assert not missing, f"{name} does not explain {missing}"
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        wristctl.simulat  # type: ignore[attr-defined]  # noqa: B018
+
+
 def test_import_is_light() -> None:
     heavy = "{'torch', 'scipy', 'pandas', 'matplotlib', 'cv2', 'numba', 'numpy'}"
-    code = f"import sys, wristctl; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+    for code in ("import wristctl; dir(wristctl)", "import wristctl.api, wristctl; wristctl.load_study()"):
+        code = f"import sys; {code}; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
 
 
 def test_imports_between_packages_point_down_only() -> None:
