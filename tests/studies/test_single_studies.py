@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import wristctl
 from tests.identification.benches import UPRIGHT, write_run
+from wristctl import studies
 from wristctl.studies.compare import planned_rollouts
 
 
@@ -62,3 +64,16 @@ def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
         chosen = ", ".join(f"{name}: {one[name] if name == left_out else several}" for name, several in axes.items())
         study = wristctl.load_study(None, f"compare={{horizon: 0.02, {chosen}}}")
         assert len(wristctl.compare(study).rows) == planned_rollouts(study.compare), left_out
+
+
+def test_no_study_knows_a_terminal() -> None:
+    """Whoever is told or asked comes in as the session's operator; what is printed, the command line prints."""
+    for file in Path(studies.__file__).parent.glob("*.py"):
+        tree = ast.parse(file.read_text())
+        imported = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+        imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        called = {
+            node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        }
+        assert not {name.split(".")[0] for name in imported} & {"typer", "rich", "click"}, file
+        assert not called & {"print", "input"}, file
