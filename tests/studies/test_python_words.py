@@ -11,7 +11,6 @@ import pytest
 
 import wristctl
 from wristctl.config.errors import UserError
-from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call
 
 study, STEP = wristctl.load_study, "reference: {kind: step, angle_deg: 5.0, inverse: network}"
@@ -31,7 +30,7 @@ WRONG: list[tuple[Wrong, str]] = [
     (lambda: wristctl.audit(study(None, CLAIM), table1=trained()),
      "fix: give table1=... a run of `wristctl.train(load_study('experiments/table1.yaml'))`"),
     (lambda: wristctl.audit(study(None, CLAIM), table1=trained(), out="here"), "fix: give table1=... a run"),
-    (lambda: wristctl.train(study(), data=trained()),  # type: ignore[arg-type]
+    (lambda: wristctl.train(study(), data=trained()),
      "a train result where a gen-data run is needed - data - fix: for example data='latest:gen-data'"),
     (lambda: wristctl.simulate(study(), network=trained(), out="here"),
      "this is in memory only - network - fix: write it too: wristctl.train(study, out=...)"),
@@ -72,7 +71,7 @@ def test_what_an_error_calls_is_there_to_be_called() -> None:
 def test_an_error_from_a_run_directory_keeps_the_command_lines_words_in_its_manifest(tmp_path: Path) -> None:
     """The directory is for those who repeat it at the shell."""
     with pytest.raises(UserError) as caught:
-        wristctl.compare(Study(), out=tmp_path)
+        wristctl.compare(study(), out=tmp_path)
     (run,) = tmp_path.iterdir()
     error = wristctl.open_run(run).manifest.error
     assert caught.value.fix == Argument("network").in_python and error is not None
