@@ -53,6 +53,34 @@ def test_verify_names_the_file_and_fails(call, made: tuple[Run, Run]) -> None:
     assert call("runs", "verify", data.id)[0] == 0
 
 
+@pytest.mark.parametrize("damage", ["flipped", "torn", "gone"])
+def test_a_damaged_manifest_is_named_by_verify_and_refused_as_an_input(
+    call, made: tuple[Run, Run], damage: str
+) -> None:
+    data, network = made
+    manifest = data.path / "run.json"
+    whole = manifest.read_bytes()
+    if damage == "gone":
+        manifest.unlink()
+    else:
+        manifest.write_bytes(whole[:99] if damage == "torn" else whole.replace(b'"gen-data"', b'"gen-eata"', 1))
+    what = "sealed file is missing" if damage == "gone" else "hash does not match what was sealed"
+    for refs in ((), (data.id,), ("latest:gen-data",)):
+        code, out, err = call("runs", "verify", *refs)
+        assert code == 3 and f"  run.json: {what}" in out, refs
+        assert f"1 of {1 if refs else 2} runs are not as they were sealed" in err
+    for ref in (data.id, str(data.path), "latest:gen-data"):
+        code, _, err = call("train", "--data", ref)
+        assert code == 2 and f"error: {what} - {manifest}" in " ".join(err.split()), ref
+    code, out, _ = call("runs", "replay", network.id)
+    assert code == 3 and f"cause: input: data: {what} ({manifest})" in out
+    for command in ("show", "report"):
+        code, _, err = call("runs", command, data.id)
+        assert code == 2 and f"error: {what}" in " ".join(err.split()), command
+    assert what in call("runs", "ls")[1]
+    assert "broken" in call("runs", "lineage", network.id)[1]
+
+
 def test_rm_asks_and_refuses_to_break_lineage(call, made: tuple[Run, Run], monkeypatch: pytest.MonkeyPatch) -> None:
     data, network = made
     code, _, err = call("runs", "rm", data.id, "--yes")
