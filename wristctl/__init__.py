@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from wristctl.version import __version__
+
 __all__ = ["__version__", "load_study", "open_run", "simulate"]
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
@@ -117,6 +118,7 @@ def test_the_manifest_says_what_was_run_on_what_by_which_code(make: Make, result
     assert manifest["numerics"] == {"dtype": "float64", "step": 1e-3}
     assert manifest["environment"]["packages"]["numpy"] == np.__version__
     assert manifest["timing"]["wall_s"] > 0
+    assert manifest["code"]["version"] == wristctl.__version__
     assert len(manifest["code"]["tree_sha256"]) == 64
     assert Run(run.path).metrics["accuracy"]["value"] is None
     events = [json.loads(line) for line in (run.path / "events.jsonl").read_text().splitlines()]

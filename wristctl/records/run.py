@@ -45,9 +45,8 @@ class Run:
     def manifest(self) -> Manifest:
         """run.json; UserError where it is not as it was sealed: no word of it is then believed."""
         file = self.path / MANIFEST
-        sealed = (self._sums() or {}).get(
-            MANIFEST
-        )  # first: a run that ends meanwhile writes run.json, and then its sums
+        # the sum first: a run that ends meanwhile writes run.json, and then its sums
+        sealed = (self._sums() or {}).get(MANIFEST)
         try:
             content = file.read_bytes()
         except OSError as error:
