@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.difference import Change, difference
-from wristctl.records.file_comparison import compare_files
 from wristctl.records.lineage import ancestry, dependents
 from wristctl.records.query import entries
 from wristctl.records.remove import removable, remove
@@ -78,34 +76,3 @@ def test_lineage_goes_back_to_the_data_and_forward_to_what_was_built_on_it(resul
 def test_a_running_run_cannot_be_removed(results: Path) -> None:
     with start_run("tune", Study(), "", results) as live, pytest.raises(UserError, match="still going on"):
         removable([Run(live.path)], force=True)
-
-
-def test_files_are_alike_within_tolerance_or_differ_at_a_named_place(tmp_path: Path) -> None:
-    time = np.arange(5) / 10
-    a, b = tmp_path / "a.csv", tmp_path / "b.csv"
-    frame = pd.DataFrame({"time": time, "theta": np.sin(time), "rate": np.cos(time)})
-    frame.to_csv(a, index=False)
-    frame.assign(theta=frame["theta"] * (1 + 1e-12)).to_csv(b, index=False)
-    assert compare_files(a, b).verdict == "within tolerance"
-    rate = frame["rate"].to_numpy().copy()
-    rate[3:] += 1e-3
-    frame.assign(rate=rate).to_csv(b, index=False)
-    assert compare_files(a, b) == ("differs", "column rate from time 0.3 s; largest difference 0.001")
-    frame[:-1].to_csv(b, index=False)
-    assert compare_files(a, b) == ("differs", "5 rows of 3 columns before, 4 rows of 3 columns now")
-
-
-def test_arrays_and_text_are_compared_by_their_numbers(tmp_path: Path) -> None:
-    a, b = tmp_path / "a.npz", tmp_path / "b.npz"
-    time, theta = np.arange(4) / 2, np.zeros((2, 4))
-    np.savez(a, time=time, theta=theta)
-    np.savez(b, time=time, theta=theta + np.array([[0, 0, 1, 1], [0, 0, 0, 1]]))
-    assert compare_files(a, b).detail == "array theta from row [0, 2]; largest difference 1"
-    first, second = tmp_path / "a.json", tmp_path / "b.json"
-    first.write_text('{"rmse": 0.1,\n"n": 5}')
-    second.write_text('{"rmse": 0.10000000001,\n"n": 5}')
-    assert compare_files(first, second).verdict == "within tolerance"
-    second.write_text('{"rmse": 0.1,\n"n": 6}')
-    assert compare_files(first, second) == ("differs", "line 2: 5 before, 6 now")
-    second.write_text('{"rmse": 0.1,\n"m": 5}')
-    assert compare_files(first, second) == ("differs", "from line 2")
