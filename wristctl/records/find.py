@@ -33,14 +33,14 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     runs = {run.id: run for run in list_runs(results)}
     if path.name in runs:
         return _readable(runs[path.name].path)
-    begun = [run for run in runs.values() if run.id.startswith(path.name)]
-    if len(begun) == 1:
-        return _readable(begun[0].path)
-    if begun:
+    matches = [run for run in runs.values() if run.id.startswith(path.name)]
+    if len(matches) == 1:
+        return _readable(matches[0].path)
+    if matches:
         raise UserError(
-            f"{len(begun)} runs begin like this",
+            f"{len(matches)} runs begin like this",
             str(ref),
-            f"write more of it: {', '.join(run.id for run in begun[:3])}",
+            f"write more of it: {', '.join(run.id for run in matches[:3])}",
         )
     fix = meant(path.name, runs) if len(runs) > 0 else "name a path, or the results folder with --out"
     raise UserError("no such run", f"{ref} in {results}", fix)

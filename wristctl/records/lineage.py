@@ -22,13 +22,13 @@ class Ancestor:
     role: str = ""
     inputs: tuple[Ancestor, ...] = field(default=())
 
-    def lines(self, head: str = "", rest: str = "") -> Iterator[str]:
+    def lines(self, first_indent: str = "", indent: str = "") -> Iterator[str]:
         """The tree as text, the run itself first."""
         role = f"{self.role}: " if self.role else ""
-        yield f"{head}{role}{self.id} ({self.state})"
+        yield f"{first_indent}{role}{self.id} ({self.state})"
         for number, each in enumerate(self.inputs, 1):
             last = number == len(self.inputs)
-            yield from each.lines(rest + ("└─ " if last else "├─ "), rest + ("   " if last else "│  "))
+            yield from each.lines(indent + ("└─ " if last else "├─ "), indent + ("   " if last else "│  "))
 
 
 def ancestry(run: Run, role: str = "", state: str = "") -> Ancestor:
