@@ -29,6 +29,12 @@ def test_ls_shows_what_was_asked_for(call, made: tuple[Run, Run]) -> None:
     listed = json.loads(call("runs", "ls", "--sort", "rmse", "--json")[1])["runs"]
     assert [each["id"] for each in listed] == [network.id, data.id]
     assert listed[0]["inputs"] == [data.id] and listed[0]["metrics"] == {"rmse": 1.0}
+    listed = json.loads(call("runs", "ls", "--sort", "rmse", "--reverse", "--json")[1])["runs"]
+    assert [each["id"] for each in listed] == [data.id, network.id]
+    assert [line.split()[0] for line in call("runs", "ls")[1].splitlines()[2:]] == [data.id, network.id], "oldest first"
+    out = call("runs", "ls", "--newer", "1h")[1]
+    assert data.id in out and network.id in out
+    assert call("runs", "ls", "--older", "1h")[1] == "no runs in results that meet this\n"
     code, _, err = call("runs", "ls", "--where", "rsme<1")
     assert code == 2 and "did you mean 'rmse'?" in err
 
@@ -41,6 +47,11 @@ def test_diff_names_each_part_that_differs(call, made: tuple[Run, Run]) -> None:
     assert found["code"] == found["environment"] == {}
     out = call("runs", "diff", data.id, network.id)[1]
     assert "rmse         2      1      -1         -50" in out
+    assert f"before  {data.id}\nafter   {network.id}\n" in out
+    out = call("runs", "diff", network.id, data.id)[1]
+    assert "rmse         1      2       1         100" in out
+    inputs = json.loads(call("runs", "diff", network.id, data.id, "--json")[1])["inputs"]
+    assert inputs == {"data": {"before": data.result_hash, "after": None}}
     assert "nothing differs" in call("runs", "diff", data.id, data.id)[1]
 
 

@@ -53,8 +53,11 @@ def compare_files(before: Path, after: Path) -> FileComparison:
 
 
 def _compare_tables(a: pd.DataFrame, b: pd.DataFrame) -> FileComparison:
-    if list(a.columns) != list(b.columns) or len(a) != len(b):
+    if a.shape != b.shape:
         return FileComparison("differs", f"{_size(a)} before, {_size(b)} now")
+    renamed = [f"column {x} before, {y} now" for x, y in zip(a.columns, b.columns, strict=True) if x != y]
+    if renamed:
+        return FileComparison("differs", renamed[0])
     columns = {str(name): (a[name].to_numpy(), b[name].to_numpy()) for name in a.columns}
     return _first_difference(columns, a["time"].to_numpy() if "time" in a else None, "column")
 
