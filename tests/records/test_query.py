@@ -22,7 +22,7 @@ from wristctl.records.tags import change_tags
 Make = Callable[..., Run]
 
 
-def _labels(found: list) -> list[str]:
+def _labels(found: list[IndexEntry]) -> list[str]:
     return [each.label for each in found]
 
 
@@ -150,6 +150,15 @@ def test_a_sealed_run_is_listed_without_being_read_again(make: Make, results: Pa
     assert entries(results) == indexed and open_run("latest:gen-data", results).id == latest.id
     os.utime(run.path / "run.json", ns=(0, about.st_mtime_ns + 1_000_000_000))
     assert [each.state for each in entries(results)] == ["broken"]
+
+
+def test_a_damaged_run_that_is_restored_with_its_dates_is_listed_as_it_was(make: Make, results: Path) -> None:
+    file = make().path / "run.json"
+    whole, changed = file.read_bytes(), file.stat().st_mtime_ns
+    for content, state in ((bytes(len(whole)), "broken"), (whole, "ok")):
+        file.write_bytes(content)
+        os.utime(file, ns=(0, changed))
+        assert [each.state for each in entries(results)] == [state]
 
 
 @pytest.mark.skipif(not os.environ.get("WRISTCTL_THOROUGH"), reason="long: make test-trust")

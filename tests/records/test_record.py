@@ -8,6 +8,7 @@ import logging
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -68,6 +69,8 @@ def test_tables_and_arrays_read_back_exactly(results: Path) -> None:
     assert np.array_equal(read.data("values")["value"], values)
     assert np.array_equal(read.array("values")["value"], values)
     assert read.array("values")["whole"].dtype == np.arange(3).dtype
+    with zipfile.ZipFile(run.path / "data/values.npz") as archive:
+        assert {each.date_time[:3] for each in archive.infolist()} == {(1980, 1, 1)}, "whenever they were written"
 
 
 def test_a_table_of_columns_or_of_a_frame_is_what_pandas_would_write(results: Path) -> None:
