@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import os
 import shutil
 import subprocess
 import sys
@@ -178,20 +179,30 @@ def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
         subprocess.run([*git, *command], check=True, capture_output=True)
     ask = (
         "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.records.code import code_state; "
-        "code, patch, _ = code_state(); print(code.commit, code.dirty); sys.stdout.write(patch.decode())"
+        "code, patch, _ = code_state(); print(code.commit, code.dirty, code.tree_sha256); "
+        "sys.stdout.write(patch.decode())"
     )
+    writing = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
     def state() -> list[str]:
-        asked = subprocess.run([sys.executable, "-c", ask, str(clone)], check=True, capture_output=True, text=True)
-        return asked.stdout.splitlines()
+        command = [sys.executable, "-c", ask, str(clone)]
+        return subprocess.run(command, check=True, capture_output=True, text=True, env=writing).stdout.splitlines()
 
-    head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True).stdout.strip()
-    assert state() == [f"{head} False"]
+    def ask_git(*arguments: str) -> str:
+        return subprocess.run([*git, *arguments], check=True, capture_output=True, text=True).stdout.strip()
+
+    head = ask_git("rev-parse", "HEAD")
+    (clean,) = state()
+    assert clean.startswith(f"{head} False ")
+    (clone / "wristctl" / "__pycache__").mkdir(exist_ok=True)
+    (clone / "wristctl" / "__pycache__" / "more.pyc").write_bytes(b"compiled")
+    assert state() == [clean], "what Python compiles is no part of the code"
     (clone / "wristctl" / "new.py").write_text("NEW = 1\n")
     (clone / "wristctl" / "__init__.py").write_text('__version__ = "9"\n')
+    objects = ask_git("count-objects")
     first, *patch = state()
-    assert first == f"{head} True"
+    assert first.startswith(f"{head} True ") and first.split()[2] != clean.split()[2]
     assert "+NEW = 1" in patch
     assert '+__version__ = "9"' in patch
-    status = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True).stdout
-    assert "?? wristctl/new.py" in status, "the user's index is untouched"
+    assert "?? wristctl/new.py" in ask_git("status", "--porcelain"), "the user's index is untouched"
+    assert ask_git("count-objects") == objects, "nothing is written to the user's repository"

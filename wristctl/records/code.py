@@ -13,6 +13,7 @@ from wristctl.records.manifest import Code
 from wristctl.version import __version__
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+_SOURCES = ("--", ".", ":(exclude,glob)**/__pycache__/**")
 
 
 def code_state() -> tuple[Code, bytes, str]:
@@ -39,8 +40,8 @@ def _patch() -> bytes:
         copy = Path(scratch) / "index"
         if index and (_PACKAGE / index.decode().strip()).is_file():
             shutil.copyfile(_PACKAGE / index.decode().strip(), copy)
-        _git("add", "--intent-to-add", "--", ".", index=copy)
-        return _git("diff", "--binary", "HEAD", "--", ".", index=copy) or b""
+        _git("add", "--intent-to-add", *_SOURCES, index=copy)
+        return _git("diff", "--binary", "HEAD", *_SOURCES, index=copy) or b""
 
 
 def _git(*arguments: str, index: Path | None = None) -> bytes | None:
