@@ -98,6 +98,7 @@ def test_a_changed_manifest_is_named_by_whoever_reads_the_run(
     assert [each.note for each in entries(results) if each.state == "broken"] == [CHANGED]
     assert changed_inputs(Run(live.path)) == [f"input: network: {CHANGED} ({manifest})"]
     assert [each.state for each in ancestry(Run(live.path)).inputs] == ["broken"]
+    assert open_run("latest:train", results).path == other.path, "the latest of another kind is as good as ever"
     other.check()
 
 
