@@ -7,6 +7,7 @@ import inspect
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,9 @@ import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
-    "cli", "studies", "report", "comparison", "tuning", "learning", "identification", "trial", "bench", "vision",
-    "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
+    "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
+    "trial", "bench", "vision", "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
+    "version",
 )  # fmt: skip
 
 
@@ -92,14 +94,32 @@ def test_import_is_light() -> None:
         subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
 
 
+def _imported(tree: ast.AST) -> Iterator[str]:
+    """The modules of wristctl that a module imports, wherever in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (each.name for each in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports name the whole path"
+            yield from (f"{node.module}.{each.name}" for each in node.names)
+
+
+def _layer(module: str) -> str:
+    """The package or file of wristctl that a module is in; a name that the face imports is where it has it from."""
+    name = [*module.split("."), "__init__"][1]
+    if name in LAYERS:
+        return name
+    face = ast.parse((PACKAGE / "__init__.py").read_text()).body
+    origins = [each for node in face if isinstance(node, ast.ImportFrom) for each in _imported(node)]
+    return next((_layer(each) for each in origins if each.endswith(f".{name}")), "__init__")
+
+
 def test_imports_between_packages_point_down_only() -> None:
     for file in PACKAGE.rglob("*.py"):
-        own = file.relative_to(PACKAGE).parts[0]
-        if file.parent == PACKAGE:
-            continue
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wristctl."):
-                other = str(node.module).split(".")[1]
+        own = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        for module in _imported(ast.parse(file.read_text())):
+            if module.split(".")[0] == "wristctl":
+                other = _layer(module)
                 assert LAYERS.index(other) >= LAYERS.index(own), f"{file}: {own} imports {other}"
 
 

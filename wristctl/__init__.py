@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from wristctl.version import __version__
+
 if TYPE_CHECKING:
     from wristctl.api import (
         audit,
@@ -33,7 +35,6 @@ if TYPE_CHECKING:
         tune,
     )
 
-__version__ = "0.1.0"
 __all__ = [
     "__version__",
     "audit",

@@ -153,6 +153,28 @@ def test_without_another_cause_a_difference_is_nondeterminism(tmp_path: Path) ->
     assert [each[:2] for each in verdicts(*runs)] == [("data/first.txt", "missing"), ("metrics.json", "differs")]
 
 
+def test_many_changes_are_counted_and_each_output_of_either_run_has_a_verdict(tmp_path: Path) -> None:
+    runs = []
+    for name in ("before", "now"):
+        with start_run("train", Study(), "", tmp_path) as live:
+            live.metric("rmse", 1.0)
+            live.file(f"data/{name}.txt").write_text("here")
+            live.file("timing.json").write_text(name)
+        runs.append(Run(live.path))
+    runs[1].manifest.code.tree_sha256 = 64 * "0"
+    (runs[1].path / "code.txt").write_text("".join(f"{64 * 'a'}  new{number}.py\n" for number in range(3)))
+    (runs[0].path / "code.txt").write_text("".join(f"{64 * 'b'}  old{number}.py\n" for number in range(4)))
+    why = causes(*runs)
+    assert [cause.split(":")[0] for cause in why] == 7 * ["code"] and why[-1] == "code: and 2 more"
+    assert why[1:3] == [f"code: old{number}.py: {12 * 'b'} -> absent" for number in range(2)]
+    assert {each.path: each.verdict for each in verdicts(*runs)} == {
+        "data/before.txt": "missing",
+        "data/now.txt": "added",
+        "metrics.json": "identical",
+        "timing.json": "volatile",
+    }
+
+
 def test_another_result_of_an_input_is_a_cause(tmp_path: Path) -> None:
     runs = []
     for value in (1.0, 2.0):
