@@ -17,6 +17,8 @@ PHRASES: list[tuple[Phrase, str, str]] = [
     (Argument("from_identified", "latest:identify"), "--from-identified latest:identify",
      "from_identified='latest:identify'"),
     (Argument("out", metavar=""), "--out", "out=..."),
+    (Argument("where", "rmse<1", quoted=True), "--where 'rmse<1'", "where='rmse<1'"),
+    (Argument("label", ""), "--label", "label=''"),
     (Argument("runs", "latest:hw-run", positional=True), "latest:hw-run", "runs='latest:hw-run'"),
     (Setting("wrist.length=0.09"), "--set wrist.length=0.09", "load_study(..., 'wrist.length=0.09')"),
     (Setting("source=run", "gen-data", option=True), "--source run", "load_study(..., 'gen-data.source=run')"),

@@ -34,6 +34,13 @@ WRONG: list[tuple[Wrong, str]] = [
      "a train result where a gen-data run is needed - data - fix: for example data='latest:gen-data'"),
     (lambda: wristctl.simulate(study(), network=trained(), out="here"),
      "this is in memory only - network - fix: write it too: wristctl.train(study, out=...)"),
+    (lambda: wristctl.simulate(study(), network="latest:train"), "fix: run `wristctl.train(study)` first"),
+    (lambda: wristctl.simulate(study(), network="2026"), "fix: name a path, or the results folder with out=..."),
+    (lambda: wristctl.simulate(study(), label="a/b", out="here"), "label='a/b' - fix: shorten or respell it"),
+    (lambda: wristctl.simulate(study(), out="/dev/null/x"), "fix: choose a folder you can write to with out=..."),
+    (lambda: wristctl.open_run("no/where"), "fix: name a run that `wristctl.runs()` shows"),
+    (lambda: wristctl.runs("rmse<"), "where='rmse<' - fix: for example where='rmse<1e-3'"),
+    (lambda: wristctl.runs(newer="2x"), "not an age - newer='2x'"),
     (lambda: wristctl.load_study(None, "wrist.lenght=1"), "load_study(..., 'wrist.lenght=1')"),
     (lambda: wristctl.load_study(None, "length"), "fix: for example load_study(..., 'wrist.length=0.09')"),
 ]  # fmt: skip
@@ -76,3 +83,10 @@ def test_an_error_from_a_run_directory_keeps_the_command_lines_words_in_its_mani
     error = wristctl.open_run(run).manifest.error
     assert caught.value.fix == Argument("network").in_python and error is not None
     assert error.fix == Argument("network").typed
+
+
+def test_a_metric_that_no_run_has_is_named_as_the_argument_it_was(tmp_path: Path) -> None:
+    wristctl.gen_data(study(None, "gen-data.samples=20"), out=tmp_path)
+    with pytest.raises(UserError) as caught:
+        wristctl.runs(sort="sampels", out=tmp_path)
+    assert str(caught.value) == "no run has a metric 'sampels' - sort='sampels' - fix: did you mean 'samples'?"

@@ -16,23 +16,26 @@ class Argument:
     """What a command is given by name: `--network RUN` or `--newer 2d`, in Python `network=...` or `newer='2d'`."""
 
     name: str
-    value: str = ""
-    """empty: any"""
+    value: str | None = None
+    """None: any"""
     metavar: str = "RUN"
     """what the command line writes where any value may stand; empty: nothing"""
     positional: bool = False
     """whether the command line takes it without its name"""
+    quoted: bool = False
+    """whether a shell needs quotes about the value"""
 
     @property
     def typed(self) -> str:
         """On the command line."""
         option = "" if self.positional else f"--{self.name.replace('_', '-')}"
-        return " ".join(part for part in (option, self.value or self.metavar) if part)
+        value = self.metavar if self.value is None else f"'{self.value}'" if self.quoted else self.value
+        return " ".join(part for part in (option, value) if part)
 
     @property
     def in_python(self) -> str:
         """As an argument of the function."""
-        return f"{self.name}={self.value!r}" if self.value else f"{self.name}=..."
+        return f"{self.name}=..." if self.value is None else f"{self.name}={self.value!r}"
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,9 @@ class Call:
         given = [study] if name != "runs" else []
         return f"wristctl.{name}({', '.join([*given, *(each.in_python for each in self.arguments)])})"
 
+
+OUT = Argument("out", metavar="")
+"""The folder of run directories, whichever it may be."""
 
 Phrase = str | Argument | Setting | Call | tuple["Phrase", ...]
 """Text with such parts in it: `("give ", Argument("table1"))`."""

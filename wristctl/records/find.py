@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
+from wristctl.config.wording import OUT, Call
 from wristctl.records.index import RESULTS, indexed, run_names
 from wristctl.records.manifest import MANIFEST, command_of
-from wristctl.records.run import Run
+from wristctl.records.run import NAME_A_RUN, Run
 
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
@@ -29,7 +30,7 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     if str(ref) and path.exists():
         return _readable(path)
     if len(path.parts) != 1:
-        raise UserError("no such run", repr(str(ref)), "name a run that `wristctl runs ls` shows")
+        raise UserError("no such run", repr(str(ref)), NAME_A_RUN)
     runs = {run.id: run for run in list_runs(results)}
     if path.name in runs:
         return _readable(runs[path.name].path)
@@ -42,7 +43,7 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
             str(ref),
             f"write more of it: {', '.join(run.id for run in matches[:3])}",
         )
-    fix = meant(path.name, runs) if len(runs) > 0 else "name a path, or the results folder with --out"
+    fix = meant(path.name, runs) if len(runs) > 0 else ("name a path, or the results folder with ", OUT)
     raise UserError("no such run", f"{ref} in {results}", fix)
 
 
@@ -53,7 +54,8 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
     if kind not in (None, found):
         raise UserError(f"a {found} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}")
     if run.state != "ok":
-        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {command_of(found)}` again")
+        again = ("run `", Call(command_of(found)), "` again")
+        raise UserError(f"run is {run.state}, not ok", str(run.path), again)
     run.check()
     return run
 
@@ -76,6 +78,6 @@ def _latest(ref: str, results: Path) -> Run:
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
     if latest is None:
         kinds = {run.kind for run in ended}
-        fix = meant(kind, kinds) if kinds else f"run `wristctl {command_of(kind)}` first"
+        fix = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     return Run(results / latest.id)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError
+from wristctl.config.wording import OUT
 from wristctl.records.manifest import MANIFEST, SUMS
 from wristctl.records.run import Run
 
@@ -48,7 +49,7 @@ def run_names(results: Path) -> list[str]:
         return []
     except OSError as error:
         raise UserError(
-            f"cannot read the results folder: {error.strerror}", str(results), "name it with --out"
+            f"cannot read the results folder: {error.strerror}", str(results), ("name it with ", OUT)
         ) from error
 
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.config.wording import Call
 from wristctl.records.files import files_below, sha256_of
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-_FIX = "name a run that `wristctl runs ls` shows"
+NAME_A_RUN = ("name a run that `", Call("runs ls"), "` shows")
+"""What to do where there is no run."""
 _RESTORE = "restore it or name another run"
 _CHANGED, _MISSING = "hash does not match what was sealed", "sealed file is missing"
 _ADDED = "file was added after sealing"
@@ -52,13 +54,13 @@ class Run:
         except OSError as error:
             if sealed:
                 raise UserError(_MISSING, str(file), _RESTORE) from error
-            raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), _FIX) from error
+            raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), NAME_A_RUN) from error
         if sealed and hashlib.sha256(content).hexdigest() != sealed:
             raise UserError(_CHANGED, str(file), _RESTORE)
         try:
             return Manifest.model_validate_json(content)
         except ValidationError as error:
-            raise UserError("not a manifest of a wristctl run", str(file), _FIX) from error
+            raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
 
     @property
     def kind(self) -> str:
@@ -94,7 +96,7 @@ class Run:
         try:
             found: dict[str, dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else {}
         except ValueError as error:
-            raise UserError("not valid JSON", str(file), f"run `wristctl {command_of(self.kind)}` again") from error
+            raise UserError("not valid JSON", str(file), ("run `", Call(command_of(self.kind)), "` again")) from error
         return found
 
     @property
@@ -120,7 +122,7 @@ class Run:
     def check(self) -> None:
         """Hash every file again; UserError naming run.json, or else the first that is missing or not as sealed."""
         self.__dict__.pop("manifest", None)
-        again = f"restore it or run `wristctl {command_of(self.kind)}` again"
+        again = ("restore it or run `", Call(command_of(self.kind)), "` again")
         for path, what in self.problems():
             if what != _ADDED:
                 raise UserError(what, str(self.path / path), again)

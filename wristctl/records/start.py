@@ -17,6 +17,7 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
+from wristctl.config.wording import OUT, Argument
 from wristctl.interrupt import interrupts, undisturbed
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
@@ -92,7 +93,7 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9_.-]{0,60}", label):
         raise UserError(
             "a label holds letters, digits, dots, dashes and underscores",
-            f"--label {label}",
+            Argument("label", label),
             "shorten or respell it",
         )
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
@@ -106,12 +107,12 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         except FileExistsError:
             if not path.is_dir():
                 raise UserError(
-                    "cannot create a run directory: a file is in the way", str(path), "choose another --out"
+                    "cannot create a run directory: a file is in the way", str(path), ("choose another ", OUT)
                 ) from None
             attempt += 1
         except OSError as error:
             what = f"cannot create a run directory: {error.strerror}"
-            raise UserError(what, str(out), "choose a folder you can write to with --out") from error
+            raise UserError(what, str(out), ("choose a folder you can write to with ", OUT)) from error
 
 
 def _begin(
@@ -172,7 +173,7 @@ def fingerprint(config: str, code: Code, environment: Environment, inputs: Mappi
 def _disk_error_of(error: BaseException, path: Path) -> BaseException:
     """The user's error behind a full or read-only disk, wherever it was met; any other error as it is."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
-        fix = "free space or choose another --out"
+        fix = ("free space or choose another ", OUT)
         return UserError(f"cannot write: {error.strerror}", str(error.filename or path), fix)
     return error
 
