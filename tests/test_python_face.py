@@ -83,6 +83,7 @@ def test_dir_shows_the_face_and_every_function_of_it_is_explained() -> None:
         assert text and "Raises UserError" in " ".join(text.split()), name
         missing = [each for each in given if f"`{each}" not in text and each not in ("study", "file")]
         assert not missing, f"{name} does not explain {missing}"
+    assert str(inspect.getdoc(wristctl.api)).startswith("The functions that")
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         wristctl.__getattr__("simulat")
 

@@ -17,6 +17,7 @@ In a notebook:
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from wristctl.version import __version__
@@ -52,11 +53,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """The functions are imported when one is first asked for, so that `import wristctl` stays light."""
-    if name not in __all__:
+    if name not in (*__all__, "api"):
         raise AttributeError(f"module 'wristctl' has no attribute {name!r}")
-    from wristctl import api
-
-    globals()[name] = found = getattr(api, name)
+    api = import_module("wristctl.api")
+    globals()[name] = found = api if name == "api" else getattr(api, name)
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,10 @@ import wristctl
 from wristctl.cli.app import main
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.learning import network_file
 from wristctl.records import Run
 from wristctl.studies.study_result import StudyResult
+from wristctl.tuning import gains_file
 
 CHAIN = ("gen_data", "train", "tune", "compare", "simulate", "audit")
 INPUTS: dict[str, dict[str, str]] = {
@@ -136,6 +138,31 @@ def test_an_input_may_be_a_result_a_run_an_id_a_path_or_the_latest(
     named = study.simulate.model_copy(update={"network": "latest:train", "tuned": "latest:tune"})
     in_study = study.model_copy(update={"simulate": named})
     np.testing.assert_equal(wristctl.simulate(in_study).metrics, expected)
+
+
+def test_a_network_and_gains_are_read_once_by_plan_search_and_comparison(
+    study: Study, recorded: Results, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+
+    def counted(function: Callable[[Path], Any]) -> Callable[[Path], Any]:
+        def counting(path: Path) -> Any:
+            read.append(function.__name__)
+            return function(path)
+
+        return counting
+
+    monkeypatch.setattr(network_file, "load_network", counted(network_file.load_network))
+    monkeypatch.setattr(gains_file, "read_gains", counted(gains_file.read_gains))
+    network, tuned = recorded["train"].run, recorded["tune"].run
+    step = {"kind": "step", "angle_deg": 10.0, "inverse": "network"}
+    search = {"candidates": 2, "iterations": 1, "horizon": 0.1, "loops": {"fast": {"plant_segments": 1}}}
+    search |= {"controllers": ["pid"], "scenarios": [{"loop": "fast", "reference": step}]}
+    (folder.parent / "search.yaml").write_text(json.dumps({"compare": {"tuning": search}}))
+    tuning = wristctl.load_study(folder.parent / "search.yaml").compare.tuning
+    compared = study.compare.model_copy(update={"tuning": tuning})
+    done = wristctl.compare(study.model_copy(update={"compare": compared}), network=network, tuned=tuned)
+    assert sorted(read) == ["load_network", "read_gains"] and set(done.searches) == {"pid"}
 
 
 def test_samples_may_come_from_courses_in_memory(in_memory: Results, recorded: Results) -> None:
