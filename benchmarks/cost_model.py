@@ -36,7 +36,7 @@ def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
     """A closed loop with the sliding mode law, of as many lanes as asked for."""
     from wristctl.config.loop import Loop, Reference
     from wristctl.config.wrist import WristParameters
-    from wristctl.control.table import controller
+    from wristctl.control.table import controller, gains_of
     from wristctl.simulation.reference import motion
     from wristctl.simulation.rollout import rollout, sample_period
 
@@ -44,7 +44,7 @@ def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
     course = motion(Reference(), wrist, horizon, sample_period(loop))
 
     def run(count: int) -> None:
-        gains = np.tile(law.presets["initial"], (count, 1))
+        gains = np.tile(gains_of(law, "initial"), (count, 1))
         rollout(law, gains, [course], np.zeros(count, np.int64), loop, wrist, threads=threads)
 
     run(16)

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # A shell starts background jobs with Ctrl-C ignored, and children inherit that: tests that interrupt need it back.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long an example takes depends on what else the machine does.
-settings.register_profile("wristctl", deadline=None)
+settings.register_profile("wristctl", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("wristctl")
 
 

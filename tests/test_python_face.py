@@ -19,7 +19,7 @@ PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
     "trial", "bench", "vision", "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
-    "version",
+    "seeds", "version",
 )  # fmt: skip
 
 

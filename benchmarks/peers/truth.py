@@ -13,9 +13,9 @@ from task import Task
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import motion
-from wristctl.wrist.allocation import TENDONS_PER_SIDE
 from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 GAINS = (20.0, 1.0, 20.0)
 """P1, P2, P3 of the sliding mode law: a calm loop, so that the error measured is the integrator's."""

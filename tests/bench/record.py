@@ -3,19 +3,8 @@
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-
-def wait_for(what: Callable[[], Any], patience: float = 60.0) -> Any:
-    """What it gives once that is true."""
-    until = time.monotonic() + patience
-    while not (got := what()):
-        assert time.monotonic() < until, "waited in vain"
-        time.sleep(0.02)
-    return got
 
 
 def read(record: Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -10,24 +11,25 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from tests.bench.client import WATCHDOG
 from tests.bench.conftest import TAUT
-from tests.bench.record import is_released, last_step, read, wait_for
+from tests.bench.record import is_released, last_step, read
+from tests.board.patience import WATCHDOG, patient, wait_for
 from wristctl.bench.fault_injection import Faults
 from wristctl.bench.film import start_film
-from wristctl.bench.frame_memory import FrameMemory, SharedCamera
+from wristctl.bench.frame_memory import FrameMemory
 from wristctl.bench.line import FaultyLine
+from wristctl.bench.real_time_bench import RealTimeBench
 from wristctl.bench.rig import Rig
 from wristctl.bench.server import BenchServer
 from wristctl.board.board import Board
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.emulator.serve import PtyLine
-from wristctl.board.messages import BAUD, Configure
-from wristctl.board.transport import SerialTransport
+from wristctl.board.messages import Flag, Target
 from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
@@ -39,79 +41,91 @@ STOPPED_WITHIN = WATCHDOG + 0.03
 AT_ONCE = 0.1
 """Seconds of the board's time that a late server runs in one go."""
 
-Serving = Callable[..., tuple[BenchServer, Path]]
+
+class Served(NamedTuple):
+    """A bench in a thread of this process, and its client's side: what is asked of it, its own thread answers."""
+
+    server: BenchServer
+    bench: RealTimeBench
+    record: Path
+
+
+Serving = Callable[..., Served]
 
 
 @pytest.fixture
 def serving(tmp_path: Path) -> Iterator[Serving]:
-    """Starts a bench's server in a thread; gives it, and the folder of its `frame` and `record`."""
-    running: list[tuple[BenchServer, threading.Thread]] = []
+    """Starts a bench's server in a thread."""
+    running: list[tuple[Served, threading.Thread]] = []
 
-    def start(*faults: InjectedFault) -> tuple[BenchServer, Path]:
+    def start(*faults: InjectedFault) -> Served:
         settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
         line, wrist = PtyLine(), WristParameters()
-        _, film = start_film(settings.camera, wrist, None, tmp_path / "frame")
-        server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record")
-        server.address = line.address  # type: ignore[attr-defined]
+        camera, film = start_film(settings, wrist, None, tmp_path / "frame")
+        ours, theirs = multiprocessing.Pipe()
+        server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record", theirs)
         thread = threading.Thread(target=server.run)
         thread.start()
-        running.append((server, thread))
-        return server, tmp_path
+        bench = RealTimeBench([camera], ours, line.address, tmp_path / "frame")
+        running.append((Served(server, bench, tmp_path / "record"), thread))
+        return running[-1][0]
 
     yield start
-    for server, thread in running:
-        server.stop()
+    for served, thread in running:
+        served.server.stop()
         thread.join()
+        served.bench.close()
 
 
-def board_of(server: BenchServer) -> Board:
-    board = Board(SerialTransport(server.address, BAUD))  # type: ignore[attr-defined]
-    board.connect()
-    board.configure(Configure(watchdog=WATCHDOG))
+def ready(bench: RealTimeBench) -> Board:
+    board = patient(bench.transport)
     board.enable()
     board.home()
     return board
 
 
 def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:
-    server, folder = serving()
+    _, bench, _ = serving()
     began = time.monotonic()
-    board, camera = board_of(server), SharedCamera(folder / "frame")
-    frames = []
+    board = ready(bench)
+    frames: list[tuple[float, Frame]] = []
     while len(frames) < 10:
         board.turn((-100.0, -100.0, 100.0, 100.0))
-        if (frame := camera.newest()) is not None:
+        if (frame := bench.camera.newest()) is not None:
             frames.append((time.monotonic(), frame))
+    board.send(Target((-40, -40, 40, 40), (400,) * 4))
+    board.wait_while(Flag.MOVING, timeout=60.0)
+    motion, truth = bench.motion(), bench.truth(began)
     board.close()
     assert (np.diff([frame.number for _, frame in frames]) >= 1).all()
     assert all(now - frame.time >= 2 / 60 for now, frame in frames)
     assert len({frame.image.tobytes() for _, frame in frames}) == 10
-    truth = server.truth(began)
     assert began <= truth.time[0] and truth.time[-1] <= time.monotonic()
     assert truth.theta[-1].sum() > 0.0
-    assert server.motion().steps[2] == -server.motion().steps[0] > 0
+    assert motion.steps == (-40, -40, 40, 40)
 
 
 def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving: Serving) -> None:
-    server, folder = serving(InjectedFault(kind="port-lost", at=0.2), InjectedFault(kind="marker-covered", at=0.1))
-    board = board_of(server)
-    server.begin(time.monotonic(), None)
+    faults = (InjectedFault(kind="port-lost", at=0.2), InjectedFault(kind="marker-covered", at=0.1))
+    _, bench, record = serving(*faults)
+    board = ready(bench)
+    bench.begin(time.monotonic())
     with pytest.raises(PortLost):
         while True:
             board.turn((0.0, 0.0, 50.0, 50.0))
-    told = wait_for(lambda: is_released(r := read(folder / "record")) and r)
+    told = wait_for(lambda: is_released(r := read(record)) and r)
     assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
 
 
 def test_a_board_that_restarts_is_found_out_and_its_drives_are_off(serving: Serving) -> None:
-    server, folder = serving(InjectedFault(kind="board-reset", at=0.2))
-    board = board_of(server)
-    server.begin(time.monotonic(), None)
+    server, bench, record = serving(InjectedFault(kind="board-reset", at=0.2))
+    board = ready(bench)
+    bench.begin(time.monotonic())
     due = server._rig.faults.next("board-reset", 0.0)
     with pytest.raises((Restarted, NoAnswer)):
         while True:
             board.turn((0.0, 0.0, 50.0, 50.0))
-    wait_for(lambda: is_released(read(folder / "record")))
+    wait_for(lambda: is_released(read(record)))
     # by the board's own clock: on a busy computer it loses time against the wall's
     assert max(at for at in server._rig.wrist.motion.last_step if at is not None) < due + AT_ONCE + 1e-3
     board.close()
@@ -157,7 +171,7 @@ def test_on_a_faulty_line_the_host_is_not_heard_for_a_while_and_a_lost_port_is_c
 def client(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
     """A client in a process of its own, and the record of its bench."""
     script, record = Path(__file__).with_name("client.py"), tmp_path / "record"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen([sys.executable, script, record], stdout=subprocess.PIPE, text=True, env=environment)
     yield process, record
     process.kill()

@@ -11,7 +11,7 @@ from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.bench import BenchSettings, Motors, WeakenedPlant
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.plant import plant_of
+from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibrium

@@ -3,54 +3,107 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
-from wristctl.board.board import Board
+from tests.board.patience import patient, wait_for
 from wristctl.board.board_errors import PortUnusable
 from wristctl.board.emulator import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, PtyLine, TcpLine, serve
-from wristctl.board.messages import BAUD, Configure, State
+from wristctl.board.messages import BAUD, State
 from wristctl.board.transport import SerialTransport
 
 
+class WatchedLine:
+    """A line that says whether a client is there."""
+
+    def __init__(self, line: Line) -> None:
+        self._line, self.address, self.there = line, line.address, False
+        self.receive, self.send, self.close = line.receive, line.send, line.close
+
+    def wait(self, timeout: float) -> bool:
+        self.there = self._line.wait(timeout)
+        return self.there
+
+
 @pytest.fixture(params=[PtyLine, lambda: TcpLine(0)], ids=["pty", "tcp"])
-def line(request: pytest.FixtureRequest) -> Iterator[Line]:
+def line(request: pytest.FixtureRequest) -> Iterator[WatchedLine]:
     """A line with an emulated board on it, in a thread of its own."""
-    make: Callable[[], Line] = request.param
-    chip, line, running = Atmega2560(), make(), [True]
-    serving = threading.Thread(target=serve, args=(chip, line, lambda: running[0]))
+    line, running = WatchedLine(request.param()), [True]
+    serving = threading.Thread(target=serve, args=(Atmega2560(), line, lambda: running[0]))
     serving.start()
-    line.chip = chip  # type: ignore[attr-defined]
     yield line
     running[0] = False
     serving.join()
     line.close()
 
 
-def test_a_board_answers_through_pyserial_and_starts_anew_for_the_next_client(line: Line) -> None:
+def test_a_board_answers_through_pyserial_and_starts_anew_for_the_next_client(line: WatchedLine) -> None:
     nonces = []
     for _ in range(2):
-        with Board(SerialTransport(line.address, BAUD)) as board:
+        with closing(patient(SerialTransport(line.address, BAUD))) as board:
             assert board.hello is not None
             nonces.append(board.hello.boot_nonce)
-            board.configure(Configure(watchdog=2.0))  # the machine may be busy
             board.enable()
             board.home()
             assert board.turn((1000.0, 0.0, 0.0, 0.0))[1].state == State.ENABLED
-        time.sleep(0.1)
+        wait_for(lambda: not line.there)
     assert nonces[1] == nonces[0] + 1
 
 
-def test_the_chip_keeps_real_time(line: Line) -> None:
-    chip: Atmega2560 = line.chip  # type: ignore[attr-defined]
-    time.sleep(0.1)
-    began, cycles = time.monotonic(), chip.cycles
-    time.sleep(0.5)
-    assert (chip.cycles - cycles) / FREQUENCY == pytest.approx(time.monotonic() - began, abs=0.15)
+class Clock:
+    """A line and the clock by which the chip on it runs: waiting takes these times, and no bytes come."""
+
+    address = "clock"
+
+    def __init__(self, waits: list[float]) -> None:
+        self.now, self.waits = 1000.0, waits
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def wait(self, timeout: float) -> bool:
+        self.now += self.waits.pop(0)
+        return True
+
+    def receive(self) -> bytes:
+        return b""
+
+    def send(self, data: bytes) -> None:
+        raise AssertionError("the board says nothing unasked")
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def paced(monkeypatch: pytest.MonkeyPatch, waits: list[float]) -> list[tuple[float, float]]:
+    """After each wait: seconds that have passed, and seconds that the chip has run."""
+    clock, chip = Clock(list(waits)), Atmega2560()
+    seen: list[tuple[float, float]] = []
+
+    def look(_edges: object, start: float) -> None:
+        assert start + chip.cycles / FREQUENCY == pytest.approx(clock.now, abs=1e-6)
+        seen.append((clock.now - began, (chip.cycles - cycles) / FREQUENCY))
+
+    began, cycles = clock.now, chip.cycles
+    monkeypatch.setattr("wristctl.board.emulator.serve.time", clock)
+    serve(chip, clock, lambda: bool(clock.waits), look)
+    return seen
+
+
+def test_the_chip_keeps_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    for passed, ran in paced(monkeypatch, [0.0005, 0.0007, 0.02, 0.0, 0.09, 0.0001] * 5):
+        assert ran == pytest.approx(passed, abs=1e-6)
+
+
+def test_time_in_which_the_computer_did_something_else_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of it but a tenth of a second, so that the board does not race through what it has missed."""
+    before, after, later = paced(monkeypatch, [0.05, 3.0, 0.01])
+    assert after[1] - before[1] == pytest.approx(0.1, abs=1e-6)
+    assert later[1] - after[1] == pytest.approx(0.01, abs=1e-6)
 
 
 def test_a_second_program_of_ours_is_refused_the_port_and_told_why() -> None:

@@ -14,7 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.bench.record import is_released, last_step, read, wait_for
+from tests.bench.record import is_released, last_step, read
+from tests.board.patience import wait_for
 from wristctl.records import list_runs
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))

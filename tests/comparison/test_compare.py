@@ -6,12 +6,14 @@ import math
 
 import pytest
 
-from wristctl.comparison.comparison import compare, frame, reference_name, series
+from wristctl.comparison.comparison import compare
+from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
 from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
-from wristctl.control.table import CONTROLLERS, controller
+from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.simulation.reference import reference_name
 
 SETTINGS = (
     "loops={one: {plant_segments: 1}, four: {}}", "horizon=0.4", "inverses=[none, exact]",
@@ -66,5 +68,5 @@ def test_step_time_is_measured_for_every_controller() -> None:
     study = load_study([])
     for name in CONTROLLERS:
         chosen = controller(name)
-        time = step_time(chosen, next(iter(chosen.presets.values())), study.wrist)
+        time = step_time(chosen, gains_of(chosen, next(iter(chosen.presets))), study.wrist)
         assert 0.0 < time.median <= time.p99

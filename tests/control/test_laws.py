@@ -65,7 +65,7 @@ def test_one_segment_model_of_the_laws_is_the_wrists(at: tuple[float, float, flo
 def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float], preset: str) -> None:
     """With an exact model sigma' = P1 rate + P2 theta'' = -P3 tanh(sigma) (E19-E21)."""
     theta, rate, theta_ref = at
-    p1, p2, p3 = controller("smc").presets[preset]
+    p1, p2, p3 = gains_of(controller("smc"), preset)
     u = torque("smc", (p1, p2, p3), theta=theta, rate=rate, theta_ref=theta_ref)
     inertia, load = inertia_and_load(theta, rate)
     sigma = p1 * (theta - theta_ref) + p2 * rate
@@ -120,9 +120,9 @@ def test_every_law_is_finite_for_any_state_and_gains_in_the_box(
 
 @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"feedforward"}))
 def test_every_gain_is_searched_over_six_decades_around_its_presets(name: str) -> None:
-    for number, gain in enumerate(controller(name).gains.values()):
+    for key, gain in controller(name).gains.items():
         assert gain.high / gain.low == pytest.approx(1e6)
-        assert gain.low <= controller(name).presets.get("default", (gain.low,) * 9)[number] <= gain.high
+        assert gain.low <= controller(name).presets.get("default", {key: gain.low})[key] <= gain.high
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))

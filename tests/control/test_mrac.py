@@ -6,7 +6,7 @@ import numpy as np
 
 from wristctl.config.wrist import WristParameters
 from wristctl.control.mrac import HIGHEST, LOWEST, MODEL_ANGLE, MODEL_RATE, PARAMETERS
-from wristctl.control.table import controller
+from wristctl.control.table import controller, gains_of
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 
@@ -50,7 +50,7 @@ def test_the_reference_model_smooths_a_step_by_its_double_pole(closed_loop) -> N
 
 
 def test_adaptation_removes_most_of_the_error_of_a_wrong_model(closed_loop, sine) -> None:
-    gains, reference = controller("mrac").presets["default"], sine(0.8, 1.0, 4.0)
+    gains, reference = gains_of(controller("mrac"), "default"), sine(0.8, 1.0, 4.0)
     fixed, adapting = (
         closed_loop("mrac", (*gains[:3], gamma, 1e-6), reference, PLANT, MODEL, segments_=4)
         for gamma in (1e-2, gains[3])

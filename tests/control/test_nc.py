@@ -6,7 +6,7 @@ import numpy as np
 
 from wristctl.config.wrist import WristParameters
 from wristctl.control.nc import UNITS
-from wristctl.control.table import controller
+from wristctl.control.table import controller, gains_of
 
 WRIST = WristParameters()
 
@@ -24,7 +24,7 @@ def test_weights_stay_within_their_bound_for_any_gains_in_the_box(closed_loop, s
 
 def test_error_shrinks_with_training_on_a_repeated_move(closed_loop, sine) -> None:
     reference = sine(0.8, 0.5, 20.0)
-    course = closed_loop("nc", controller("nc").presets["default"], reference, WRIST, WRIST, segments_=4, limit=120.0)
+    course = closed_loop("nc", gains_of(controller("nc"), "default"), reference, WRIST, WRIST, segments_=4, limit=120.0)
     each = np.sqrt(np.mean((course.theta - reference[:, 0]).reshape(10, -1) ** 2, axis=1))
     assert each[-1] < 0.5 * each[0]
     assert each[-1] <= each[4] <= each[1]

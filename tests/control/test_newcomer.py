@@ -17,7 +17,7 @@ from wristctl.tuning.search import search
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """-k (theta - theta_ref)"""
-    return -gains[0] * (now.theta - now.theta_ref)
+    return -gains.k * (now.theta - now.theta_ref)
 
 
 NEWCOMER = Controller(
@@ -25,7 +25,7 @@ NEWCOMER = Controller(
     law=law,
     source="a test",
     gains={"k": Gain("N m/rad", "spring", 1e-2, 1e4)},
-    presets={"default": (2.0,)},
+    presets={"default": {"k": 2.0}},
 )
 
 
@@ -47,7 +47,7 @@ def test_newcomer_is_simulated_tuned_and_compared_without_another_change() -> No
             },
         }
     )
-    assert simulate(study).metrics["rmse"] > 0.0
+    assert simulate(study).first.metrics["rmse"] > 0.0
     found = search(study, NEWCOMER, np.random.default_rng(0))
     assert 1e-2 <= found.gains["k"] <= 1e4
     results = compare(study, tuned={"newcomer": found.gains})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller
+from wristctl.control.table import controller, gains_of
 
 WRIST = WristParameters()
 SOFT = WRIST.model_copy(update={"stiffness": 0.8 * WRIST.stiffness})
@@ -61,5 +61,5 @@ def test_super_twisting_torque_is_continuous_across_its_surface(closed_loop, sin
 @pytest.mark.parametrize("name", ["smc-tracking", "super-twisting"])
 def test_integral_holds_while_a_tendon_saturates(name: str, closed_loop) -> None:
     far = np.tile([0.8, 0.0, 0.0], (50, 1))
-    course = closed_loop(name, controller(name).presets["default"], far, WRIST, WRIST, limit=10.0)
+    course = closed_loop(name, gains_of(controller(name), "default"), far, WRIST, WRIST, limit=10.0)
     assert (course.memory == 0.0).all()

@@ -11,7 +11,7 @@ import pytest
 from tests.identification.benches import DIRECTIONS, KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import Fit, fit, linearise
+from wristctl.identification.fit import SPOOL, Coordinate, Fit, fit, linearise
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.intervals import (
     autocorrelation,
@@ -55,14 +55,14 @@ def test_slopes_are_the_differences_of_expected_angles() -> None:
     trials, _ = logged(0, poses=(UPRIGHT,), directions=("flexion",))
     asked = problem(trials)
     x = asked.begin()
-    x[asked.coordinates["delay"]] = 0.0213
+    x[asked.coordinates[Coordinate("delay")]] = 0.0213
     slopes = linearise(asked, x).slopes[0]
-    for name, at in asked.coordinates.items():
-        size = 1e-6 if name.startswith("spool") else 1e-3
+    for each, at in asked.coordinates.items():
+        size = 1e-6 if each.kind == SPOOL else 1e-3
         nudge = size * (np.arange(len(x)) == at)
         ahead, behind = (linearise(asked, x + side * nudge).expected[0] for side in (1.0, -1.0))
         numeric = (ahead - behind) / (2.0 * size)
-        assert np.abs(slopes[:, at] - numeric).max() < 0.01 * np.abs(numeric).max(), name
+        assert np.abs(slopes[:, at] - numeric).max() < 0.01 * np.abs(numeric).max(), each
 
 
 def found(seed: int) -> tuple[Fit, dict[str, float], dict[str, bool]]:
@@ -159,7 +159,7 @@ def test_what_the_clocks_may_be_off_by_widens_the_delay_and_nothing_else() -> No
     fitted = fit(problem(trials, clock_error=0.0))
     sure = knowledge(fitted).deviation
     unsure = knowledge(replace(fitted, problem=problem(trials, clock_error=3e-3))).deviation
-    at = fitted.problem.coordinates["delay"]
+    at = fitted.problem.coordinates[Coordinate("delay")]
     assert unsure[at] == pytest.approx(np.hypot(sure[at], 3e-3))
     assert np.delete(unsure, at) == pytest.approx(np.delete(sure, at))
 

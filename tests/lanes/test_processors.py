@@ -17,13 +17,13 @@ import hashlib
 import numpy as np
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller
+from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 
 law, wrist, loop = controller("smc"), WristParameters(), Loop(plant_segments=4)
 followed = [motion(Reference(), wrist, 0.3, 1e-3)]
-gains = np.array(law.presets["initial"]) * np.linspace(1.0, 3.0, 17)[:, None]
+gains = np.array(gains_of(law, "initial")) * np.linspace(1.0, 3.0, 17)[:, None]
 for chosen in gains, gains[:1]:
     done = rollout(law, chosen, followed, np.zeros(len(chosen), np.int64), loop, wrist, record=True, threads=1)
     print(hashlib.sha256(done.samples.tobytes()).hexdigest())

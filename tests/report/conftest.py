@@ -22,7 +22,7 @@ from wristctl.report.trial_figures import errors as trial_errors
 from wristctl.report.trial_figures import tensions as trial_tensions
 from wristctl.report.tuning_figures import convergence, gain_history
 from wristctl.report.wrist_drawing import directions, stroboscope
-from wristctl.simulation.closed_loop import Simulation
+from wristctl.simulation.closed_loop import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.tuning.search import Search
 from wristctl.vision.marker import Sighting, SightingVerdict
@@ -59,7 +59,7 @@ def result(row: str, reference: str, rmse: float, failed: bool = False) -> Compa
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
     done = Simulation(course(row, 1.0, failed), metrics, failed)
-    return ComparedRow("default", reference, "exact", controller, gains, done)
+    return ComparedRow("default", reference, "exact", controller, gains, Repeated.once(done))
 
 
 def results() -> list[ComparedRow]:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from wristctl.comparison.comparison import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.simulation.closed_loop import Repeated
 
 
 def texts(axes: Axes) -> list[str]:
@@ -42,7 +43,9 @@ def test_map_prints_every_rmse_and_marks_what_failed(results: list[ComparedRow])
 def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results: list[ComparedRow]) -> None:
     for value in (0.0, np.nan):
         bad = [dataclasses.replace(r.simulation, metrics={"rmse": value}) for r in results]
-        (ours, *_) = rmse_map([dataclasses.replace(r, simulation=s) for r, s in zip(results, bad, strict=True)]).axes
+        (ours, *_) = rmse_map(
+            [dataclasses.replace(r, repeated=Repeated.once(s)) for r, s in zip(results, bad, strict=True)]
+        ).axes
         assert texts(ours) == ["0" if value == 0.0 else "x"] * len(results)
 
 

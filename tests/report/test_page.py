@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.comparison.comparison import ComparedRow, frame, series
+from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.comparison_page import several_page
 from wristctl.report.page import page
+from wristctl.simulation.closed_loop import Repeated
 
 HERE = Path(__file__).parent
 KEPT = HERE.parents[1] / "build" / "screenshots"
@@ -58,7 +60,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow
 
 def _complete(result: ComparedRow) -> ComparedRow:
     metrics = {"settling": 1.0, "steady_state": 1e-4} | result.simulation.metrics
-    return replace(result, simulation=replace(result.simulation, metrics=metrics))
+    return replace(result, repeated=Repeated.once(replace(result.simulation, metrics=metrics)))
 
 
 @pytest.fixture(scope="module")

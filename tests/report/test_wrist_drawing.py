@@ -13,7 +13,7 @@ from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS
 from wristctl.wrist.kinematics import chain_tip
-from wristctl.wrist.shape import backbone, discs, offset_points
+from wristctl.wrist.shape import arcs_backbone, discs, offset_points
 
 WRIST = WristParameters()
 L, C = WRIST.length, WRIST.tendon_offset
@@ -22,7 +22,7 @@ L, C = WRIST.length, WRIST.tendon_offset
 @pytest.mark.parametrize("angles", [[0.0], [0.7], [-1e-9], [0.3, -0.2, 0.5, 0.1], [1.0, 1.0, 1.0]])
 def test_last_disc_sits_at_the_tip_and_stands_across_it(angles: list[float]) -> None:
     theta = np.array(angles)
-    centres, normals = discs(theta, L, 5)
+    centres, normals = discs(arcs_backbone, theta, WRIST)
     x, y = chain_tip(theta[None], L)[0]
     assert centres[-1] == pytest.approx(x + 1j * y, abs=1e-15)
     assert normals[-1] == pytest.approx(np.exp(1j * theta.sum()))
@@ -32,7 +32,7 @@ def test_last_disc_sits_at_the_tip_and_stands_across_it(angles: list[float]) -> 
 def test_backbone_keeps_its_length_and_its_tangent() -> None:
     theta = np.array([0.3, -0.2, 0.5, 0.1])
     at = np.linspace(0.0, L, 4001)
-    points, tangents = backbone(theta, L, at)
+    points, tangents = arcs_backbone(WRIST, theta, at)
     steps = np.diff(points)
     assert np.abs(steps).sum() == pytest.approx(L, rel=1e-6)
     assert np.abs(steps / np.abs(steps) - tangents[:-1]).max() < 1e-3
@@ -40,7 +40,7 @@ def test_backbone_keeps_its_length_and_its_tangent() -> None:
 
 @pytest.mark.parametrize("theta", [0.6, -0.4])
 def test_drawn_tendons_have_the_models_length(theta: float) -> None:
-    frames = discs(np.array([theta]), L, 5)
+    frames = discs(arcs_backbone, np.array([theta]), WRIST)
     for sign in (1, -1):
         drawn = np.abs(np.diff(offset_points(frames, sign * C))).sum()
         assert drawn == pytest.approx(2 * 4 * (L / theta - sign * C) * np.sin(theta / 8), rel=1e-12)

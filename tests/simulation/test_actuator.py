@@ -14,6 +14,7 @@ from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
 
 WRIST = WristParameters()
@@ -31,7 +32,9 @@ def _drive(drive, state, model, commands, out, h):
 def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
     """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
     out = np.zeros((len(commands), 2))
-    _drive(drive, at_rest(drive, WRIST, np.zeros(1)), segments(WRIST, 1), np.ascontiguousarray(commands), out, PERIOD)
+    _drive(
+        drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), np.ascontiguousarray(commands), out, PERIOD
+    )
     return out
 
 
@@ -48,7 +51,7 @@ def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -
     drive = drive_of(Actuator(level="lagged", lag=0.05))
     pull = delivered(drive, np.tile([44.0, 4.0, 0.0], (500, 1)))
     time = (np.arange(500) + 1) * PERIOD
-    quantum = drive.stiffness * drive.step
+    quantum = drive.motor.stiffness * drive.motor.step
     assert np.abs(pull[:, 0] - (44.0 - 40.0 * np.exp(-time / 0.05))).max() < 0.5 * quantum + 0.4
     np.testing.assert_allclose(pull / quantum, np.rint(pull / quantum), atol=1e-9)
     assert np.abs(pull[:, 1] - 4.0).max() <= 0.5 * quantum + 1e-9
@@ -58,21 +61,21 @@ def test_lagged_pull_grows_no_faster_than_the_motor_turns() -> None:
     drive = drive_of(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
     pull = delivered(drive, np.tile([100.0, 4.0, 0.0], (100, 1)))[:, 0]
     slope = (pull[50] - pull[0]) / (50 * PERIOD)
-    assert slope == pytest.approx(drive.stiffness * drive.speed, rel=0.05)
+    assert slope == pytest.approx(drive.motor.stiffness * drive.motor.speed, rel=0.05)
 
 
 def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_its_target() -> None:
     drive = drive_of(Actuator(level="tendon"))
     length = delivered(drive, np.tile([4.0, 4.0, 0.8], (500, 1)))[:, 0]
-    fine = length / drive.step
+    fine = length / drive.motor.step
     np.testing.assert_allclose(fine, np.rint(fine), atol=1e-6)
     speed = np.diff(length) / PERIOD
-    assert speed.max() <= drive.speed + drive.step / PERIOD
+    assert speed.max() <= drive.motor.speed + drive.motor.step / PERIOD
     ramp = (length[20] - length[0]) / (0.5 * (20 * PERIOD) ** 2)
-    assert ramp == pytest.approx(drive.acceleration, rel=0.15)
-    target = 4.0 / drive.stiffness + WRIST.length - _plus_length(0.8)
-    assert length[-1] == pytest.approx(target, abs=drive.step)
-    assert length.max() <= target + 2 * drive.step
+    assert ramp == pytest.approx(drive.motor.acceleration, rel=0.15)
+    target = 4.0 / drive.motor.stiffness + WRIST.length - _plus_length(0.8)
+    assert length[-1] == pytest.approx(target, abs=drive.motor.step)
+    assert length.max() <= target + 2 * drive.motor.step
 
 
 def _plus_length(theta: float) -> float:

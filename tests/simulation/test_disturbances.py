@@ -9,7 +9,7 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Disturbances, Drift, Plant, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.simulation.disturbances import course
+from wristctl.simulation.disturbances import acting
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.wrist.compiled_model import linearised
@@ -27,14 +27,14 @@ def run(disturbances: Disturbances, plant: Plant | None = None, horizon: float =
 
 
 def test_push_is_half_a_sine_with_its_impulse() -> None:
-    force = course(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)), TIME)[:, 0]
+    force = acting(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)), TIME)[:, 0]
     assert force.sum() * 1e-3 == pytest.approx(-2.0 * 0.5 * 2 / np.pi, rel=1e-4)
     assert not force[TIME <= 1.0].any() and not force[TIME >= 1.5].any()
     assert force.min() == pytest.approx(-2.0, rel=1e-4)
 
 
 def test_drift_runs_linearly_between_its_ends() -> None:
-    scale = course(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)), TIME)[:, 1]
+    scale = acting(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)), TIME)[:, 1]
     assert scale[[0, 1000, 2000, 3000, 4999]] == pytest.approx([1.0, 1.0, 0.8, 0.6, 0.6])
 
 
@@ -42,7 +42,7 @@ def test_a_loaded_wrist_rests_where_tendons_gravity_and_tip_force_balance() -> N
     outcome = run(Disturbances(load=0.3))
     pulls = [2.0 * float(outcome.column(f"tension_{side}", 0)[-1]) for side in ("plus", "minus")]
     values, zero = segments(WRIST, 4, (0.0, 0.3)), np.zeros(4)
-    assert np.abs(linearised(values, outcome.segment_theta(0)[-1], zero, zero, pulls)[0]).max() < 1e-4
+    assert np.abs(linearised(values, outcome.coordinates(0)[-1], zero, zero, pulls)[0]).max() < 1e-4
     assert outcome.column("theta", 0)[-1] > run(Disturbances()).column("theta", 0)[-1] + 0.03
 
 

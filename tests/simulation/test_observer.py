@@ -12,10 +12,9 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller
-from wristctl.simulation.actuator import drive_of
+from wristctl.control.table import controller, gains_of
 from wristctl.simulation.closed_loop import simulate
-from wristctl.simulation.frames import frames
+from wristctl.simulation.frames import readings, schedule
 from wristctl.simulation.observer import stationary_gain
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
@@ -28,12 +27,15 @@ CLEAN = Sensor(level="camera", noise_deg=0.0, dropped=0.0)
 SOFT = Plant(stiffness_scale=0.8)
 
 
-def run(name: str, preset: str, loop: Loop, seeds: int = 1, horizon: float = 5.0, record: bool = True) -> Outcome:
+def run(
+    name: str, preset: str, loop: Loop, seeds: int = 1, horizon: float = 5.0, record: bool = True, noise: int = 0
+) -> Outcome:
     law = controller(name)
-    gains = np.tile(law.presets[preset], (seeds, 1)).reshape(seeds, -1)
+    gains = np.tile(gains_of(law, preset), (seeds, 1)).reshape(seeds, -1)
     course = motion(Reference(), WRIST, horizon, 1e-3)
     which = np.zeros(seeds, np.int64)
-    return rollout(law, gains, [course], which, loop, WRIST, seeds=np.arange(seeds), record=record, threads=1)
+    streams = [(noise, seed) for seed in range(seeds)]
+    return rollout(law, gains, [course], which, loop, WRIST, streams=streams, record=record, threads=1)
 
 
 def test_an_exact_model_and_a_clean_camera_give_the_true_angle() -> None:
@@ -79,13 +81,13 @@ def test_the_gain_is_the_stationary_one_of_an_independent_riccati_solver() -> No
     between, variance = sum(p @ noise @ p.T for p in powers), np.deg2rad(CAMERA.noise_deg) ** 2
     covariance = solve_discrete_are((powers[-1] @ fine).T, np.eye(3)[:, :1], between, [[variance]])
     expected = covariance[:, 0] / (covariance[0, 0] + variance)
-    assert stationary_gain(CAMERA, drive_of(Actuator()), WRIST, 1e-3) == pytest.approx(expected, rel=0.05)
+    assert stationary_gain(CAMERA, Actuator(), WRIST, 1e-3) == pytest.approx(expected, rel=0.05)
 
 
 def test_the_estimates_error_is_the_noise_that_linear_theory_lets_through() -> None:
     """Noise of one frame after another through the gain, then predicted over 34 to 50 ms."""
     sensor = Sensor(level="camera", dropped=0.0)
-    gain, variance = stationary_gain(sensor, drive_of(Actuator()), WRIST, 1e-3), np.deg2rad(sensor.noise_deg) ** 2
+    gain, variance = stationary_gain(sensor, Actuator(), WRIST, 1e-3), np.deg2rad(sensor.noise_deg) ** 2
     keep = (np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])) @ linear_wrist(1.0 / 60.0)
     fused = solve_discrete_lyapunov(keep, variance * np.outer(gain, gain))
     ahead = [linear_wrist(t)[0] for t in np.arange(34, 51) * 1e-3]
@@ -95,20 +97,26 @@ def test_the_estimates_error_is_the_noise_that_linear_theory_lets_through() -> N
     assert np.std(errors) == pytest.approx(expected, rel=0.1)
 
 
-def test_noise_and_drops_have_their_statistics_and_belong_to_the_seed_not_to_the_batch() -> None:
-    many = frames(CAMERA, 1e-3, 200.0, np.arange(3))
-    noise, seen = many.readings[:, 0], many.readings[:, 1]
-    assert noise.std(axis=0) == pytest.approx(np.full(3, np.deg2rad(0.1)), rel=0.03)
+def test_noise_and_drops_have_their_statistics_and_belong_to_the_stream_not_to_the_batch() -> None:
+    many = readings(12_000, [CAMERA] * 3, [(0, 0), (0, 1), (0, 2)])
+    noise, seen = many[..., 0], many[..., 1]
+    assert noise.std(axis=1) == pytest.approx(np.full(3, np.deg2rad(0.1)), rel=0.03)
     assert 1.0 - seen.mean() == pytest.approx(0.05, abs=0.006)
-    assert np.abs(np.corrcoef(noise.T)[np.triu_indices(3, 1)]).max() < 0.05
-    alone = frames(CAMERA, 1e-3, 200.0, np.array([2]))
-    assert (alone.readings[..., 0] == many.readings[..., 2]).all()
-    other = frames(CAMERA.model_copy(update={"seed": 1}), 1e-3, 200.0, np.array([2]))
-    assert (other.readings[:, 0, 0] != many.readings[:, 0, 2]).all()
+    assert np.abs(np.corrcoef(noise)[np.triu_indices(3, 1)]).max() < 0.05
+    alone = readings(12_000, [CAMERA], [(0, 2)])
+    assert (alone[0] == many[2]).all()
+    assert (readings(12_000, [CAMERA], [(1, 2)])[0, :, 0] != many[2, :, 0]).all()
+
+
+def test_cameras_of_one_stream_scale_the_same_draws_by_their_own_noise() -> None:
+    quiet, loud = (CAMERA.model_copy(update={"noise_deg": each}) for each in (0.05, 0.2))
+    first, second = readings(500, [quiet, loud], [(3, 4)] * 2)
+    np.testing.assert_allclose(second[:, 0], 4.0 * first[:, 0], rtol=1e-15)
+    assert (first[:, 1] == second[:, 1]).all()
 
 
 def test_frames_are_taken_at_the_frame_rate_and_arrive_after_the_delay() -> None:
-    taken = frames(CAMERA, 1e-3, 5.0, np.zeros(1, np.int64))
+    taken = schedule(CAMERA, 1e-3, 5.0)
     np.testing.assert_allclose(taken.captures * 1e-3, np.arange(len(taken.captures)) / 60.0, atol=0.5e-3)
     assert set(taken.arrivals - taken.captures) == {34}
     with pytest.raises(ValidationError, match="one frame per control_period"):
@@ -119,13 +127,13 @@ def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batc
     push = Disturbances(push=Push(force=2.0, start=0.2))
     loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"), disturbances=push)
     law, course = controller("smc-tracking"), motion(Reference(), WRIST, 0.5, 1e-3)
-    gains = np.tile(law.presets["camera"], (11, 1))
-    which, seeds = np.zeros(11, np.int64), np.arange(11)
-    batch = rollout(law, gains, [course], which, loop, WRIST, seeds=seeds, record=True, threads=2)
+    gains = np.tile(gains_of(law, "camera"), (11, 1))
+    which, streams = np.zeros(11, np.int64), [(5, seed) for seed in range(11)]
+    batch = rollout(law, gains, [course], which, loop, WRIST, streams=streams, record=True, threads=2)
     assert batch.samples is not None
     for index in (0, 7, 10):
         one = np.zeros(1, np.int64)
-        alone = rollout(law, gains[:1], [course], one, loop, WRIST, seeds=one + index, record=True)
+        alone = rollout(law, gains[:1], [course], one, loop, WRIST, streams=[streams[index]], record=True)
         assert alone.samples is not None and alone.samples[0].tobytes() == batch.samples[index].tobytes()
 
 
@@ -136,19 +144,18 @@ def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
     level: str, rmse: float, steady_state: float
 ) -> None:
     """Medians of 20 seeds at -20 % stiffness unknown to the law; its gains were chosen on another stream of noise."""
-    other_noise = CAMERA.model_copy(update={"seed": 7})
-    loop = Loop.model_validate({"sensor": other_noise, "plant": SOFT, "actuator": {"level": level}})
-    found = run("smc-tracking", "camera", loop, seeds=20, record=False).metrics
+    loop = Loop.model_validate({"sensor": CAMERA, "plant": SOFT, "actuator": {"level": level}})
+    found = run("smc-tracking", "camera", loop, seeds=20, record=False, noise=7).metrics
     assert np.median(found["rmse"]) <= rmse and np.median(found["steady_state"]) <= steady_state
     pushed = loop.model_copy(update={"disturbances": Disturbances(push=Push(force=2.0, start=2.5, duration=0.5))})
-    settled = run("smc-tracking", "camera", pushed, seeds=20, record=False).metrics["settling"]
+    settled = run("smc-tracking", "camera", pushed, seeds=20, record=False, noise=7).metrics["settling"]
     assert np.median(settled) <= 3.0 + 0.5
 
 
 def test_a_trajectory_holds_what_the_law_saw_and_what_acted_beside_what_was_and_was_commanded() -> None:
     loop = Loop(sensor=CAMERA, actuator=Actuator(level="tendon"))
     settings = SimulateSettings(controller="smc-tracking", gains="camera", loop=loop, horizon=0.5)
-    table = simulate(Study(simulate=settings)).trajectory.frame()
+    table = simulate(Study(simulate=settings)).first.trajectory.frame()
     late = np.abs(table["theta_seen"] - table["theta"])
     assert 1e-4 < late.max() < 0.05
     for side in ("plus", "minus"):

@@ -8,9 +8,10 @@ import pytest
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import CONTROLLERS, controller
+from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout, sample_period
+from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.wrist.statics import equilibrium
 
 WRIST = WristParameters()
@@ -24,8 +25,8 @@ UNKNOWN = {
 
 def run(name: str, plant: Plant, *references: Reference, horizon: float = 5.0, **loop: object) -> Outcome:
     chosen, each = controller(name), Loop.model_validate({"plant": plant, **loop})
-    motions = [motion(r, WRIST, horizon, sample_period(each)) for r in references]
-    gains = np.tile(chosen.presets["default"], (len(motions), 1))
+    motions = [motion(r, WRIST, horizon, sample_period(each.control_period)) for r in references]
+    gains = np.tile(gains_of(chosen, "default"), (len(motions), 1))
     return rollout(chosen, gains, motions, np.arange(len(motions)), each, WRIST, record=True, threads=1)
 
 
@@ -74,7 +75,10 @@ def test_commands_stay_finite_and_within_limits_for_any_gains_in_the_box(name: s
     rng = np.random.default_rng(1)
     box = np.log10([[g.low, g.high] for g in chosen.gains.values()]).reshape(-1, 2)
     gains = 10.0 ** rng.uniform(box[:, 0], box[:, 1], (80, len(box)))
-    motions = [motion(r, WRIST, 0.5, sample_period(loop)) for r in (STEP, Reference(angle_deg=-50.0, duration=0.3))]
+    motions = [
+        motion(r, WRIST, 0.5, sample_period(loop.control_period))
+        for r in (STEP, Reference(angle_deg=-50.0, duration=0.3))
+    ]
     outcome = rollout(chosen, gains, motions, np.arange(80) % 2, loop, WRIST, record=True)
     assert outcome.samples is not None
     tension = np.array([[outcome.column(f"tension_{s}", i) for s in ("plus", "minus")] for i in range(80)])

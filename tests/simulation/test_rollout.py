@@ -12,8 +12,9 @@ from scipy.integrate import solve_ivp
 from wristctl.config.loop import LOOPS, Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
+from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout, sample_period
+from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.simulation.stream import stream
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
@@ -25,7 +26,7 @@ def run(
     name: str, gains: list[tuple[float, ...]], loop: Loop, *references: Reference, horizon: float = 5.0,
     wrist: WristParameters = WRIST, threads: int = 1,
 ) -> Outcome:  # fmt: skip
-    motions = [motion(r, wrist, horizon, sample_period(loop)) for r in references]
+    motions = [motion(r, wrist, horizon, sample_period(loop.control_period)) for r in references]
     which = np.repeat(np.arange(len(motions)), len(gains))
     return rollout(
         controller(name), np.array(gains * len(motions)), motions, which, loop, wrist, record=True, threads=threads
@@ -103,7 +104,7 @@ def test_a_wrist_that_bends_beyond_a_full_turn_is_a_failure_and_spoils_no_other_
     theta = outcome.column("theta", 1)
     lost = int(np.argmax(np.isnan(theta)))
     assert 0 < lost < len(theta) and np.isnan(theta[lost:]).all() and np.isfinite(theta[:lost]).all()
-    assert np.isfinite(outcome.segment_theta(1)).all()
+    assert np.isfinite(outcome.coordinates(1)).all()
 
 
 def test_the_loop_is_left_right_symmetric() -> None:
@@ -123,7 +124,7 @@ def test_a_stream_gives_the_same_metrics_as_one_batch_in_constant_memory() -> No
     rng = np.random.default_rng(2)
     gains = 10.0 ** rng.uniform([0, -1, 0], [2, 0, 2], (200, 3))
     loop = LOOPS["sampled"]
-    followed = motion(MOVES[0], WRIST, 0.2, sample_period(loop))
+    followed = motion(MOVES[0], WRIST, 0.2, sample_period(loop.control_period))
     whole = rollout(controller("smc"), gains, [followed], np.zeros(200, np.int64), loop, WRIST)
     parts = stream(controller("smc"), (gains[i : i + 64] for i in range(0, 200, 64)), followed, loop, WRIST)
     streamed = np.concatenate([outcome.metrics["rmse"] for outcome in parts])

@@ -12,7 +12,7 @@ import pytest
 import wristctl
 from tests.identification.benches import UPRIGHT, write_run
 from wristctl import studies
-from wristctl.studies.compare import planned_rollouts
+from wristctl.comparison.comparison import count_rollouts
 
 
 def test_identified_parameters_reach_a_loop_from_memory(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
     for left_out in (*axes, ""):
         chosen = ", ".join(f"{name}: {one[name] if name == left_out else several}" for name, several in axes.items())
         study = wristctl.load_study(None, f"compare={{horizon: 0.02, {chosen}}}")
-        assert len(wristctl.compare(study).rows) == planned_rollouts(study.compare), left_out
+        assert len(wristctl.compare(study).rows) == count_rollouts(study.compare), left_out
 
 
 def test_no_study_knows_a_terminal() -> None:

@@ -10,7 +10,7 @@ from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.scene import Scene
 from wristctl.vision.scene_parts import FACE, THICK
-from wristctl.wrist.shape import discs
+from wristctl.wrist.shape import arcs_backbone, discs
 
 WRIST = WristParameters()
 QUIET = SceneSettings(noise=0.0)
@@ -54,7 +54,7 @@ def test_light_falls_off_across_the_picture_by_the_gradient() -> None:
 @pytest.mark.parametrize("positive", ["right", "left"])
 def test_positive_angles_bend_toward_the_side_that_the_markers_settings_say(positive: str) -> None:
     scene = Scene(QUIET, WRIST, Markers(positive=positive))  # type: ignore[arg-type]
-    tips = [discs(bent(each)[0], WRIST.length, 5)[0][-1] for each in (0.0, 30.0)]
+    tips = [discs(arcs_backbone, bent(each)[0], WRIST)[0][-1] for each in (0.0, 30.0)]
     straight, bent_over = scene.camera.project(np.array([[tip.real, tip.imag, 0.0] for tip in tips]))
     assert (bent_over[0] > straight[0] + 20.0) == (positive == "right")
     assert bent_over[1] > straight[1]  # and lower

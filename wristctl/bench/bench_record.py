@@ -43,7 +43,7 @@ class BenchRecord:
             "last_step": [_moved(at, start) for at in self._last.last_step],
             "steps": self._last.steps,
             "energised": self._last.energised,
-            "theta": float(newest.theta.sum()),
+            "theta": float(newest.angle[-1]),
             "pull": newest.pull.sum(axis=0).tolist(),
         }
         part = self._path.with_name(f".{self._path.name}.part")

@@ -7,17 +7,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.bench.motors import CYCLES, PERIOD, follow, motor_of, spool_state_of
+from wristctl.bench.motors import CYCLES, PERIOD, Hanging, follow, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.disturbances import course
-from wristctl.simulation.plant import plant_of
+from wristctl.simulation.disturbances import acting
+from wristctl.simulation.worlds import drawn, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
-from wristctl.wrist.segments import segments
+from wristctl.wrist.plant import kernel_of
 
 Array = NDArray[np.float64]
 
@@ -26,14 +28,16 @@ _KEPT = 60_000
 
 
 class Truth(NamedTuple):
-    """What a wrist of n segments did, once a millisecond."""
+    """What a wrist did, once a millisecond."""
 
     time: Array
     """(T,) [s] on the board's clock"""
     theta: Array
-    """(T, n) segment angles [rad]"""
+    """(T, q) the plant's coordinates: segment angles [rad]"""
+    angle: Array
+    """(T,) of the last disc [rad]"""
     rate: Array
-    """(T, n) [rad/s]"""
+    """(T, q) [rad/s]"""
     pull: Array
     """(T, 4) at the wrist [N], of tendons 1, 2, 4, 5, throughout the millisecond that ends then"""
     reeled: Array
@@ -52,14 +56,22 @@ class MotorMotion(NamedTuple):
 
 
 class BenchWrist:
-    """Straight and at rest at power-on, facing ulnar; it follows the board's pins in whole milliseconds."""
+    """Straight and at rest at power-on, facing ulnar; it follows the board's pins in whole milliseconds.
 
-    def __init__(self, settings: BenchSettings, wrist: WristParameters) -> None:
+    `stream` draws what the settings leave to chance of the plant: a bench has one wrist for as long as it stands.
+    """
+
+    def __init__(self, settings: BenchSettings, wrist: WristParameters, stream: Entropy = (0,)) -> None:
         drive = drive_of(settings.actuator)
         assert drive is not None
-        self._settings, self._wrist, self._n = settings, wrist, settings.segments
-        self._tendon = drive._replace(stiffness=settings.actuator.tendon_stiffness)
-        self._motor, self._spools = motor_of(settings), spool_state_of(settings)
+        self._settings, self._wrist = settings, wrist
+        self._drawn = drawn(settings.plant, stream)
+        self._model = PLANTS[settings.plant.model]
+        self._n = self._model.coordinates(settings.segments)
+        self._follow = kernel_of(follow, self._model)
+        one = drive.motor._replace(stiffness=settings.actuator.tendon_stiffness)
+        self._tendon = drive._replace(motor=one)
+        self._stepper, self._spools = stepper_of(settings), spool_state_of(settings)
         self._state = np.zeros(2 * self._n)
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
@@ -100,14 +112,14 @@ class BenchWrist:
         while (count := min(cycles // CYCLES - self._periods, _KEPT)) > 0:
             self._make_room(count)
             time = PERIOD * np.arange(self._periods, self._periods + count, dtype=np.float64)
-            acting = course(self._disturbances, time - self._start)
-            if acting is None:
-                acting = np.tile((0.0, 1.0), (count, 1))
+            disturbed = acting(self._disturbances, time - self._start)
+            if disturbed is None:
+                disturbed = np.tile((0.0, 1.0), (count, 1))
             out = self._record[self._rows : self._rows + count]
-            heard = follow(
-                self._tendon, self._motor, self._plant, self._sides, self._spools, self._state, acting, self._edges,
-                self._periods, out, (0,) * self._n,
-            )  # fmt: skip
+            hanging = Hanging(self._model, self._values, self._tendon, self._stepper, self._sides)
+            heard = self._follow(
+                hanging, self._spools, self._state, disturbed, self._edges, self._periods, out, (0,) * self._n
+            )
             self._edges = self._edges[heard:]
             self._rows += count
             self._periods += count
@@ -117,18 +129,24 @@ class BenchWrist:
         fresh = max(0, min(self._rows, self._periods - round(since / PERIOD)))
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
-        return Truth(time, *np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1))
+        theta, rate, pull, reeled = np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1)
+        return Truth(time, theta, self._model.angle(theta), rate, pull, reeled)
+
+    def tip_angle(self, coordinates: Array) -> Array:
+        """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+        angles: Array = self._model.angle(coordinates)
+        return angles
 
     def angles(self, times: Array) -> Array:
-        """Segment angles (k, n) [rad] at k times within what `truth` remembers, straight lines between milliseconds."""
+        """Coordinates (k, q) at k times within what `truth` remembers, straight lines between milliseconds."""
         first = max(0, round((times.min()) / PERIOD) - 2)
         known = self.truth(first * PERIOD)
         return np.stack([np.interp(times, known.time, angle) for angle in known.theta.T], axis=-1)
 
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
-        plant = plant_of(in_plane(self._wrist, direction), self._settings.plant)
-        self._plant = segments(plant, self._n)
+        plant = plant_of(in_plane(self._wrist, direction), self._drawn)
+        self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
 
     def _make_room(self, count: int) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.seeds import Entropy
 from wristctl.vision.camera import Frame, Image
 
 Array = NDArray[np.float64]
@@ -30,17 +31,13 @@ class Exposure(NamedTuple):
     """(k, n) of k parts of the exposure [rad]"""
     covered: bool
     swapped: bool
-    seed: int
-
-
-def stream(seed: int, number: int) -> np.random.Generator:
-    """The random stream of one frame: the first number decides whether it is lost, the others are its noise."""
-    return np.random.default_rng([seed, number])
+    noise: Entropy
+    """of the `shown` frame's random stream: its first number decides whether it is lost, the others are its noise"""
 
 
 def picture(exposure: Exposure, painter: Painter) -> Frame:
     """Draw it; of one `shown` frame always the same."""
-    rng = stream(exposure.seed, exposure.shown)
+    rng = np.random.default_rng(exposure.noise)
     rng.random()
     image = painter.render(exposure.theta, rng, covered=exposure.covered, swapped=exposure.swapped)
     return Frame(image, exposure.time, exposure.number)

@@ -13,20 +13,21 @@ import cv2
 
 from wristctl.bench.exposure import Exposure, picture
 from wristctl.bench.frame_memory import FrameMemory
-from wristctl.config.bench import RenderedCamera
+from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 
 
 def start_film(
-    settings: RenderedCamera, wrist: WristParameters, markers: Markers | None, pictures: Path
+    settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path
 ) -> tuple[BaseProcess, Connection]:
     """A process that puts pictures into the file `pictures`, and the way to it.
 
     It says when it is ready (None), takes exposures with the time at which their clock was 0 (`time.monotonic`), and
     ends when the other side is closed.
     """
-    FrameMemory(pictures, (settings.scene.height, settings.scene.width))
+    scene = settings.camera.scene
+    FrameMemory(pictures, (scene.height, scene.width))
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_develop, args=(theirs, settings, wrist, markers, pictures), daemon=True)
@@ -36,15 +37,16 @@ def start_film(
 
 
 def _develop(
-    exposed: Connection, settings: RenderedCamera, wrist: WristParameters, markers: Markers | None, pictures: Path
+    exposed: Connection, settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path
 ) -> None:
     """Draw each exposure and show it when it arrives; late, leave pictures out. Ctrl-C is others' affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from wristctl.vision.scene import Scene
 
     cv2.setNumThreads(1)
-    painter, memory = Scene(settings.scene, wrist, markers), FrameMemory(pictures)
-    delay = settings.delay_frames / settings.frame_rate
+    camera, memory = settings.camera, FrameMemory(pictures)
+    painter = Scene(camera.scene, wrist, markers, settings.plant.model)
+    delay = camera.delay_frames / camera.frame_rate
     try:
         exposed.send(None)
         while True:

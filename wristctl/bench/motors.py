@@ -16,13 +16,9 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import ARC_LIMIT
-from wristctl.lanes.lane import where
-from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import pulls
-from wristctl.simulation.disturbances import disturb
-from wristctl.wrist.integrator import step
-from wristctl.wrist.segments import load_segments
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)
@@ -31,7 +27,7 @@ _FULL_STEPS_PER_TURN = 4  # electrical, of a two-phase motor
 _PORT_A, _PORT_C = ord("A"), ord("C")
 
 
-class Motor(NamedTuple):
+class Stepper(NamedTuple):
     """What the four motors have in common; lengths of tendon [m] and pulls [N] at the spool."""
 
     step: float
@@ -41,10 +37,10 @@ class Motor(NamedTuple):
     release: float  # share of its surplus stretch that a released tendon loses in one period
 
 
-def motor_of(settings: BenchSettings) -> Motor:
+def stepper_of(settings: BenchSettings) -> Stepper:
     """The motors of these settings."""
     actuator, motors = settings.actuator, settings.motors
-    return Motor(
+    return Stepper(
         step=actuator.step_length,
         turn=_FULL_STEPS_PER_TURN * actuator.microstep * actuator.step_length,
         holding=motors.holding_torque / actuator.pulley_radius,
@@ -121,23 +117,29 @@ def _turn(spools: Any, motor: Any, stiffness: float) -> None:
             spools.reeled[axis] -= motor.release * max(0.0, pull - motor.detent) / stiffness
 
 
-@compiled
-def follow(
-    tendon: Any, motor: Any, plant: Any, sides: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int,
-    out: Any, segments: Any,
-) -> int:  # fmt: skip
+class Hanging(NamedTuple):
+    """What hangs on the board: the plant (its model and the values of its parameters), the Drive of one tendon, the
+    motors, and the axes of two tendons on the + and two on the - side."""
+
+    model: Any
+    values: Any
+    tendon: Any
+    motor: Any
+    sides: Any
+
+
+def follow(hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, out: Any, cut: Any) -> int:
     """Advance spools and wrist by a period for each row (tip force, stiffness scale) of `acting`; the edges used up.
 
-    `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on, `sides`
-    the axes of two tendons on the + and two on the - side, `tendon` the Drive of one tendon. A row of `out` is what
-    is so at a period's end: angles, rates; and what was in its middle, and held throughout: pulls, reeled lengths. A
-    wrist bent beyond a full turn stops there.
+    `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on. A row of
+    `out` is what is so at a period's end: coordinates, rates; and what was in its middle, and held throughout: pulls,
+    reeled lengths.
     """
-    undisturbed = load_segments(rows_of(plant))
+    undisturbed = parameters_of(hanging.model, rows_of(hanging.values))
+    motor, tendon, sides = hanging.motor, hanging.tendon, hanging.sides
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
-    n = len(segments)
-    theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
-    old = lanes_like(theta)
+    n = len(cut)
+    q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     zero = 0.0 * reeled[0]
     at = 0
     for k in range(acting.shape[0]):
@@ -145,25 +147,17 @@ def follow(
         while at < edges.shape[0] and edges[at, 0] < middle:
             _hear(spools, motor, edges[at, 0], edges[at, 1], edges[at, 2])
             at += 1
-        _turn(spools, motor, tendon.stiffness)
-        wrist = disturb(undisturbed, acting[k, 0], acting[k, 1])
+        _turn(spools, motor, tendon.motor.stiffness)
+        plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         plus, minus = zero, zero
         for pair in range(2):
             one, other = sides[pair], sides[2 + pair]
-            pull_plus, pull_minus = pulls(tendon, wrist, theta, omega, 1.0, reeled[one], reeled[other])
+            pull_plus, pull_minus = pulls(tendon, plant, q, rate, 1.0, reeled[one], reeled[other])
             pull[one] = pull_plus
             pull[other] = pull_minus
             plus = plus + pull_plus
             minus = minus + pull_minus
-        for i in range(n):
-            old[i] = theta[i]
-        step(wrist, theta, omega, plus, minus, PERIOD + zero)
-        alive = 1.0 + zero
-        for i in range(n):
-            alive = where(abs(theta[i]) < ARC_LIMIT, alive, zero)
-        for i in range(n):
-            theta[i] = where(alive > zero, theta[i], old[i])
-            omega[i] = where(alive > zero, omega[i], zero)
+        advance_or_stop(plant, q, rate, plus, minus, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]
         for axis in range(AXES):

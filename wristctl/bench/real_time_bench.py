@@ -24,6 +24,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy
 
 _END = 5.0
 
@@ -52,9 +53,9 @@ class RealTimeBench:
         """As `Bench.face`."""
         self._ask("face", direction)
 
-    def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
+    def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
         """As `Bench.begin`."""
-        self._ask("begin", start, disturbances)
+        self._ask("begin", start, disturbances, noise)
 
     def truth(self, since: float = 0.0) -> Truth:
         """As `Bench.truth`."""
@@ -94,7 +95,7 @@ def connect(
     It takes as long to start as its parts take to be compiled, if this is the first time.
     """
     folder = Path(tempfile.mkdtemp(prefix="wristctl-bench-"))
-    camera, film = start_film(settings.camera, wrist, markers, folder / "frame")
+    camera, film = start_film(settings, wrist, markers, folder / "frame")
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     bench = context.Process(target=_serve, args=(theirs, film, folder, settings, wrist, seed, record), daemon=True)

@@ -15,6 +15,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy, stream
 from wristctl.vision.scene import Scene
 
 
@@ -22,7 +23,7 @@ class Rig:
     """A wrist that hangs on a chip's pins, before a camera; all times are of the chip's clock [s].
 
     The wrist does not act back on the board, so it may follow when somebody looks; what it does is the same however
-    often that is.
+    often that is. `seed` is the root of its random streams.
     """
 
     def __init__(
@@ -36,9 +37,9 @@ class Rig:
         self.settings = settings
         self.chip = chip or Atmega2560()
         self.faults = Faults(settings.faults)
-        self.wrist = BenchWrist(settings, wrist)
-        self.shutter = Shutter(settings.camera, self.faults, self.wrist, seed)
-        self._drawn = settings.camera.scene, wrist, markers
+        self.wrist = BenchWrist(settings, wrist, stream(seed, "bench plant"))
+        self.shutter = Shutter(settings.camera, self.faults, self.wrist, stream(seed, "bench camera"))
+        self._drawn = settings.camera.scene, wrist, markers, settings.plant.model
 
     @cached_property
     def scene(self) -> Scene:
@@ -55,8 +56,10 @@ class Rig:
         self.catch_up()
         self.wrist.face(direction)
 
-    def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
-        """A trial's motion starts at `start`: from there count disturbances and faults."""
+    def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
+        """A trial's motion begins at `start`: disturbances, faults and frames of the stream `noise` count from it."""
         self.catch_up()
+        if noise is not None:
+            self.shutter.begin(start, noise)
         self.wrist.disturb(disturbances or Disturbances(), start)
         self.faults.begin(start)

@@ -22,6 +22,7 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, serve
 from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
+from wristctl.seeds import Entropy
 
 log = logging.getLogger(__name__)
 
@@ -67,9 +68,9 @@ class BenchServer:
         """As `Bench.face`."""
         self._rig.wrist.face(direction)
 
-    def begin(self, start: float, disturbances: Disturbances | None) -> None:
+    def begin(self, start: float, disturbances: Disturbances | None, noise: Entropy | None = None) -> None:
         """As `Bench.begin`."""
-        self._rig.begin(start - self._start, disturbances)
+        self._rig.begin(start - self._start, disturbances, noise)
 
     def truth(self, since: float) -> Truth:
         """As `Bench.truth`."""
@@ -125,5 +126,5 @@ class BenchServer:
         energised = any(self._rig.wrist.motion.energised)
         if energised != self._energised:
             self._energised = energised
-            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).theta.sum()
+            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).angle[-1]
             log.info("drives %s, wrist at %.1f deg", "on" if energised else "off", np.rad2deg(theta))

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from wristctl.bench.bench_wrist import BenchWrist
-from wristctl.bench.exposure import Exposure, stream
+from wristctl.bench.exposure import Exposure
 from wristctl.bench.fault_injection import Faults
 from wristctl.config.bench import RenderedCamera
+from wristctl.seeds import Entropy
 
 _SMEAR, _MOST_INSTANTS, _WITHIN = np.deg2rad(0.25), 8, 8
 """Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how
@@ -17,10 +18,19 @@ many are drawn at most; moments whose mean a part shows."""
 
 
 class Shutter:
-    """Takes frame number k at k/frame_rate on the board's clock. Each frame has a random stream of its own."""
+    """Takes frame number k at k/frame_rate on the board's clock. Each frame has a random stream of its own.
 
-    def __init__(self, settings: RenderedCamera, faults: Faults, wrist: BenchWrist, seed: int) -> None:
-        self._settings, self._faults, self._wrist, self._seed = settings, faults, wrist, seed
+    From a trial's start on frames count anew, in the trial's own stream: trials of the same scenario and repetition
+    meet the same noise, whatever was done before them.
+    """
+
+    def __init__(self, settings: RenderedCamera, faults: Faults, wrist: BenchWrist, stream: Entropy) -> None:
+        self._settings, self._faults, self._wrist = settings, faults, wrist
+        self._streams = [(0, stream)]  # the first frame of each, and whose it is
+
+    def begin(self, start: float, stream: Entropy) -> None:
+        """Frames from `start` [s] on belong to this stream."""
+        self._streams.append((math.ceil(start * self._settings.frame_rate - 1e-9), stream))
 
     @property
     def delay(self) -> float:
@@ -34,7 +44,7 @@ class Shutter:
 
     def arrives(self, number: int) -> bool:
         """Whether this frame gets through."""
-        dropped = stream(self._seed, number).random() < self._settings.dropped
+        dropped = np.random.default_rng(self._noise(number)).random() < self._settings.dropped
         return not (dropped or self._faults.on("frames-dropped", self._time(number)))
 
     def expose(self, number: int) -> Exposure:
@@ -45,12 +55,16 @@ class Shutter:
         at = self._time(shown)
         half = 0.5 * self._settings.exposure
         ends = self._wrist.angles(np.array([at - half, at + half]))
-        turned = abs(ends.sum(axis=1) @ [-1.0, 1.0])
+        turned = abs(float(np.diff(self._wrist.tip_angle(ends))[0]))
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
         moments = at + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
         covered, swapped = (self._faults.on(kind, at) for kind in ("marker-covered", "markers-swapped"))
-        return Exposure(number, time, shown, parts, covered, swapped, self._seed)
+        return Exposure(number, time, shown, parts, covered, swapped, self._noise(shown))
+
+    def _noise(self, number: int) -> Entropy:
+        first, stream = next(each for each in reversed(self._streams) if each[0] <= number)
+        return *stream, number - first
 
     def _time(self, number: int) -> float:
         return number / self._settings.frame_rate

@@ -10,6 +10,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy
 
 
 class VirtualBench:
@@ -29,9 +30,9 @@ class VirtualBench:
         """Turn the bench so that this direction's plane is the one that bends and is seen."""
         self._rig.face(direction)
 
-    def begin(self, start: float, disturbances: Disturbances | None = None) -> None:
-        """A trial's motion starts at `start`: from there count disturbances and faults."""
-        self._rig.begin(start, disturbances)
+    def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
+        """A trial's motion begins at `start`: disturbances, faults and frames of the stream `noise` count from it."""
+        self._rig.begin(start, disturbances, noise)
 
     def truth(self, since: float = 0.0) -> Truth:
         """What the wrist did after `since`, as far back as the last minute."""

@@ -51,7 +51,11 @@ def dictionary_hash(table: MessageTable) -> int:
 
 
 def c_header(table: MessageTable) -> str:
-    """Return messages.h: constants, codes, what each command needs, packed structures, range checks."""
+    """Return messages.h: constants, codes, packed structures, what each command needs, and who handles it.
+
+    Every command has one handler, `on_name`, and every answer one function that gives it, `answer_name`: declared here
+    and called from here alone, so that one that is missing does not link and one of another type does not compile.
+    """
     protocol, commands = table["protocol"], table["commands"]
     lines = [f"/* {MARK} */", "#ifndef MESSAGES_H", "#define MESSAGES_H"]
     lines += ["#include <stdbool.h>", "#include <stdint.h>", ""]
@@ -73,19 +77,14 @@ def c_header(table: MessageTable) -> str:
     for name, entry in table["answers"].items():
         lines += ["", *_c_struct(f"{name.lower()}_answer", entry)]
     whens = dict.fromkeys(entry["when"] for entry in commands.values())
-    lines += ["", f"enum when {{ {', '.join(f'WHEN_{when.upper()}' for when in whens)} }};"]
+    named = ", ".join(f"WHEN_{when.upper()}{' = 1' * (k == 0)}" for k, when in enumerate(whens))
+    lines += ["", f"enum when {{ {named} }}; /* 0: no command has this code */"]
     lines += ["", "/* X(name, when it is admitted, length of its payload, whether it feeds the watchdog) */"]
     lines += ["#define COMMANDS(X) \\"]
     for name, entry in commands.items():
         length = f"sizeof(struct {name.lower()}_command)" if entry["fields"] else "0"
         lines += [f"  X({name}, WHEN_{entry['when'].upper()}, {length}, {str(entry['feeds']).lower()}) \\"]
-    lines += ["", "static inline bool command_in_range(uint8_t command, const void *payload) {", "  switch (command) {"]
-    for name, entry in commands.items():
-        checks = _c_checks(entry)
-        if checks:
-            lines += [f"  case COMMAND_{name}: {{", f"    const struct {name.lower()}_command *m = payload;"]
-            lines += [*checks, "    return true;", "  }"]
-    return "\n".join([*lines, "  }", "  return true;", "}", "", "#endif", ""])
+    return "\n".join([*lines, "", *_c_handlers(commands), "", *_c_answers(table), "", "#endif", ""])
 
 
 def _estop_frame(table: MessageTable) -> bytes:
@@ -109,17 +108,51 @@ def _c_struct(tag: str, entry: MessageTable) -> list[str]:
     return [*lines, "} __attribute__((packed));"]
 
 
+def _c_handlers(commands: MessageTable) -> list[str]:
+    declared, cases = [], []
+    for name, entry in commands.items():
+        structure = f"const struct {name.lower()}_command *"
+        checks = _c_checks(entry)
+        declared += [f"uint8_t on_{name.lower()}({f'{structure}c' if entry['fields'] else 'void'});"]
+        if checks:
+            cases += [f"  case COMMAND_{name}: {{", f"    {structure}c = payload;"]
+            cases += [*checks, f"    return on_{name.lower()}(c);", "  }"]
+        else:
+            cases += [f"  case COMMAND_{name}: return on_{name.lower()}({'payload' * bool(entry['fields'])});"]
+    return [
+        *("/* Handlers: what a command is to do; the result says whether it was done. */", *declared, ""),
+        "/* Have an admitted command of the right length done by its handler, if its values are in range. */",
+        "static inline uint8_t command_carry_out(uint8_t command, const void *payload) {",
+        *("  switch (command) {", *cases, "  }", "  return RESULT_UNKNOWN;", "}"),
+    ]
+
+
+def _c_answers(table: MessageTable) -> list[str]:
+    declared, cases = [], []
+    for answer in map(str.lower, table["answers"]):
+        asking = [name for name, entry in table["commands"].items() if entry.get("answer", "").lower() == answer]
+        declared += [f"void answer_{answer}(struct {answer}_answer *a);"]
+        cases += [*(f"  case COMMAND_{name}:" for name in asking), f"    answer_{answer}(body);"]
+        cases += [f"    return sizeof(struct {answer}_answer);"]
+    return [
+        *("/* What the board answers behind the result. */", *declared, ""),
+        "/* Write what a command is answered behind its result, done or not; the number of bytes. */",
+        "static inline uint8_t command_answer(uint8_t command, void *body) {",
+        *("  switch (command) {", *cases, "  }", "  return 0;", "}"),
+    ]
+
+
 def _c_checks(entry: MessageTable) -> list[str]:
     lines = []
     for name, (kind, count, scale, _unit, lowest, highest) in entry["fields"].items():
         least, past = WIRE_RANGE[kind]
         first, last = round(lowest * scale), round(highest * scale)
-        value = f"m->{name}[i]" if count > 1 else f"m->{name}"
+        value = f"c->{name}[i]" if count > 1 else f"c->{name}"
         outside = [f"{value} < {_c_number(first)}"] * (first > least)
         outside += [f"{value} > {_c_number(last)}"] * (last < past - 1)
         if outside:
             loop = f"for (uint8_t i = 0; i < {count}; i++) " if count > 1 else ""
-            lines += [f"    {loop}if ({' || '.join(outside)}) return false;"]
+            lines += [f"    {loop}if ({' || '.join(outside)}) return RESULT_RANGE;"]
     return lines
 
 

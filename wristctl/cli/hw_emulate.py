@@ -62,7 +62,7 @@ def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
             from wristctl.config.wrist import WristParameters
 
             settings, its = BenchSettings(), WristParameters()
-            camera, film = start_film(settings.camera, its, None, pictures)
+            camera, film = start_film(settings, its, None, pictures)
             server = BenchServer(Rig(settings, its, 0, chip=chip), line, film)
         log.info("serving, with a wrist of the default settings on axes 0 to 3; its camera's frames: %s", pictures)
         log.info("try: wristctl hw check --port %s --wiring 3", line.address)

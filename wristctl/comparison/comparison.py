@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wristctl.comparison.paper import T2, verdict
 from wristctl.config.control import CompareSettings, TuneSettings
 from wristctl.config.errors import UserError
-from wristctl.config.loop import DirectionName, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller, gains_of
-from wristctl.simulation.closed_loop import Simulation, simulation
-from wristctl.simulation.reference import Motion, motion
-from wristctl.simulation.rollout import rollout, sample_period
-from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.control.table import TunedGains, controller, gains_of
+from wristctl.simulation.batch import sample_period
+from wristctl.simulation.closed_loop import Repeated, Simulation, repeat, scenario_of
+from wristctl.simulation.draws import Draws, is_random
+from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-Gains = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -37,27 +30,17 @@ class ComparedRow:
     inverse: str
     controller: str
     gains: str
-    simulation: Simulation
+    repeated: Repeated
+
+    @property
+    def simulation(self) -> Simulation:
+        """The first repetition."""
+        return self.repeated.first
 
     @property
     def label(self) -> str:
         """controller/gains"""
         return f"{self.controller}/{self.gains}"
-
-
-def reference_name(reference: Reference) -> str:
-    """A short name: kind, duration and target."""
-    if reference.kind == "tip-path":
-        return f"tip path {reference.duration:g} s {' '.join(_millimetres(tip) for tip in reference.tips)}"
-    if reference.kind == "multi-step":
-        return f"steps {reference.duration:g} s {' '.join(f'{angle:g}' for angle in reference.angles_deg)} deg"
-    target = f"{reference.end_deg:g} deg" if reference.tip is None else f"tip {_millimetres(reference.tip)} mm"
-    how = {"step": "step", "sine": f"sine {reference.frequency:g} Hz"}
-    return f"{how.get(reference.kind, f'minimum jerk {reference.duration:g} s')} {target}"
-
-
-def _millimetres(tip: tuple[float, float]) -> str:
-    return f"{1e3 * tip[0]:.3g}, {1e3 * tip[1]:.3g}"
 
 
 def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> None:
@@ -75,58 +58,95 @@ def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> No
                     )
 
 
+@dataclass(frozen=True)
+class Condition:
+    """A block of the comparison: a loop in one direction's plane, and the courses that every row follows there."""
+
+    name: str
+    loop: Loop
+    wrist: WristParameters
+    courses: Sequence[Course]
+
+
+@dataclass(frozen=True)
+class Course:
+    """A reference in a direction through one inverse: its name, its scenario's, and the motion."""
+
+    reference: str
+    inverse: str
+    scenario: str
+    motion: Motion
+
+
+def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
+    """What the study's `compare` section asks for: every row follows each course of each of these."""
+    chosen = study.compare
+    return [
+        Condition(name, loop, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network))
+        for name, loop in chosen.loops.items()
+        for direction in chosen.directions
+        for wrist in [in_plane(study.wrist, direction)]
+    ]
+
+
+def count_rollouts(chosen: CompareSettings) -> int:
+    """How many rollouts the section asks for."""
+    courses = len(chosen.directions) * len(chosen.references) * len(chosen.inverses)
+    times = [chosen.repetitions if is_random(loop) else 1 for loop in chosen.loops.values()]
+    return len(chosen.rows) * courses * sum(times)
+
+
 def compare(
     study: Study,
     network: Inverse | None = None,
-    tuned: Gains | None = None,
+    tuned: TunedGains | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[ComparedRow]:
     """Run every combination of the study's `compare` section.
 
     UserError for an unknown controller or gains, a missing network or tuned gains, before anything is run.
     """
-    chosen = study.compare
+    chosen, draws = study.compare, Draws(study.seed)
     gains = [gains_of(controller(row.controller), row.gains, tuned) for row in chosen.rows]
     names = list(dict.fromkeys(row.controller for row in chosen.rows))
-    planned = [
-        (loop_name, loop, wrist, _motions(study, wrist, direction, sample_period(loop), network))
-        for loop_name, loop in chosen.loops.items()
-        for direction in chosen.directions
-        for wrist in [in_plane(study.wrist, direction)]
-    ]
+    conditions = planned(study, network)
     results: list[ComparedRow] = []
-    for part, (loop_name, loop, wrist, motions) in enumerate(planned):
-        labels, followed = zip(*motions, strict=True)
+    for part, condition in enumerate(conditions):
+        courses, motions = condition.courses, [each.motion for each in condition.courses]
+        scenarios = [each.scenario for each in courses]
         for number, name in enumerate(names):
             rows = [i for i, row in enumerate(chosen.rows) if row.controller == name]
-            batch = np.array([gains[i] for i in rows for _ in followed]).reshape(len(rows) * len(followed), -1)
-            which = np.tile(np.arange(len(followed)), len(rows))
-            base = (part * len(names) + number) / (len(names) * len(planned))
+            batch = np.array([gains[i] for i in rows for _ in courses]).reshape(len(rows) * len(courses), -1)
+            which = np.tile(np.arange(len(courses)), len(rows))
+            base = (part * len(names) + number) / (len(names) * len(conditions))
 
             def report(share: float, base: float = base) -> None:
                 if progress is not None:
-                    progress(base + share / (len(names) * len(planned)))
+                    progress(base + share / (len(names) * len(conditions)))
 
-            outcome = rollout(controller(name), batch, followed, which, loop, wrist, record=True, progress=report)
-            for index in range(len(batch)):
-                row = chosen.rows[rows[index // len(followed)]]
-                (reference, inverse), course = labels[which[index]], followed[which[index]]
-                done = simulation(outcome, index, course, wrist, f"{name}/{row.gains_name}")
-                results.append(ComparedRow(loop_name, reference, inverse, name, row.gains_name, done))
+            done = repeat(
+                controller(name), batch, motions, which, condition.loop, condition.wrist, scenarios, draws,
+                chosen.repetitions, progress=report,
+            )  # fmt: skip
+            for index, repeated in enumerate(done):
+                row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]
+                own = repeated.labelled(f"{name}/{row.gains_name}")
+                found = (condition.name, course.reference, course.inverse, name, row.gains_name)
+                results.append(ComparedRow(*found, own))
     return _in_order(results, chosen)
 
 
-def _motions(
+def _courses(
     study: Study, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
-) -> list[tuple[tuple[str, str], Motion]]:
+) -> list[Course]:
     chosen = study.compare
-    planned: list[tuple[tuple[str, str], Motion]] = []
+    found: list[Course] = []
     for reference in chosen.references:
-        toward = reference.mirrored() if DIRECTIONS[direction].sign < 0 else reference
         for inverse in chosen.inverses:
-            course = motion(toward.model_copy(update={"inverse": inverse}), wrist, chosen.horizon, period, network)
-            planned.append(((_course_name(reference, direction, chosen), inverse), course))
-    return planned
+            own = toward(reference, direction).model_copy(update={"inverse": inverse})
+            name, scenario = _course_name(reference, direction, chosen), scenario_of(reference, direction)
+            found.append(Course(name, inverse, scenario, motion(own, wrist, chosen.horizon, period, network)))
+    return found
 
 
 def _course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
@@ -148,53 +168,3 @@ def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[C
             chosen.inverses.index(r.inverse),
         ),
     )
-
-
-def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[np.float64]]:
-    """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
-
-    segment_theta (results, T, segments) is for drawing, hence in single precision; nan beyond a plant's segments.
-    """
-    courses = [result.simulation.trajectory for result in results]
-    columns = {
-        "theta": [c.theta for c in courses],
-        "tip_x": [c.tip[:, 0] for c in courses],
-        "tip_y": [c.tip[:, 1] for c in courses],
-        "theta_ref": [c.theta_ref for c in courses],
-        "theta_desired": [c.theta_desired for c in courses],
-        "tension_plus": [c.tension[:, 0] for c in courses],
-        "tension_minus": [c.tension[:, 1] for c in courses],
-        "time": [c.time for c in courses],
-    }
-    most = max(c.segment_theta.shape[1] for c in courses)
-    columns["segment_theta"] = [
-        np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
-    ]
-    stacked = {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
-    return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
-
-
-def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
-    """Every metric of every result beside the paper's T2, one row each."""
-    import pandas as pd
-
-    rows = []
-    for result in results:
-        metrics = result.simulation.metrics
-        printed = T2.get(result.controller)
-        rows.append(
-            {
-                "loop": result.loop,
-                "reference": result.reference,
-                "controller": result.controller,
-                "gains": result.gains,
-                "inverse": result.inverse,
-                "failed": result.simulation.failed,
-                **metrics,
-                "paper_rmse": printed.rmse if printed else np.nan,
-                "paper_settling": printed.settling if printed else np.nan,
-                "paper_steady_state": printed.steady_state if printed else np.nan,
-                "verdict": verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"]),
-            }
-        )
-    return pd.DataFrame(rows)

@@ -9,10 +9,11 @@ import numpy as np
 
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, wrist_of
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import TENDONS_PER_SIDE, allocate
+from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 
 class StepTime(NamedTuple):
@@ -22,7 +23,7 @@ class StepTime(NamedTuple):
     p99: float
 
 
-@compiled
+@kernel
 def _steps(law: Any, count: int, now: Any, wrist: Any, limits: Any, gains: Any, memory: Any, out: Any) -> None:
     known, view, pull = load_segments(rows_of(wrist)), now_of(now), rows_of(out)
     signals = rows_of(now)

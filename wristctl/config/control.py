@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
 
 from wristctl.config.loop import LOOPS, DirectionName, Loop, Loops, Reference, Scenario
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.tables import CONTROLLERS, METRICS, OPTIMISERS
 
 GainsChoice = str | dict[str, float]
+ControllerName = Annotated[str, OneOf(CONTROLLERS)]
+
+_REPETITIONS = "repetitions, each with noise and drawn plants of its own, the same for all rows"
 
 
 class Row(Section):
     """One controller with one set of gains."""
 
-    controller: str = choice("smc", "name in the table of controllers")
+    controller: ControllerName = choice("smc", "name in the table of controllers")
     gains: GainsChoice = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
 
     @property
@@ -27,8 +34,8 @@ class Row(Section):
         return f"{self.controller}/{self.gains_name}"
 
 
-class Objective(Section):
-    """Weights of the tuning objective; each term is averaged over the tuning scenarios."""
+class Objective(OpenSection):
+    """Weights of the tuning objective; each term is averaged over the tuning scenarios and repetitions."""
 
     rmse: float = quantity(1.0, "1/rad", "weight of the RMSE", ge=0)
     settling: float = quantity(0.01, "1/s", "weight of the settling time (the horizon where it never settles)", ge=0)
@@ -37,12 +44,32 @@ class Objective(Section):
     )
     saturation: float = quantity(0.0, "", "weight of the share of time in saturation", ge=0)
 
+    def added(self) -> Mapping[str, Parameter]:
+        """A weight for every other metric of the table."""
+        others = {name: METRICS[name] for name in METRICS if name not in type(self).model_fields}
+        return {
+            name: Parameter(0.0, f"1/({each.unit})" if each.unit else "", f"weight of {each.formula}")
+            for name, each in others.items()
+        }
+
+    def weights(self) -> dict[str, float]:
+        """The weight of each metric that has one, by name."""
+        given = {name: getattr(self, name) for name in type(self).model_fields} | (self.model_extra or {})
+        return {name: float(weight) for name, weight in given.items() if weight != 0.0}
+
+    @model_validator(mode="after")
+    def _none_negative(self) -> Self:
+        below = [name for name, weight in (self.model_extra or {}).items() if weight < 0.0]
+        if below:
+            raise ValueError(f"the weight of {below[0]} is negative")
+        return self
+
 
 class TuneSettings(Section):
     """A search for gains: the same budget, optimiser, objective and start for every controller."""
 
-    controllers: tuple[str, ...] = choice(("smc",), "controllers to tune", min_length=1)
-    optimiser: Literal["pso", "differential-evolution", "random"] = choice("pso", "ask/tell optimiser", "paper")
+    controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune", min_length=1)
+    optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser", "paper")
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
     iterations: int = choice(60, "iterations", "assumed", ge=1, le=100_000)
     objective: Objective = Objective()
@@ -60,6 +87,7 @@ class TuneSettings(Section):
         min_length=1,
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+    repetitions: int = choice(1, _REPETITIONS + " and candidates", ge=1, le=1000)
     network: str | None = choice(None, "train run behind references with inverse: network")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
@@ -89,6 +117,7 @@ class CompareSettings(Section):
         ("ulnar",), "directions of bending, each by its own plane", min_length=1
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+    repetitions: int = choice(1, _REPETITIONS, ge=1, le=1000)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
     tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
@@ -97,7 +126,7 @@ class CompareSettings(Section):
 class SimulateSettings(Section):
     """One closed loop."""
 
-    controller: str = choice("smc", "name in the table of controllers")
+    controller: ControllerName = choice("smc", "name in the table of controllers")
     gains: GainsChoice = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
@@ -106,6 +135,7 @@ class SimulateSettings(Section):
         "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
     )
     horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
+    repetitions: int = choice(1, "rollouts, each with noise and a drawn plant of its own", ge=1, le=10_000)
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")

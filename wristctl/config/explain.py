@@ -20,10 +20,13 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> User
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
     detail: Any = unknown[0] if unknown else max(details, key=lambda each: len(each["loc"]))
     path: KeyPath = ()
-    for key in detail["loc"]:
-        if (*path, key) in origins:  # a location also names the alternatives of a union, which no file does
-            path = (*path, key)
-    where = (origins[path], f": {'.'.join(map(str, path))}") if path else ""
+    whole: KeyPath = ()
+    for key in _location(detail):  # a location also names the alternatives of a union, which no file does
+        if (*path, key) in origins:
+            path = whole = (*path, key)
+        elif path and (isinstance(key, int) or field_at((*whole, key))[1] is not field_at(whole)[1]):
+            whole = (*whole, key)
+    where = (origins[path], f": {'.'.join(map(str, whole))}") if path else ""
     return UserError(_what(detail), where, _fix(detail))
 
 
@@ -38,9 +41,16 @@ def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     return error.at((origins[path], f": {error.where}")) if path else error
 
 
+def _location(detail: Any) -> KeyPath:
+    """Where it is wrong; of what an open section does not know, the key is told beside the section."""
+    return (*detail["loc"], *[key for key in [detail.get("ctx", {}).get("key")] if key is not None])
+
+
 def _what(detail: Any) -> str:
     if detail["type"] == "extra_forbidden":
-        return f"unknown key {detail['loc'][-1]!r}"
+        return f"unknown key {_location(detail)[-1]!r}"
+    if detail["type"] == "added_value":
+        return str(detail["msg"])
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
     value = repr(detail["input"])
@@ -55,9 +65,9 @@ def _what(detail: Any) -> str:
 
 
 def _fix(detail: Any) -> str:
-    path: KeyPath = detail["loc"]
+    path = _location(detail)
     if detail["type"] == "extra_forbidden":
-        return meant(str(path[-1]), keys_of(field_at(path[:-1])[0]))
+        return meant(str(path[-1]), detail.get("ctx", {}).get("known") or keys_of(field_at(path[:-1])[0]))
     if detail["type"] == "literal_error":
         return meant(str(detail["input"]), re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
     if _as_keys(detail):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import NoneType, UnionType
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from wristctl.config.section import Section
+from wristctl.config.section import OneOf, Section
 from wristctl.config.strict_yaml import KeyPath
 from wristctl.config.study import Study
 
@@ -47,6 +48,14 @@ def section_keys(command: str | None) -> dict[str, FieldInfo]:
 def unit_of(field: FieldInfo) -> str:
     """The unit a leaf was declared with, empty where it has none."""
     return _declared(field, "unit")
+
+
+def choices_of(field: FieldInfo) -> Sequence[str]:
+    """The names that a leaf may have, where they are few and known: those of a table, or of a Literal."""
+    tables = [each.table for each in field.metadata if isinstance(each, OneOf)]
+    if tables:
+        return tuple(tables[0])
+    return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
 
 
 def source_of(field: FieldInfo) -> str:

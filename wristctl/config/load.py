@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
+from wristctl.config.former import leave_out_former
 from wristctl.config.keys import keys_of, section_keys
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
@@ -34,6 +35,7 @@ def read_study(
     origins: dict[KeyPath, Phrase] = {}
     for file in files:
         _merge(data, _read(file), str(file), origins)
+    leave_out_former(data, origins)
     for override in overrides:
         _merge(data, _override(override, command), Setting(override), origins)
     try:

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.tables import REFERENCES
 
 InverseName = Literal["none", "exact", "network"]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
@@ -33,14 +34,14 @@ class Loop(Section):
         return self
 
 
-class Reference(Section):
+class Reference(OpenSection):
     """The wanted motion, from rest and straight.
 
     step and minimum-jerk move to an angle or a tip position, sine swings between straight and the angle, multi-step
     jumps through angles, tip-path moves through tip positions, each move a minimum jerk of `duration`.
     """
 
-    kind: Literal["step", "minimum-jerk", "sine", "multi-step", "tip-path"] = choice("minimum-jerk", "shape of it")
+    kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of it")
     angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
     angles_deg: tuple[float, ...] = quantity((20.0, -10.0, 30.0), "deg", "angles of a multi-step", min_length=1)
@@ -58,10 +59,17 @@ class Reference(Section):
         """The wanted angle at the end [deg], where it is no tip."""
         return 30.0 if self.angle_deg is None else self.angle_deg
 
+    def added(self) -> Mapping[str, Parameter]:
+        """What a kind from elsewhere adds."""
+        parameters: Mapping[str, Parameter] = REFERENCES[self.kind].parameters
+        return parameters
+
     def mirrored(self) -> Reference:
         """The same motion to the other side."""
+        turned = {name: -self.value(name) for name, each in self.added().items() if each.mirrors}
         return self.model_copy(
             update={
+                **turned,
                 "angle_deg": -self.end_deg if self.tip is None else None,
                 "tip": None if self.tip is None else (self.tip[0], -self.tip[1]),
                 "angles_deg": tuple(-angle for angle in self.angles_deg),

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal
 
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.tables import DISTURBANCES, PLANTS
+
+PlantName = Annotated[str, OneOf(PLANTS)]
 
 
 class Plant(Section):
     """How the simulated wrist differs from the one that its controller knows."""
 
+    model: PlantName = choice("pcc", "what is simulated: pcc is piecewise constant curvature")
     stiffness_scale: float = quantity(1.0, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
     damping_scale: float = quantity(1.0, "", "damping over the controller's", gt=0)
     payload: float = quantity(0.0, "kg", "mass added to the hand, which the controller does not know", ge=0)
+    stiffness_spread: float = quantity(
+        0.0, "", "each repetition's stiffness is drawn anew, evenly within this share above and below", ge=0, lt=1
+    )
+    damping_spread: float = quantity(0.0, "", "the same of the damping", ge=0, lt=1)
+    payload_spread: float = quantity(0.0, "kg", "each repetition's payload is drawn anew, up to so much more", ge=0)
 
 
 class Push(Section):
@@ -32,12 +42,17 @@ class Drift(Section):
     duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
 
 
-class Disturbances(Section):
+class Disturbances(OpenSection):
     """What acts on the wrist unknown to its controller."""
 
     push: Push = Push()
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
     drift: Drift = Drift()
+
+    def added(self) -> Mapping[str, Parameter]:
+        """What disturbances from elsewhere add."""
+        own = (name for name in DISTURBANCES if name not in type(self).model_fields)
+        return {name: each for kind in own for name, each in DISTURBANCES[kind].parameters.items()}
 
 
 class Actuator(Section):
@@ -67,6 +82,5 @@ class Sensor(Section):
     delay_frames: float = quantity(2.0, "", "frames between capture and use", "assumed", ge=0, le=20)
     noise_deg: float = quantity(0.1, "deg", "standard deviation of the angle", "rendered markers: 0.025", ge=0)
     dropped: float = quantity(0.05, "", "share of frames without a result", "assumed", ge=0, lt=1)
-    seed: int = choice(0, "stream of noise and dropped frames", ge=0)
     torque_noise: float = quantity(5e-4, "N m s^0.5", "observer: white torque that its model does not know", gt=0)
     load_drift: float = quantity(0.03, "N m/s^0.5", "observer: random walk of the load that it estimates", gt=0)

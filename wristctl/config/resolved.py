@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
-from wristctl.config.keys import keys_of, source_of, unit_of
-from wristctl.config.section import Section
+from wristctl.config.keys import choices_of, keys_of, source_of, unit_of
+from wristctl.config.section import OpenSection, Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
 
@@ -44,8 +44,14 @@ def _entries(section: Section) -> Iterator[Entry]:
     for (key, field), name in zip(keys_of(type(section)).items(), type(section).model_fields, strict=True):
         value = getattr(section, name)
         unit, source = unit_of(field), source_of(field) if value == field.default else ""
-        parts = (unit and f"[{unit}]", field.description, source and f"({source})")
+        choices = ", ".join(choices_of(field))
+        meaning = f"{field.description or ''}{choices and f': {choices}'}"
+        parts = (unit and f"[{unit}]", meaning, source and f"({source})")
         yield key, value, " ".join(part for part in parts if part)
+    if isinstance(section, OpenSection):
+        for name in section.model_extra or ():
+            added = section.added()[name]
+            yield name, section.value(name), f"[{added.unit}] {added.meaning}" if added.unit else added.meaning
 
 
 def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:

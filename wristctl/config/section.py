@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, model_validator
 from pydantic.config import JsonDict
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from wristctl.config.tables import Table
 
 
 class Section(BaseModel):
@@ -23,3 +28,62 @@ def quantity(default: Any, unit: str, meaning: str, source: str = "", **constrai
 def choice(default: Any, meaning: str, source: str = "", **constraints: Any) -> Any:
     """A leaf without a unit (a name, a switch, a count)."""
     return quantity(default, "", meaning, source, **constraints)
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""
+
+    table: Table[Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The string's schema, and then that the table has it; the error is that of a Literal."""
+        return core_schema.no_info_after_validator_function(self._known, handler(source))
+
+    def _known(self, name: str) -> str:
+        if name not in self.table:
+            *others, last = (f"'{each}'" for each in self.table)
+            expected = f"{', '.join(others)} or {last}" if others else last
+            raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
+        return name
+
+
+class Parameter(NamedTuple):
+    """A number that an entry of a table adds to a section: its default, unit and meaning.
+
+    `mirrors` is true of what changes its sign where the motion is mirrored.
+    """
+
+    default: float
+    unit: str
+    meaning: str
+    mirrors: bool = False
+
+
+class OpenSection(Section):
+    """Settings to which entries of a table add: what is not declared here, such an entry must declare."""
+
+    model_config = ConfigDict(extra="allow")
+
+    def added(self) -> Mapping[str, Parameter]:
+        """What entries of the table add to this section, by name."""
+        raise NotImplementedError
+
+    def value(self, name: str) -> float:
+        """What was given of an added parameter, or its default."""
+        given: float = (self.model_extra or {}).get(name, self.added()[name].default)
+        return given
+
+    @model_validator(mode="after")
+    def _nothing_unknown(self) -> Self:
+        extra = self.model_extra or {}
+        added = self.added() if extra else {}
+        for key, given in extra.items():
+            if key not in added:
+                fields = {field.alias or name for name, field in type(self).model_fields.items()}
+                known = sorted({*fields, *added})
+                raise PydanticCustomError("extra_forbidden", "unknown key", {"key": key, "known": known})
+            if isinstance(given, bool) or not isinstance(given, int | float):
+                told = {"key": key, "given": repr(given)}
+                raise PydanticCustomError("added_value", "{given} should be a number", told)
+        return self

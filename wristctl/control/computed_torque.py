@@ -10,7 +10,7 @@ from wristctl.control.model import one_segment
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """M (theta_ref'' - 2 zeta w de/dt - w^2 e) + load (Spong, Hutchinson and Vidyasagar 2006, section 8.3)."""
-    frequency, damping_ratio = gains[0], gains[1]
+    frequency, damping_ratio = gains.w, gains.zeta
     inertia, load = one_segment(wrist, now.theta, now.rate)
     error, error_rate = now.theta - now.theta_ref, now.rate - now.rate_ref
     wanted = now.acceleration_ref - frequency * (2.0 * damping_ratio * error_rate + frequency * error)
@@ -25,5 +25,5 @@ COMPUTED_TORQUE = Controller(
         "w": Gain("rad/s", "natural frequency of the error", 1e-1, 1e5),
         "zeta": Gain("", "damping ratio of the error", 1e-3, 1e3),
     },
-    presets={"default": (50.0, 1.0)},
+    presets={"default": {"w": 50.0, "zeta": 1.0}},
 )

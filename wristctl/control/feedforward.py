@@ -14,4 +14,4 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     return load
 
 
-FEEDFORWARD = Controller(name="feedforward", law=law, source="baseline", gains={}, presets={"default": ()})
+FEEDFORWARD = Controller(name="feedforward", law=law, source="baseline", gains={}, presets={"default": {}})

@@ -96,7 +96,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     inertia, slope, static, _ = strain_model(wrist, now.theta_ref)
     damping = wrist.damping * (1.0 + slope * slope / 3.0)
     feedforward = inertia * now.acceleration_ref + damping * now.rate_ref + static
-    return feedforward - gains[0] * (now.theta - now.theta_ref) - gains[1] * (now.rate - now.rate_ref)
+    return feedforward - gains.Kp * (now.theta - now.theta_ref) - gains.Kd * (now.rate - now.rate_ref)
 
 
 GVSC = Controller(
@@ -107,6 +107,6 @@ GVSC = Controller(
         "Kp": Gain("N m/rad", "proportional gain", 1e-2, 1e4),
         "Kd": Gain("N m s/rad", "derivative gain", 1e-4, 1e2),
     },
-    presets={"default": (10.0, 0.3)},
+    presets={"default": {"Kp": 10.0, "Kd": 0.3}},
     notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
 )

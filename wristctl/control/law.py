@@ -1,21 +1,25 @@
 """What a controller is: a law, its gains with units and search boxes, and presets.
 
 A law is a function of lanes, written once: `law(now, wrist, gains, memory) -> torque`. It runs in rollouts, in
-batches for tuning and on hardware. `now` has the fields of NOW, `wrist` the Segments of the controller's
-one-segment model, `gains` and `memory` are indexed rows; the law may write its memory.
+batches for tuning and on hardware. `now` has the fields of NOW, `wrist` the Segments of the controller's one-segment
+model, `gains` the controller's own by name; `memory` is indexed, and the law may write it. What a law may call is in
+docs/lanes.md.
 """
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import types
 
 from wristctl.lanes.blocks import width
-from wristctl.lanes.compiled import cache_folder
+from wristctl.lanes.compiled import caching
 from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
@@ -42,25 +46,60 @@ class Gain:
 
 @dataclass(frozen=True)
 class Controller:
-    """A named law with its gains; `memory` is the number of values it carries from tick to tick."""
+    """A named law with its gains; `memory` is the number of values it carries from tick to tick.
+
+    The law reads a gain by its name, `gains.Kp`; where that is a Python word, such as lambda, by `gains.lambda_`.
+    """
 
     name: str
     law: Any
     source: str
     gains: Mapping[str, Gain]
-    presets: Mapping[str, tuple[float, ...]]
+    presets: Mapping[str, Mapping[str, float]]
+    """Every gain by name, of each preset."""
     memory: int = 0
     notes: Mapping[str, str] = field(default_factory=dict)
     """What a reader should know about a preset."""
 
+    def __post_init__(self) -> None:
+        """ValueError for a preset that does not give every gain and no other."""
+        for preset, given in self.presets.items():
+            if not isinstance(given, Mapping) or set(given) != set(self.gains):
+                raise ValueError(f"preset {preset} of {self.name} must give {', '.join(self.gains)} by name")
+
+    def values(self, gains: Mapping[str, float]) -> tuple[float, ...]:
+        """Gains by name in the order in which compiled code holds them."""
+        return tuple(float(gains[name]) for name in self.gains)
+
     def compiled(self, count: int = 1) -> Any:
         """The law as native code that every kernel of as many rollouts can call."""
-        return _native(self.law, width(count))
+        names = tuple(f"{name}_" if keyword.iskeyword(name) else name for name in self.gains)
+        return _native(self.law, width(count), names)
+
+
+class _NativeLaw(types.WrapperAddressProtocol):
+    """A compiled law as kernels know laws, all of one type: that its rows of gains have names is its own affair."""
+
+    def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
+        self._lanes = lanes
+        with caching(Path(law.__code__.co_filename)) as cached:
+            self._code = numba.cfunc(_signature(lanes, names), cache=cached)(law)
+
+    def __wrapper_address__(self) -> int:
+        """Where the code is."""
+        return int(self._code.address)
+
+    def signature(self) -> Any:
+        """What kernels call."""
+        return _signature(self._lanes)
+
+
+def _signature(lanes: int, gains: tuple[str, ...] = ()) -> Any:
+    number = LaneType(lanes)
+    now, wrist, named = (RowsType(number, None, fields=fields) for fields in (NOW, Segments._fields, gains))
+    return number(now, wrist, named, RowsType(number, None))
 
 
 @cache
-def _native(law: Law, lanes: int) -> Any:
-    number = LaneType(lanes)
-    rows = RowsType(number, None)
-    now, wrist = (RowsType(number, None, fields=fields) for fields in (NOW, Segments._fields))
-    return numba.cfunc(number(now, wrist, rows, rows), cache=cache_folder() is not None)(law)
+def _native(law: Law, lanes: int, names: tuple[str, ...]) -> _NativeLaw:
+    return _NativeLaw(law, lanes, names)

@@ -28,7 +28,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     and Li 1987); the leak (sigma modification, Ioannou) and the projection to bounds keep a_hat finite where it is not
     of that form. Adaptation holds while a tendon saturates.
     """
-    frequency, slope, feedback, rate_of_adaptation, leak = gains[0], gains[1], gains[2], gains[3], gains[4]
+    frequency, slope, feedback, rate_of_adaptation, leak = gains.w, gains.lambda_, gains.Kd, gains.gamma, gains.leak
     h, zero = now.period, 0.0 * now.period
     started = memory[STARTED] > zero
     lag = where(started, memory[MODEL_ANGLE], now.theta) - now.theta_ref
@@ -72,7 +72,7 @@ MRAC = Controller(
         "gamma": Gain("1/(J s)", "adaptation gain", 1e-2, 1e4),
         "leak": Gain("1/s", "rate at which parameters return to the model's", 1e-6, 1e0),
     },
-    presets={"default": (80.0, 80.0, 0.5, 100.0, 1e-3)},
+    presets={"default": {"w": 80.0, "lambda": 80.0, "Kd": 0.5, "gamma": 100.0, "leak": 1e-3}},
     memory=PARAMETERS + len(LOWEST),
     notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
 )

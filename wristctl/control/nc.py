@@ -44,7 +44,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     gains: |W_next| <= (|W| + a |phi|)/(1 + a kappa) with a = h Gamma |r|, never above the larger of |W| and
     |phi|/kappa <= sqrt(UNITS + 1)/kappa. Learning holds while a tendon saturates.
     """
-    slope, feedback, rate_of_learning, forgetting = gains[0], gains[1], gains[2], gains[3]
+    slope, feedback, rate_of_learning, forgetting = gains.lambda_, gains.Kv, gains.Gamma, gains.kappa
     inputs = (now.theta, now.rate, now.theta_ref, now.rate_ref, now.acceleration_ref)
     r = now.rate - now.rate_ref + slope * (now.theta - now.theta_ref)
     torque = memory[UNITS] - feedback * r
@@ -69,7 +69,7 @@ NC = Controller(
         "Gamma": Gain("N m/rad", "learning gain", 1e-3, 1e3),
         "kappa": Gain("1/(N m)", "e-modification: bounds the weights", 1e-3, 1e3),
     },
-    presets={"default": (50.0, 0.5, 2.0, 0.1)},
+    presets={"default": {"lambda": 50.0, "Kv": 0.5, "Gamma": 2.0, "kappa": 0.1}},
     memory=UNITS + 1,
     notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
 )

@@ -10,7 +10,7 @@ from wristctl.lanes.lane import where
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """-(Kp e + Ki int(e) + Kd de/dt) (E22, sign C7); the integral holds while it would drive a saturated tendon on."""
-    kp, ki, kd = gains[0], gains[1], gains[2]
+    kp, ki, kd = gains.Kp, gains.Ki, gains.Kd
     error = now.theta - now.theta_ref
     integral = memory[0] + now.period * error
     torque = -(kp * error + ki * integral + kd * (now.rate - now.rate_ref))
@@ -28,7 +28,7 @@ PID = Controller(
         "Ki": Gain("N m/(rad s)", "integral gain", 1e-2, 1e4),
         "Kd": Gain("N m s/rad", "derivative gain", 1e-4, 1e2),
     },
-    presets={"printed": (1e4, 5e3, 2e3)},
+    presets={"printed": {"Kp": 1e4, "Ki": 5e3, "Kd": 2e3}},
     memory=1,
     notes={"printed": 'the paper\'s "crude tuning", read as torque (C12) with the sign turned (C7)'},
 )

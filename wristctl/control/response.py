@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from wristctl.control.law import NOW
+from wristctl.control.law import NOW, now_of, wrist_of
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD = range(len(NOW))
 
 
+class Controlled(NamedTuple):
+    """A law with the arrays that it works on: what it sees (NOW), the controller's one-segment wrist (Segments), its
+    gains, its memory, and the reference (angle, rate, acceleration)."""
+
+    law: Any
+    signals: Any
+    model: Any
+    gains: Any
+    memory: Any
+    reference: Any
+
+
 @compiled
-def respond(
-    law: Any, view: Any, signals: Any, seen: Any, known: Any, gain: Any, kept: Any,
-    angle: Any, rate: Any, target: Any, since: float, low: Any, high: Any, period: float,
-) -> Any:  # fmt: skip
+def respond(control: Any, known: Any, angle: Any, rate: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
-    `angle` and `rate` are as measured; `target` (angle, rate, acceleration) is the reference `since` seconds ago,
-    continued by its own derivatives; `low` and `high` bound a side's pull. `signals` are the rows behind the law's
-    `view`, `seen` and `known` the controller's one-segment wrist as rows and as Segments, `kept` the law's memory.
+    `angle` and `rate` are as measured; the reference is what it was `since` seconds ago, continued by its own
+    derivatives; `bounds` are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
     """
+    low, high = bounds
+    signals, target = rows_of(control.signals), rows_of(control.reference)
     torque_low, torque_high = reach(angle, known, low, high)
     signals[_THETA] = angle
     signals[_RATE] = rate
@@ -31,6 +42,7 @@ def respond(
     signals[_LOW] = torque_low
     signals[_HIGH] = torque_high
     signals[_PERIOD] = period + 0.0 * low
-    wanted = law(view, seen, gain, kept)
+    gains, memory = rows_of(control.gains), rows_of(control.memory)
+    wanted = control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
     plus, minus = allocate(angle, known, wanted, low, high)
     return wanted, torque_low, torque_high, plus, minus

@@ -15,7 +15,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     L_f sigma = P1 rate - P2 load / M and L_g sigma = P2 / M. As printed the law uses the rate itself, not the rate
     of e (C9): on a moving reference it lags.
     """
-    p1, p2, p3 = gains[0], gains[1], gains[2]
+    p1, p2, p3 = gains.P1, gains.P2, gains.P3
     inertia, load = one_segment(wrist, now.theta, now.rate)
     sigma = p1 * (now.theta - now.theta_ref) + p2 * now.rate
     return load - inertia / p2 * (p1 * now.rate + p3 * tanh(sigma))
@@ -31,10 +31,10 @@ SMC = Controller(
         "P3": Gain("1/s", "reaching gain", 1e-1, 1e5),
     },
     presets={
-        "printed": (0.001, 1000.0, 1000.0),
-        "exchanged": (1000.0, 0.001, 1000.0),
-        "initial": (1.0, 1.0, 1.0),
-        "stepper": (20.0, 1.0, 60.0),
+        "printed": {"P1": 0.001, "P2": 1000.0, "P3": 1000.0},
+        "exchanged": {"P1": 1000.0, "P2": 0.001, "P3": 1000.0},
+        "initial": {"P1": 1.0, "P2": 1.0, "P3": 1.0},
+        "stepper": {"P1": 20.0, "P2": 1.0, "P3": 60.0},
     },
     notes={
         "printed": "on sigma = 0 the angle has a time constant of P2/P1 = 1e6 s (C5)",

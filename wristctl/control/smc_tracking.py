@@ -18,7 +18,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     carries the reference's own motion, so a moving reference leaves no lag. On sigma = 0 a constant error of the model
     is integrated away; outside the layer phi the reaching rate is k phi. The integral holds while a tendon saturates.
     """
-    slope, restoring, reaching, layer = gains[0], gains[1], gains[2], gains[3]
+    slope, restoring, reaching, layer = gains.lambda_, gains.kappa, gains.k, gains.phi
     inertia, load = one_segment(wrist, now.theta, now.rate)
     error, error_rate = now.theta - now.theta_ref, now.rate - now.rate_ref
     integral = memory[0] + now.period * error
@@ -41,9 +41,9 @@ SMC_TRACKING = Controller(
         "phi": Gain("rad/s", "width of the boundary layer", 1e-2, 1e4),
     },
     presets={
-        "default": (140.0, 450.0, 280.0, 10.0),
-        "camera": (20.0, 250.0, 100.0, 10.0),
-        "stepper": (30.0, 450.0, 40.0, 10.0),
+        "default": {"lambda": 140.0, "kappa": 450.0, "k": 280.0, "phi": 10.0},
+        "camera": {"lambda": 20.0, "kappa": 250.0, "k": 100.0, "phi": 10.0},
+        "stepper": {"lambda": 30.0, "kappa": 450.0, "k": 40.0, "phi": 10.0},
     },
     memory=1,
     notes={

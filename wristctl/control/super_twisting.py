@@ -19,7 +19,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     function holds for every such r. Reaching is finite to |s| of about (k1 tau)^2, exponential within. v holds while a
     tendon saturates.
     """
-    slope, k1, k2, tau = gains[0], gains[1], gains[2], gains[3]
+    slope, k1, k2, tau = gains.lambda_, gains.k1, gains.k2, gains.tau
     inertia, load = one_segment(wrist, now.theta, now.rate)
     error, error_rate = now.theta - now.theta_ref, now.rate - now.rate_ref
     s = error_rate + slope * error
@@ -44,7 +44,7 @@ SUPER_TWISTING = Controller(
         "k2": Gain("rad/s^3", "rate of the twisting term", 1e0, 1e6),
         "tau": Gain("s", "time constant near s = 0", 1e-5, 1e1),
     },
-    presets={"default": (140.0, 500.0, 5e4, 0.0036)},
+    presets={"default": {"lambda": 140.0, "k1": 500.0, "k2": 5e4, "tau": 0.0036}},
     memory=1,
     notes={"default": "chosen by trial on the four-segment plant at 1 kHz"},
 )

@@ -1,35 +1,27 @@
-"""The table of controllers: a newcomer is one file and one line here."""
+"""The table of controllers: a newcomer is one file, and one line in `wristctl.config.tables`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from wristctl.config.errors import UserError, meant
-from wristctl.control.computed_torque import COMPUTED_TORQUE
-from wristctl.control.feedforward import FEEDFORWARD
-from wristctl.control.gvsc import GVSC
+from wristctl.config.tables import CONTROLLERS as _TABLE
+from wristctl.config.tables import Table
 from wristctl.control.law import Controller
-from wristctl.control.mrac import MRAC
-from wristctl.control.nc import NC
-from wristctl.control.pid import PID
-from wristctl.control.smc import SMC
-from wristctl.control.smc_tracking import SMC_TRACKING
-from wristctl.control.super_twisting import SUPER_TWISTING
 
-CONTROLLERS: dict[str, Controller] = {
-    c.name: c for c in (SMC, PID, MRAC, GVSC, NC, SMC_TRACKING, SUPER_TWISTING, COMPUTED_TORQUE, FEEDFORWARD)
-}
+CONTROLLERS: Table[Controller] = _TABLE
+
+TunedGains = Mapping[str, Mapping[str, float]]
+"""Gains by controller and name, as a tune run finds them."""
 
 
 def controller(name: str) -> Controller:
     """The controller of this name; UserError with the nearest name if there is none."""
-    if name not in CONTROLLERS:
-        raise UserError(f"unknown controller '{name}'", "controller", meant(name, CONTROLLERS))
-    return CONTROLLERS[name]
+    return CONTROLLERS.named(name)
 
 
 def gains_of(
-    chosen: Controller, gains: str | Mapping[str, float], tuned: Mapping[str, Mapping[str, float]] | None = None
+    chosen: Controller, gains: str | Mapping[str, float], tuned: TunedGains | None = None
 ) -> tuple[float, ...]:
     """Gains by preset name, `tuned`, or by value, in the controller's order; UserError for what is unknown or missing.
 
@@ -45,11 +37,11 @@ def gains_of(
             raise UserError(
                 f"unknown gains '{gains}' of {chosen.name}", "gains", meant(gains, [*chosen.presets, "tuned"])
             )
-        return chosen.presets[gains]
+        return chosen.values(chosen.presets[gains])
     for name in gains:
         if name not in chosen.gains:
             raise UserError(f"unknown gain '{name}' of {chosen.name}", f"gains.{name}", meant(name, chosen.gains))
     missing = [name for name in chosen.gains if name not in gains]
     if missing:
         raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", "gains", "give every gain by name")
-    return tuple(float(gains[name]) for name in chosen.gains)
+    return chosen.values(gains)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,20 @@ _NUDGE, _NUDGE_M = 1e-4, 1e-6
 """Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""
 _MOST = 200
 """Evaluations of one search; 10 to 20 are usual."""
+
+
+class Coordinate(NamedTuple):
+    """What one coordinate of a search is: a parameter by name, or a small error of one place in one run.
+
+    That is the camera's zero in a bending plane (ZERO), or what a tendon's spool has reeled in unknown (SPOOL).
+    """
+
+    kind: str
+    run: str = ""
+    place: str | int = ""
+
+
+ZERO, SPOOL = "camera's zero", "spool's zero"
 
 
 @dataclass(frozen=True)
@@ -44,11 +58,12 @@ class Problem:
         return tuple(name for name in UNKNOWNS if name not in self.settings.fixed)
 
     @cached_property
-    def coordinates(self) -> dict[str, int]:
+    def coordinates(self) -> dict[Coordinate, int]:
         """Where each coordinate of the search stands: free parameters, zeros, spools."""
+        free = [Coordinate(name) for name in self.free]
         zeros = [_zero(trial) for trial in self.trials]
         spools = [_spool(trial, tendon) for trial in self.trials for tendon in trial.tendons]
-        return {name: at for at, name in enumerate(dict.fromkeys([*self.free, *zeros, *spools]))}
+        return {each: at for at, each in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
 
     def begin(self) -> Array:
         """The coordinates at the start."""
@@ -59,8 +74,7 @@ class Problem:
 
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest coordinates."""
-        zeros = sum(name.startswith(_ZERO) for name in self.coordinates)
-        widest = np.repeat([0.2, 2e-3], [zeros, len(self.coordinates) - len(self.free) - zeros])
+        widest = np.array([_WIDEST[each.kind] for each in self.coordinates if each.kind in _WIDEST])
         low, high = np.array([UNKNOWNS[name].bounds() for name in self.free]).reshape(-1, 2).T
         return np.concatenate([low, -widest]), np.concatenate([high, widest])
 
@@ -68,10 +82,10 @@ class Problem:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
         known = {
             "tendon_radius": 1.0 / self.settings.radius_error,
-            _ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
-            _SPOOL: 1.0 / self.settings.spool_error,
+            ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
+            SPOOL: 1.0 / self.settings.spool_error,
         }
-        return np.array([known.get(name.split(" ")[0], 0.0) for name in self.coordinates])
+        return np.array([known.get(each.kind, 0.0) for each in self.coordinates])
 
     def values(self, x: Array) -> dict[str, float]:
         """Every parameter at coordinates x, found or held."""
@@ -93,15 +107,16 @@ class Problem:
         return angles(candidates, trial.reeled, self.settings.step, self.settings.segments)
 
 
-_ZERO, _SPOOL = "zero", "spool"
+_WIDEST = {ZERO: 0.2, SPOOL: 2e-3}
+"""Largest of these errors [rad, m]."""
 
 
-def _zero(trial: MeasuredTrial) -> str:
-    return f"{_ZERO} {trial.run} {trial.plane}"
+def _zero(trial: MeasuredTrial) -> Coordinate:
+    return Coordinate(ZERO, trial.run, trial.plane)
 
 
-def _spool(trial: MeasuredTrial, tendon: int) -> str:
-    return f"{_SPOOL} {trial.run} {tendon}"
+def _spool(trial: MeasuredTrial, tendon: int) -> Coordinate:
+    return Coordinate(SPOOL, trial.run, tendon)
 
 
 @dataclass(frozen=True)
@@ -119,18 +134,19 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     coordinates, delay = problem.coordinates, problem.values(x)["delay"]
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
-        moved = [name for name in problem.free if name in SIMULATED] + [_spool(trial, each) for each in trial.tendons]
-        nudges = [_NUDGE_M if name.startswith(_SPOOL) else _NUDGE for name in moved]
-        near = [x + nudge * (np.arange(len(x)) == coordinates[name]) for name, nudge in zip(moved, nudges, strict=True)]
+        moved = [Coordinate(name) for name in problem.free if name in SIMULATED]
+        moved += [_spool(trial, each) for each in trial.tendons]
+        nudges = [_NUDGE_M if each.kind == SPOOL else _NUDGE for each in moved]
+        near = [x + nudge * (np.arange(len(x)) == coordinates[each]) for each, nudge in zip(moved, nudges, strict=True)]
         course = problem.simulate(trial, [problem.candidate(trial, each) for each in (x, *near)])
         expected, *others = (trial.shown(each, delay) for each in course)
         slopes = np.zeros((len(expected), len(x)))
-        for name, nudge, other in zip(moved, nudges, others, strict=True):
-            slopes[:, coordinates[name]] = (other - expected) / nudge
+        for each, nudge, other in zip(moved, nudges, others, strict=True):
+            slopes[:, coordinates[each]] = (other - expected) / nudge
         if "delay" in problem.free:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
-            slopes[:, coordinates["delay"]] = (early - late) / (2.0 * h)
+            slopes[:, coordinates[Coordinate("delay")]] = (early - late) / (2.0 * h)
         slopes[:, coordinates[_zero(trial)]] = 1.0
         return expected + x[coordinates[_zero(trial)]], slopes
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.wording import Setting
-from wristctl.identification.fit import Fit, Problem, linearise
+from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import UNKNOWNS
@@ -104,7 +104,8 @@ def additions(fit: Fit, lacking: Mapping[str, float]) -> list[Addition]:
     """
     x, begin = fit.x.copy(), fit.problem.begin()
     for name in lacking:
-        x[fit.problem.coordinates[name]] = begin[fit.problem.coordinates[name]]
+        at = fit.problem.coordinates[Coordinate(name)]
+        x[at] = begin[at]
     return [_addition(fit, x, what, *change) for what, change in ADDITIONS.items()]
 
 

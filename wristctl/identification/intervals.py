@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.identification.fit import Fit, Problem
+from wristctl.identification.fit import Coordinate, Fit, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ def _with_clocks(problem: Problem, deviation: Array) -> Array:
     """An error of the clocks is a delay, and nothing in the trials tells the two apart."""
     wider = deviation.copy()
     if "delay" in problem.free:
-        at = problem.coordinates["delay"]
+        at = problem.coordinates[Coordinate("delay")]
         wider[at] = np.hypot(wider[at], problem.settings.clock_error)
     return wider
 

@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import SupposedWrist, angles
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import actuate, at_rest, drive_of
-from wristctl.simulation.reference import motion
+from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
+from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
 
 if TYPE_CHECKING:
@@ -51,9 +53,11 @@ class RehearsedTruth:
     frame_rate: float = 60.0
     exposure: float = 4e-3
     dropped: float = 0.05
+    plant: str = "pcc"
+    """Name of the plant's model."""
 
 
-@compiled
+@kernel
 def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: float) -> None:
     known, motor = load_segments(rows_of(model)), rows_of(motors)
     for tick in range(commands.shape[0]):
@@ -70,7 +74,7 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     commands = np.stack([*sides, followed.theta_ref], axis=1)
     drive = drive_of(actuator)
     out = np.empty((len(commands), 2))
-    _reel_in(drive, at_rest(drive, wrist, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
+    _reel_in(drive, at_rest(drive, wrist, PCC, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
     return out
 
 
@@ -84,10 +88,9 @@ def rehearse(
     logs, seen, kinds = [], [], []
     for number, (direction, reference) in enumerate(moves):
         side = DIRECTIONS[direction]
-        followed = reference if side.sign > 0 else reference.mirrored()
-        reeled = spools(in_plane(wrist, direction), followed, truth.actuator, horizon)
-        own = _own(truth, direction)
-        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, Loop().plant_segments)[0]
+        reeled = spools(in_plane(wrist, direction), toward(reference, direction), truth.actuator, horizon)
+        own, model = _own(truth, direction), PLANTS[truth.plant]
+        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, Loop().plant_segments, model)[0]
         time = _PERIOD * np.arange(len(angle))
         ticks = slice(None, None, _LOGGED)
         steps = np.rint(reeled[ticks] / truth.actuator.step_length).astype(int)

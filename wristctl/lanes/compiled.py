@@ -1,17 +1,20 @@
-"""`compiled`: numba's njit with this project's settings and a cache in the user's own cache folder.
+"""numba's njit with this project's settings, and a cache in the user's own cache folder for what Python calls.
 
 numba renews a cached function when its own file changes, but not when a function that it calls does. So the cache
-folder's name holds a hash of every source file that compiled code may rest on: other sources, another folder.
+folder's name holds a hash of the file and of all files that it imports, theirs too: other sources, another folder.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -20,41 +23,97 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+TRIED = "0.68"
+"""The numba that the tests ran with. What lanes are built on (docs/lanes.md) may be another thing in the next one."""
+
 _KEPT_DAYS = 30.0
-_ABOVE = {"cli", "report", "comparison", "tuning", "records"}
-"""Packages that compiled code does not rest on."""
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
+_PACKAGE = Path(__file__).resolve().parents[1]
+_IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
+_CONSTANT_FREE = ("wristctl.config", "wristctl.records")
+"""Packages that compiled code takes nothing from, neither a function nor a number."""
+
+if not numba.__version__.startswith(f"{TRIED}."):
+    told = f"numba {numba.__version__}: wristctl was tried with {TRIED} only; pip install 'numba=={TRIED}.*'"
+    warnings.warn(told, stacklevel=2)
 
 
 @cache
-def cache_folder() -> Path | None:
-    """Folder of compiled kernels, or None where none can be written (then every process compiles anew)."""
-    package = Path(__file__).resolve().parents[1]
+def _read(file: Path) -> tuple[bytes, tuple[Path, ...]]:
+    """The content of a source file, and the files beside or in this package that it imports at its top."""
+    content = file.read_bytes()
+    found = []
+    for module in sorted({each.decode() for each in _IMPORT.findall(content)}):
+        inside = module.startswith("wristctl.") and not module.startswith(_CONSTANT_FREE)
+        stem = (_PACKAGE.parent if inside else file.parent).joinpath(*module.split("."))
+        if inside or not module.startswith("wristctl"):
+            found += [each for each in (stem.with_suffix(".py"), stem / "__init__.py") if each.is_file()]
+    return content, tuple(found)
+
+
+def sources(file: Path) -> list[Path]:
+    """The file and every file that it rests on, sorted: those that it imports and those that they import."""
+    reached, waiting = {file}, [file]
+    while waiting:
+        for each in _read(waiting.pop())[1]:
+            if each not in reached:
+                reached.add(each)
+                waiting.append(each)
+    return sorted(reached)
+
+
+@cache
+def cache_folder(file: Path, *others: Path) -> Path | None:
+    """Folder for what is compiled of these source files, or None where none can be written: then nothing is kept."""
+    if not file.is_file():  # typed into a notebook
+        return None
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(package.rglob("*.py")):
-        if source.relative_to(package).parts[0] not in _ABOVE:
-            digest.update(source.read_bytes())
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
-    folder = base / digest.hexdigest()[:16]
+    for source in sorted({each for root in (file, *others) for each in sources(root)}):
+        digest.update(_read(source)[0])
     try:
+        folder = _kernels() / digest.hexdigest()[:16]
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             os.utime(folder)
-        _forget_old(base, folder)
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: the user has no home
         return None
     return folder
 
 
-def _forget_old(base: Path, current: Path) -> None:
-    for folder in base.iterdir():
-        if folder != current and time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
-            shutil.rmtree(folder, ignore_errors=True)
+@cache
+def _kernels() -> Path:
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
+    if base.is_dir():
+        for folder in base.iterdir():
+            if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
+                shutil.rmtree(folder, ignore_errors=True)
+    return base
+
+
+@contextmanager
+def caching(file: Path, *others: Path) -> Iterator[bool]:
+    """Within the block numba caches what these source files define where it belongs; yields whether it can.
+
+    numba takes its folder from a setting of the whole process, when a function is decorated: it is put back at once.
+    """
+    folder, before = cache_folder(file, *others), numba.config.CACHE_DIR
+    if folder is not None:
+        numba.config.CACHE_DIR = str(folder)
+    try:
+        yield folder is not None
+    finally:
+        numba.config.CACHE_DIR = before
 
 
 def compiled(function: F) -> F:
-    """Compile for lanes: cached, without the interpreter's lock, without fast-math."""
-    folder = cache_folder()
-    if folder is not None:
-        numba.config.CACHE_DIR = str(folder)
-    jit = numba.njit(error_model="numpy", nogil=True, forceinline=True, cache=folder is not None)
-    return cast(F, jit(function))
+    """Compile for code that is compiled: inlined where it is called, and kept with what calls it."""
+    return cast(F, numba.njit(**_OPTIONS)(function))
+
+
+def kernel(function: F, *others: Path) -> F:
+    """Compile for Python, which calls it, and keep it in the cache.
+
+    `others` are source files beside the function's own that decide what it does, where it does not import them.
+    """
+    with caching(Path(function.__code__.co_filename), *others) as cached:
+        return cast(F, numba.njit(cache=cached, **_OPTIONS)(function))

@@ -46,9 +46,6 @@ def tanh(x: Any) -> Any:
     return where(x < 0.0, -size, size)
 
 
-ARC_LIMIT = 2.0 * math.pi
-"""Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
-
 _e2 = polynomial(E2)
 _e3 = polynomial(E3)
 

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils
+from numba.core import cgutils, types
 from numba.core.typing.templates import signature
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 from wristctl.lanes.types import LaneType, MaskType, PlaneType, define
 
@@ -79,6 +79,11 @@ def floor(x: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
+def rounded(x: Any) -> Any:
+    """x as it is rounded: a product that does not fuse with the sum it stands in."""
+    raise NotImplementedError("compiled code only")
+
+
 def exp2i(k: Any) -> Any:
     """2^k for whole k between -1022 and 1023."""
     raise NotImplementedError("compiled code only")
@@ -96,6 +101,12 @@ define(sqrt, (LaneType,), LaneType, _instruction("sqrt"))
 define(floor, (LaneType,), LaneType, _instruction("floor"))
 define(abs, (LaneType,), LaneType, _instruction("fabs"))
 define(exp2i, (LaneType,), LaneType, _exp2i)
+define(rounded, (LaneType,), LaneType, lambda b, x: b.fadd(x, ir.Constant(x.type, [-0.0] * x.type.count)))
+
+
+@overload(rounded, strict=False)
+def _rounded_number(x: Any) -> Any:
+    return (lambda x: x) if isinstance(x, types.Float) else None
 
 
 def polynomial(coefficients: tuple[float, ...]) -> Any:

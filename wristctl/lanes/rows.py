@@ -17,6 +17,7 @@ from numba.core.imputils import lower_builtin, lower_getattr_generic
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import intrinsic
 
+import wristctl.lanes.lane  # noqa: F401 teaches numba what lanes do
 from wristctl.lanes.types import WIDTHS, LaneType, PlaneType, RowsType
 
 _PAIR_OF_INDICES = numba.types.UniTuple(numba.types.intp, 2)
@@ -48,15 +49,21 @@ class _Length(AbstractTemplate):
         return signature(types.intp, args[0]) if isinstance(args[0], RowsType) else None
 
 
-def _address(builder: Any, rows: RowsType, pointer: Any, index: Any) -> Any:
+def _address(builder: Any, rows: RowsType, value: Any, index: Any) -> Any:
+    pointer = builder.extract_value(value, 0)
     if isinstance(index.type, ir.ArrayType):
         row, column = cgutils.unpack_tuple(builder, index)
         index = builder.add(builder.mul(row, ir.Constant(row.type, rows.columns)), column)
-    return builder.gep(pointer, [index], inbounds=True)
+    return builder.gep(pointer, [index], inbounds=True, source_etype=rows.element.llvm)
+
+
+def load_row(builder: Any, rows: RowsType, value: Any, index: Any) -> Any:
+    """The element at an index, while code is generated."""
+    return builder.load(_address(builder, rows, value, index), align=8, typ=rows.element.llvm)
 
 
 def _load(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-    return builder.load(_address(builder, sig.args[0], *args), align=8)
+    return load_row(builder, sig.args[0], *args)
 
 
 def _store(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
@@ -84,9 +91,8 @@ class _Field(AttributeTemplate):
 
 
 @lower_getattr_generic(RowsType)
-def _field(context: Any, builder: Any, rows: RowsType, pointer: Any, name: str) -> Any:
-    index = context.get_constant(types.intp, rows.fields.index(name))
-    return builder.load(_address(builder, rows, pointer, index), align=8)
+def _field(context: Any, builder: Any, rows: RowsType, value: Any, name: str) -> Any:
+    return load_row(builder, rows, value, context.get_constant(types.intp, rows.fields.index(name)))
 
 
 def rows_named(fields: tuple[str, ...]) -> Any:
@@ -99,6 +105,17 @@ def rows_named(fields: tuple[str, ...]) -> Any:
     return view
 
 
+def _rows(builder: Any, rows: RowsType, pointer: Any) -> Any:
+    return builder.insert_value(ir.Constant(rows.llvm, ir.Undefined), pointer, 0)
+
+
+def _opaque(builder: Any, pointer: Any, kind: ir.Type) -> Any:
+    """The pointer without its pointee, which llvmlite still gives to pointers of numba's own."""
+    same = builder.gep(pointer, [ir.Constant(ir.IntType(64), 0)], inbounds=True, source_etype=kind)
+    same.type = ir.PointerType()
+    return same
+
+
 def _view(array: types.Array, fields: tuple[str, ...] = ()) -> Any:
     if array.dtype != types.float64 or array.layout != "C" or array.ndim not in (1, 2):
         return None
@@ -106,7 +123,7 @@ def _view(array: types.Array, fields: tuple[str, ...] = ()) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         struct = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0])
-        return builder.bitcast(struct.data, sig.return_type.llvm)
+        return _rows(builder, sig.return_type, _opaque(builder, struct.data, ir.DoubleType()))
 
     return signature(result, array), codegen
 
@@ -117,30 +134,28 @@ def rows_of(typingctx: Any, array: types.Array) -> Any:
     return _view(array)
 
 
+def _beyond(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+    return _rows(builder, sig.return_type, _address(builder, sig.args[0], args[0], args[1]))
+
+
 @intrinsic
 def part(typingctx: Any, rows: RowsType, start: types.Integer, segments: Any) -> Any:
     """The rows from `start` on, as many as the tuple `segments` has entries."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        return builder.gep(args[0], [args[1]], inbounds=True)
-
-    return signature(RowsType(rows.element, len(segments)), rows, types.intp, segments), codegen
+    return signature(RowsType(rows.element, len(segments)), rows, types.intp, segments), _beyond
 
 
 @intrinsic
 def beyond(typingctx: Any, rows: RowsType, start: types.Integer) -> Any:
     """The rows from `start` on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        return builder.gep(args[0], [args[1]], inbounds=True)
-
-    return signature(RowsType(rows.element, None), rows, types.intp), codegen
+    return signature(RowsType(rows.element, None), rows, types.intp), _beyond
 
 
 def _scratch(result: RowsType, rows: RowsType) -> Any:
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         memory = ir.ArrayType(result.element.llvm, result.entries)
-        return builder.bitcast(cgutils.alloca_once(builder, memory), result.llvm)
+        return _rows(builder, result, _opaque(builder, cgutils.alloca_once(builder, memory), memory))
 
     return signature(result, rows), codegen
 

@@ -75,8 +75,11 @@ class RowsType(types.Type):
 
     @property
     def llvm(self) -> ir.Type:
-        """A pointer to the first element."""
-        return self.element.llvm.as_pointer()
+        """A pointer, which does not say to what: loads and stores name the element.
+
+        In a structure, since numba's variables cannot hold such a pointer itself.
+        """
+        return ir.LiteralStructType([ir.PointerType()])
 
     @property
     def entries(self) -> int:

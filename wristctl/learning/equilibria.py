@@ -15,10 +15,10 @@ from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, unit_cube
 from wristctl.learning.domain import OTHERS, Domain
-from wristctl.wrist.allocation import TENDONS_PER_SIDE
 from wristctl.wrist.kinematics import chain_tip, exact_arc
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.statics import equilibria_at
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 GRAVITY = 9.81
 """[m/s^2]"""

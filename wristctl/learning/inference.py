@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.learning.baseline import Polynomial
 from wristctl.learning.network import LEAK, Network
 from wristctl.wrist.kinematics import Array
@@ -62,7 +62,7 @@ def _add_columns(total: Any, factors: Any, columns: Any) -> None:
         total[i] += (p * a[i] + q * b[i]) + (r * c[i] + s * d[i])
 
 
-@compiled
+@kernel
 def _angles(sizes: Any, kind: int, packed: Any, inputs: Any, value: Any, result: Any, out: Any) -> None:
     for sample in range(len(out)):
         value[: sizes[0]] = inputs[sample]
@@ -85,7 +85,7 @@ def _angles(sizes: Any, kind: int, packed: Any, inputs: Any, value: Any, result:
         out[sample] = value[0]
 
 
-@compiled
+@kernel
 def _polynomials(powers: Any, factors: Any, inputs: Any, table: Any, out: Any) -> None:
     for sample in range(len(out)):
         for j in range(inputs.shape[1]):
@@ -101,7 +101,7 @@ def _polynomials(powers: Any, factors: Any, inputs: Any, table: Any, out: Any) -
         out[sample] = total
 
 
-@compiled
+@kernel
 def _arcs(inputs: Any, out: Any) -> None:
     for sample in range(len(out)):
         out[sample] = 2.0 * math.atan2(inputs[sample, 1], inputs[sample, 0])

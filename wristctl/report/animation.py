@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from wristctl.config.wrist import WristParameters
@@ -22,7 +21,7 @@ def animation(run: Run) -> dict[str, Any] | None:
     """Wrist, time step and one course per closed loop of the run, grouped by what it had to follow; None without any.
 
     A course holds its group, its name, its colour, and per picture the angle of each segment [0.1 mrad] and the wanted
-    angle; pictures end where it diverged.
+    angle; pictures end where it diverged. It draws arcs, so that loops of another plant are left out.
     """
     if (run.path / "data/trajectories.npz").is_file():
         courses, time = _compared(run)
@@ -31,6 +30,8 @@ def animation(run: Run) -> dict[str, Any] | None:
     elif run.kind == "hw-run" and (run.path / "data/trials.csv").is_file():
         courses, time = _trials(run)
     else:
+        return None
+    if not courses:
         return None
     step = max(1, round(1.0 / FRAMES / float(time[1] - time[0])))
     wrist = run.config.wrist
@@ -55,7 +56,7 @@ def _wrist(wrist: WristParameters) -> dict[str, float]:
 Named = tuple[str, str, str, Any, Any]
 
 
-def _compared(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
     table, series = run.data("comparison"), run.array("trajectories")
     bent = series.get("segment_theta", series["theta"][..., None])
     many = table["inverse"].nunique() > 1
@@ -67,10 +68,12 @@ def _compared(run: Run) -> tuple[Iterable[Named], np.ndarray]:
         )
         for row in table.itertuples()
     ]
-    return [(*n, bent[k], series["theta_desired"][k]) for k, n in enumerate(names)], series["time"][0]
+    arcs = {name for name, loop in run.config.compare.loops.items() if loop.plant.model == "pcc"}
+    drawn = [k for k, loop in enumerate(table["loop"]) if loop in arcs]
+    return [(*names[k], bent[k], series["theta_desired"][k]) for k in drawn], series["time"][0]
 
 
-def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+def _single(run: Run) -> tuple[list[Named], np.ndarray]:
     import numpy as np
 
     with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
@@ -79,17 +82,20 @@ def _single(run: Run) -> tuple[Iterable[Named], np.ndarray]:
     table = dict(zip(names, numbers.T, strict=True))
     own = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
     settings = getattr(run.config, run.kind.replace("-", "_"))
+    if settings.loop.plant.model != "pcc":
+        return [], table["time"]
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
     name = ("", f"{settings.controller}/{gains}", settings.controller)
     return [(*name, np.stack([table[each] for each in own], axis=1), table["theta_desired"])], table["time"]
 
 
-def _trials(run: Run) -> tuple[Iterable[Named], np.ndarray]:
+def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
     """Each whole trial on the control grid: the true segments where known, else the estimate as one segment."""
     import numpy as np
 
     trials, log = run.data("trials"), run.data("log")
-    truth = run.data("truth") if (run.path / "data/truth.csv").is_file() else None
+    arcs = run.config.hw_run.bench.plant.model == "pcc"
+    truth = run.data("truth") if arcs and (run.path / "data/truth.csv").is_file() else None
     time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
     courses = []
     for row in trials[trials["outcome"] == "ok"].to_dict("records"):

@@ -18,11 +18,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from numpy.typing import NDArray
 
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.vision.drawn_parts import coil, hand
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
-from wristctl.wrist.shape import Planar, backbone, coil, discs, hand, offset_points
+from wristctl.wrist.shape import Planar, discs, offset_points
 
 Array = NDArray[np.float64]
 
@@ -31,10 +33,11 @@ RIM = 1.25
 
 
 def draw_wrist(
-    axes: Axes, segment_theta: Array, wrist: WristParameters, pulling: int = 0, edge_on: bool = False
+    axes: Axes, q: Array, wrist: WristParameters, pulling: int = 0, edge_on: bool = False, plant: str = "pcc"
 ) -> None:
-    """Draw the wrist with the given segment angles (n,) [rad]; `pulling` is the sign of the side whose tendons pull."""
-    frames = discs(segment_theta, wrist.length, wrist.discs)
+    """Draw the wrist at its plant's coordinates (q,); `pulling` is the sign of the side whose tendons pull."""
+    backbone = PLANTS[plant].backbone
+    frames = discs(backbone, q, wrist)
     c, centres, normals = wrist.tendon_offset, *frames
     for outline in hand(wrist.hand_offset, edge_on) if wrist.hand_offset > 0.0 else []:
         _fill(axes, centres[-1] + normals[-1] * outline, facecolor=LIGHT)
@@ -42,7 +45,7 @@ def draw_wrist(
         ends = offset_points(frames, offset)
         for start, end in pairwise(ends):
             _line(axes, coil(complex(start), complex(end), 0.15 * c), color=GREY, linewidth=0.5)
-    line, _ = backbone(segment_theta, wrist.length, np.linspace(0.0, wrist.length, 60))
+    line, _ = backbone(wrist, q, np.linspace(0.0, wrist.length, 60))
     _line(axes, line, color=BLUE, linewidth=1.2, linestyle="--")
     for sign in (1, -1):
         style = {"color": VERMILLION, "linewidth": 2.2} if sign == pulling else {"color": BLACK, "linewidth": 1.2}
@@ -71,7 +74,7 @@ def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Fig
     return made
 
 
-def stroboscope(trajectory: Trajectory, wrist: WristParameters, count: int = 7) -> Figure:
+def stroboscope(trajectory: Trajectory, wrist: WristParameters, count: int = 7, plant: str = "pcc") -> Figure:
     """A move as the wrist at `count` instants, evenly spaced until it rests within 2 % of it, and its tip's path."""
     made, ((axes,),) = figure(width=5.0, height=4.2)
     known = np.isfinite(trajectory.theta)
@@ -79,12 +82,12 @@ def stroboscope(trajectory: Trajectory, wrist: WristParameters, count: int = 7) 
     moving = np.flatnonzero(np.abs(theta - theta[-1]) > 0.02 * np.abs(theta).max())
     instants = np.linspace(0, moving[-1] if len(moving) else len(time) - 1, count).round().astype(int)
     colours = ScalarMappable(Normalize(0.0, float(time[instants[-1]])), mpl.colormaps["viridis_r"])
-    rim = RIM * wrist.tendon_radius
+    rim, backbone = RIM * wrist.tendon_radius, PLANTS[plant].backbone
     for at in instants:
         colour, bent = colours.to_rgba(time[at]), trajectory.segment_theta[at]
-        line, _ = backbone(bent, wrist.length, np.linspace(0.0, wrist.length, 60))
+        line, _ = backbone(wrist, bent, np.linspace(0.0, wrist.length, 60))
         _line(axes, line, color=colour, linewidth=1.2)
-        frames = discs(bent, wrist.length, wrist.discs)
+        frames = discs(backbone, bent, wrist)
         for plate in zip(offset_points(frames, -rim), offset_points(frames, rim), strict=True):
             _line(axes, np.array(plate), color=colour, linewidth=2.5)
     tip, desired = (each[:, 0] + 1j * each[:, 1] for each in (trajectory.tip, trajectory.tip_desired))

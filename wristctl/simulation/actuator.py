@@ -17,11 +17,10 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, maximum, minimum, tanh
-from wristctl.lanes.lane import floor, sqrt, where
-from wristctl.wrist.allocation import TENDONS_PER_SIDE
-from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.segments import segments
-from wristctl.wrist.tendons import lengths, moment_arms
+from wristctl.lanes.lane import floor, rounded, sqrt, where
+from wristctl.lanes.parts import tuple_of
+from wristctl.wrist.plant import PlantModel, stretch
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
 
 Array = NDArray[np.float64]
 
@@ -31,25 +30,37 @@ _SLIDING = 5e-3
 """Speed [m/s] at which friction is fully developed."""
 
 
+class Motor(NamedTuple):
+    """One side's motor and tendons, SI units; `stiffness` is that of both tendons together."""
+
+    lag: Any
+    stiffness: Any
+    friction: Any
+    step: Any
+    speed: Any
+    acceleration: Any
+
+
 class Drive(NamedTuple):
-    """Both sides' motors and tendons as the kernel sees them; SI units, stiffness of a side's two tendons together."""
+    """Both sides' motors and tendons: how much of them is simulated (LAGGED or TENDON), and their values."""
 
     level: int
-    lag: float
-    stiffness: float
-    friction: float
-    step: float
-    speed: float
-    acceleration: float
+    motor: Motor
 
 
-def drive_of(actuator: Actuator) -> Drive | None:
-    """The kernel's view of an actuator section; None where tensions are as commanded, and nothing is compiled in."""
-    if actuator.level == "ideal":
-        return None
+read_motor = tuple_of(Motor)
+"""A Motor of lanes from rows of lanes, in compiled code."""
+
+
+def level_of(actuator: Actuator) -> int | None:
+    """LAGGED, TENDON, or None where tensions are as commanded, and nothing of a motor is compiled in."""
+    return {"ideal": None, "lagged": LAGGED, "tendon": TENDON}[actuator.level]
+
+
+def motor_of(actuator: Actuator) -> Motor:
+    """The values of an actuator section."""
     step = actuator.step_length
-    return Drive(
-        level={"lagged": LAGGED, "tendon": TENDON}[actuator.level],
+    return Motor(
         lag=actuator.lag,
         stiffness=TENDONS_PER_SIDE * actuator.tendon_stiffness,
         friction=actuator.friction,
@@ -59,38 +70,54 @@ def drive_of(actuator: Actuator) -> Drive | None:
     )
 
 
-def at_rest(drive: Drive | None, wrist: WristParameters, theta: Array) -> Array:
-    """State of both sides at pretension with segments at theta (n,): pull or reeled length, then speed; (4,)."""
-    pull, n = TENDONS_PER_SIDE * wrist.pretension, len(theta)
+def drive_of(actuator: Actuator) -> Drive | None:
+    """The drive of an actuator section; None where it is ideal."""
+    level = level_of(actuator)
+    return None if level is None else Drive(level, motor_of(actuator))
+
+
+def at_rest(drive: Drive | None, wrist: WristParameters, model: PlantModel, q: Array) -> Array:
+    """State of both sides at pretension with the plant at q: pull or reeled length, then speed; (4,)."""
+    pull = TENDONS_PER_SIDE * wrist.pretension
     if drive is None or drive.level != TENDON:
         return np.array([pull, 0.0, pull, 0.0])
-    taut = terms(segments(wrist, n), theta, 0.0 * theta).tendon_lengths.sum(axis=0)
-    plus, minus = pull / drive.stiffness + wrist.length - taut
+    plus, minus = pull / drive.motor.stiffness + wrist.length - model.taut(wrist, q)
     return np.array([plus, 0.0, minus, 0.0])
 
 
 @compiled
-def _lag(drive: Any, state: Any, side: int, command: Any, h: float) -> Any:
-    fastest = drive.stiffness * drive.speed * h + 0.0 * command
-    change = clip((command - state[side]) * (h / (drive.lag + h)), -fastest, fastest)
+def _lag(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
+    fastest = motor.stiffness * motor.speed * h
+    change = clip((command - state[side]) * (h / (motor.lag + h)), -fastest, fastest)
     state[side] = state[side] + change
-    quantum = drive.stiffness * drive.step
+    quantum = rounded(motor.stiffness * motor.step)
     return quantum * floor(state[side] / quantum + 0.5)
 
 
 @compiled
-def _reel(drive: Any, state: Any, side: int, target: Any, h: float) -> Any:
+def reeling(gap: Any, acceleration: Any, h: float) -> Any:
+    """Speed from which one more period and then braking stay within the gap: v^2/(2 a) + h v = |gap|."""
+    change = rounded(acceleration * h)
+    return sqrt(2.0 * acceleration * abs(gap) + rounded(change * change)) - change
+
+
+@compiled
+def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
     """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps."""
     gap = target - state[side]
-    change = drive.acceleration * h
-    # the speed v from which one more period and then braking stay within the gap: v^2/(2 a) + h v = |gap|
-    stopping = sqrt(change * change + 2.0 * drive.acceleration * abs(gap)) - change
-    wanted = minimum(stopping, drive.speed + 0.0 * gap)
+    change = rounded(motor.acceleration * h)
+    wanted = minimum(reeling(gap, motor.acceleration, h), motor.speed)
     wanted = where(gap < 0.0, -wanted, wanted)
     speed = clip(wanted, state[side + 1] - change, state[side + 1] + change)
     state[side + 1] = speed
     state[side] = state[side] + h * speed
-    return drive.step * floor(state[side] / drive.step + 0.5)
+    return motor.step * floor(state[side] / motor.step + 0.5)
+
+
+@compiled
+def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
+    """What a spool has to reel in [m] for a pull [N]: its tendons' stretch, and by how much their path is shorter."""
+    return pull / stiffness + length - path
 
 
 @compiled
@@ -99,36 +126,29 @@ def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus
     if drive is None:
         return plus, minus
     if drive.level == LAGGED:
-        return _lag(drive, state, 0, plus, h), _lag(drive, state, 2, minus, h)
-    path_plus, path_minus = lengths(theta_ref, known)
-    reeled_plus = _reel(drive, state, 0, plus / drive.stiffness + known.length - path_plus, h)
-    reeled_minus = _reel(drive, state, 2, minus / drive.stiffness + known.length - path_minus, h)
+        return _lag(drive.motor, state, 0, plus, h), _lag(drive.motor, state, 2, minus, h)
+    motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, known)
+    reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, known.length, path_plus), h)
+    reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, known.length, path_minus), h)
     return reeled_plus, reeled_minus
 
 
 @compiled
-def pulls(drive: Any, segment: Any, theta: Any, omega: Any, rubbing: float, plus: Any, minus: Any) -> Any:
-    """Pulls [N] of both sides on a wrist at theta, omega from what they deliver, with this share of the friction."""
+def pulls(drive: Any, plant: Any, q: Any, rate: Any, rubbing: float, plus: Any, minus: Any) -> Any:
+    """Pulls [N] of both sides on a plant at q, rate from what they deliver, with this share of the friction."""
     if drive is None:
         return plus, minus
     if drive.level != TENDON:
         return plus, minus
+    motor = drive.motor
     zero = 0.0 * plus
-    bend, slide_plus, slide_minus = zero, zero, zero
-    for k in range(len(theta)):
-        path_plus, path_minus = lengths(theta[k], segment)
-        arm_plus, arm_minus = moment_arms(theta[k], segment)
-        plus = plus - segment.length + path_plus
-        minus = minus - segment.length + path_minus
-        bend = bend + abs(theta[k])
-        slide_plus = slide_plus + arm_plus * omega[k]
-        slide_minus = slide_minus + arm_minus * omega[k]
-    wrapped = 0.5 * rubbing * drive.friction * bend
+    stretch_plus, stretch_minus, bend, slide_plus, slide_minus = stretch(plant, q, rate, plus, minus)
+    wrapped = 0.5 * rubbing * motor.friction * bend
     x_plus, x_minus = wrapped * tanh(slide_plus / _SLIDING), wrapped * tanh(slide_minus / _SLIDING)
     # (1 - x/2)/(1 + x/2) is the capstan's exp(-x) to x^3/12
-    plus = drive.stiffness * maximum(plus, zero) * (1.0 - x_plus) / (1.0 + x_plus)
-    minus = drive.stiffness * maximum(minus, zero) * (1.0 - x_minus) / (1.0 + x_minus)
-    return plus, minus
+    pull_plus = motor.stiffness * maximum(stretch_plus, zero) * (1.0 - x_plus) / (1.0 + x_plus)
+    pull_minus = motor.stiffness * maximum(stretch_minus, zero) * (1.0 - x_minus) / (1.0 + x_minus)
+    return pull_plus, pull_minus
 
 
 @compiled
@@ -136,6 +156,7 @@ def tendon_stiffness(drive: Any, segment: Any, theta: Any) -> Any:
     """Stiffness [N m/rad] that elastic tendons on held spools add to one segment at theta; 0 without them."""
     if drive is None:
         return 0.0 * theta
+    if drive.level != TENDON:
+        return 0.0 * theta
     arm_plus, arm_minus = moment_arms(theta, segment)
-    held = drive.stiffness if drive.level == TENDON else 0.0
-    return held * (arm_plus * arm_plus + arm_minus * arm_minus)
+    return drive.motor.stiffness * (arm_plus * arm_plus + arm_minus * arm_minus)

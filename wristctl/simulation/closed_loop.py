@@ -1,25 +1,33 @@
-"""Trajectories out of rollouts, and `simulate`: one closed loop from a configuration."""
+"""Closed loops out of rollouts: trajectories, and the loop of a study's `simulate` section, repeated."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.plant import plant_of
-from wristctl.simulation.reference import Motion, motion
-from wristctl.simulation.rollout import Outcome, rollout, sample_period
-from wristctl.simulation.trajectory import Trajectory, desired_errors
-from wristctl.wrist.directions import DIRECTIONS, in_plane
-from wristctl.wrist.kinematics import Inverse, chain_tip
-from wristctl.wrist.statics import equilibrium
+from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.draws import Draws, is_random
+from wristctl.simulation.metrics import of_trajectory
+from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.trajectory import Trajectory
+from wristctl.simulation.worlds import loops_of, plant_of
+from wristctl.wrist.directions import in_plane
+from wristctl.wrist.kinematics import Inverse
 
 Array = NDArray[np.float64]
+
+_TOGETHER = 64
+"""Rollouts that are recorded at once."""
 
 
 @dataclass(frozen=True)
@@ -31,24 +39,119 @@ class Simulation:
     failed: bool
 
 
-def trajectory(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Trajectory:
-    """The recorded rollout `index` as a Trajectory."""
-    angles = outcome.segment_theta(index)
+@dataclass(frozen=True)
+class Repeated:
+    """The same loop several times, each with noise and a drawn plant of its own."""
+
+    first: Simulation
+    metrics: dict[str, Array]
+    """Of each repetition, (R,)."""
+    failed: NDArray[np.bool_]
+    """(R,)"""
+    errors: Array
+    """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
+
+    @classmethod
+    def once(cls, done: Simulation) -> Repeated:
+        """One simulation."""
+        metrics = {name: np.array([value]) for name, value in done.metrics.items()}
+        return cls(done, metrics, np.array([done.failed]), done.trajectory.error[None])
+
+    def labelled(self, label: str) -> Repeated:
+        """The same with this label on its trajectory."""
+        course = replace(self.first.trajectory, label=label)
+        return replace(self, first=replace(self.first, trajectory=course))
+
+
+def repeat(
+    law: Controller,
+    gains: Array,
+    motions: Sequence[Motion],
+    which: NDArray[np.int64],
+    loop: Loop,
+    wrist: WristParameters,
+    scenarios: Sequence[str],
+    draws: Draws,
+    repetitions: int = 1,
+    start: Start | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Repeated]:
+    """Each of the rows, gains (count, g) with the motion `which` (count,), as often as asked for.
+
+    `scenarios` are the names of the motions' scenarios, which their noise goes by. Where nothing is drawn a repetition
+    could not differ from another: such loops run once.
+    """
+    rows, times = len(gains), repetitions if is_random(loop) else 1
+    loops = loops_of(loop, [draws.plant(each) for each in range(times)])
+    each = max(1, _TOGETHER // rows)
+    found: list[_Gathered] = [_Gathered() for _ in range(rows)]
+    for first in range(0, times, each):
+        now = range(first, min(first + each, times))
+
+        def report(share: float, now: range = now) -> None:
+            if progress is not None:
+                progress((now.start + share * len(now)) / times)
+
+        lane_loops = loop if len(now) == 1 and loops[now[0]] is loop else [loops[k] for k in now for _ in range(rows)]
+        streams = [draws.camera(scenarios[motion], k) for k in now for motion in which]
+        outcome = rollout(
+            law, np.tile(gains, (len(now), 1)), motions, np.tile(which, len(now)), lane_loops, wrist, start, streams,
+            record=True, progress=report,
+        )  # fmt: skip
+        for lane, k in enumerate(k for k in now for _ in range(rows)):
+            plant = plant_of(wrist, loops[k].plant)
+            found[lane % rows].add(simulation(outcome, lane, motions[which[lane % rows]], plant, loop.plant.model))
+    return [each.repeated() for each in found]
+
+
+class _Gathered:
+    """Repetitions of one row as they come."""
+
+    def __init__(self) -> None:
+        self._first: Simulation | None = None
+        self._metrics: list[dict[str, float]] = []
+        self._failed: list[bool] = []
+        self._errors: list[Array] = []
+
+    def add(self, done: Simulation) -> None:
+        self._first = self._first or done
+        self._metrics.append(done.metrics)
+        self._failed.append(done.failed)
+        if len(self._errors) < _TOGETHER:
+            self._errors.append(done.trajectory.error)
+
+    def repeated(self) -> Repeated:
+        assert self._first is not None
+        metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
+        return Repeated(self._first, metrics, np.array(self._failed), np.array(self._errors))
+
+
+def simulation(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Simulation:
+    """The recorded rollout `index` with all its metrics; `plant` is the wrist as it is, of this plant model."""
+    course = trajectory(outcome, index, followed, plant, model)
+    metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
+    return Simulation(course, metrics | of_trajectory(course), bool(outcome.failed[index]))
+
+
+def trajectory(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Trajectory:
+    """The recorded rollout `index` as a Trajectory; `plant` is the wrist as it is, of this plant model."""
+    coordinates = outcome.coordinates(index)
     return Trajectory(
-        label=label,
+        label="",
         time=followed.time,
         theta=outcome.column("theta", index),
-        segment_theta=angles,
+        segment_theta=coordinates,
         rate=outcome.column("rate", index),
         theta_ref=followed.theta_ref,
         theta_desired=followed.theta_desired,
-        tip=chain_tip(angles, wrist.length),
+        tip=PLANTS[model].tips(plant, coordinates),
         tip_desired=followed.tip_desired,
         torque_wanted=outcome.column("torque_wanted", index),
         torque=outcome.column("torque", index),
         tension=_sides(outcome, "tension", index),
         acting=_sides(outcome, "acting", index),
         seen=outcome.column("seen", index),
+        outside=followed.outside,
     )
 
 
@@ -57,35 +160,39 @@ def _sides(outcome: Outcome, name: str, index: int) -> Array:
     return np.stack([outcome.column(f"{name}_{side}", index) for side in ("plus", "minus")], axis=-1)
 
 
-def simulation(outcome: Outcome, index: int, followed: Motion, wrist: WristParameters, label: str) -> Simulation:
-    """The recorded rollout `index` with all its metrics."""
-    course = trajectory(outcome, index, followed, wrist, label)
-    metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
-    failed = bool(outcome.failed[index])
-    return Simulation(course, metrics | desired_errors(course) | {"outside_domain": followed.outside}, failed)
+def scenario_of(reference: Reference, direction: DirectionName) -> str:
+    """The name that a scenario's noise goes by: its reference and direction."""
+    return f"{reference_name(reference)}, {direction}"
+
+
+def _equilibrium(loop: Loop) -> Start:
+    model, n = PLANTS[loop.plant.model], loop.plant_segments
+    return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
 
 def simulate(
-    study: Study, network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None
-) -> Simulation:
-    """Run the study's `simulate` section: one closed loop.
+    study: Study,
+    network: Inverse | None = None,
+    tuned: Mapping[str, Mapping[str, float]] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Repeated:
+    """Run the study's `simulate` section: one closed loop, as often as it says.
 
     `network` is needed where the reference has `inverse: network`, `tuned` (gains by controller and name) where the
     gains are `tuned`. Raises UserError for an unknown controller or preset, a reference out of reach, or a start in
     equilibrium of a wrist that buckles.
     """
-    chosen = study.simulate
+    chosen, loop = study.simulate, study.simulate.loop
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    wrist, reference = in_plane(study.wrist, chosen.direction), chosen.reference
-    if DIRECTIONS[chosen.direction].sign < 0:
-        reference = reference.mirrored()
-    followed = motion(reference, wrist, chosen.horizon, sample_period(chosen.loop), network)
-    start = None
-    if chosen.start == "equilibrium":
-        plant = plant_of(wrist, chosen.loop.plant)
-        start = equilibrium(plant, chosen.loop.plant_segments, (plant.pretension, plant.pretension))
+    wrist, draws = in_plane(study.wrist, chosen.direction), Draws(study.seed)
+    reference = toward(chosen.reference, chosen.direction)
+    followed = motion(reference, wrist, chosen.horizon, sample_period(loop.control_period), network)
+    start = _equilibrium(loop) if chosen.start == "equilibrium" else None
+    scenario = scenario_of(chosen.reference, chosen.direction)
     which = np.zeros(1, np.int64)
-    outcome = rollout(law, gains, [followed], which, chosen.loop, wrist, start, record=True)
+    (done,) = repeat(
+        law, gains, [followed], which, loop, wrist, [scenario], draws, chosen.repetitions, start, progress
+    )  # fmt: skip
     name = chosen.gains if isinstance(chosen.gains, str) else "given"
-    return simulation(outcome, 0, followed, wrist, f"{law.name}/{name}")
+    return done.labelled(f"{law.name}/{name}")

@@ -1,34 +1,71 @@
-"""Disturbances, evaluated on the sample grid before the loop runs: forces on the last disc and stiffness in time."""
+"""Disturbances, evaluated on the sample grid before the loop runs: forces on the last disc and stiffness in time.
+
+The entries of `wristctl.config.tables.DISTURBANCES`: their forces add, their scales of the stiffness multiply.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.plant import Disturbances
-from wristctl.lanes.compiled import compiled
-from wristctl.wrist.segments import Segments
+from wristctl.config.section import Parameter
+from wristctl.config.tables import DISTURBANCES as _TABLE
+from wristctl.config.tables import Table
 
 Array = NDArray[np.float64]
 
+Of = Callable[[Disturbances, Array], Array]
+"""From the settings and times (T,) [s] to what is so then, (T,)."""
 
-def course(disturbances: Disturbances, time: Array) -> Array | None:
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One kind of disturbance: what it does over time, and whether these settings have it act at all.
+
+    `parameters` are the leaves that it adds to the section, where it is not the section's own.
+    """
+
+    meaning: str
+    acts: Callable[[Disturbances], bool]
+    force: Of | None = None
+    """On the last disc, across the straight wrist [N]."""
+    scale: Of | None = None
+    """Of the stiffness, over the plant's own."""
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+
+
+DISTURBANCES: Table[Disturbance] = _TABLE
+
+
+def acting(settings: Disturbances, time: Array) -> Array | None:
     """Tip force across the straight wrist [N] and stiffness over the plant's own, (T, 2); None if nothing acts."""
-    push, load, drift = disturbances.push, disturbances.load, disturbances.drift
-    if push.force == load == 0.0 and drift.scale == 1.0:
+    chosen = [each for each in DISTURBANCES.values() if each.acts(settings)]
+    if not chosen:
         return None
-    phase = (time - push.start) / push.duration
-    force = load + np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
-    scale = 1.0 + (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
+    force, scale = np.zeros(len(time)), np.ones(len(time))
+    for each in chosen:
+        force = force if each.force is None else force + each.force(settings, time)
+        scale = scale if each.scale is None else scale * each.scale(settings, time)
     return np.stack([force, scale], axis=1)
 
 
-@compiled
-def disturb(own: Any, force: float, scale: float) -> Any:
-    """The plant under one sample's disturbance."""
-    return Segments(
-        own.length, own.mass, own.hand_mass, own.hand_offset, own.gravity_x, own.gravity_y, own.tendon_offset,
-        own.spans, scale * own.stiffness, own.damping, own.force_x, force + own.force_y,
-    )  # fmt: skip
+def _push(settings: Disturbances, time: Array) -> Array:
+    push = settings.push
+    phase = (time - push.start) / push.duration
+    return np.where((phase > 0.0) & (phase < 1.0), push.force * np.sin(np.pi * phase), 0.0)
+
+
+def _drift(settings: Disturbances, time: Array) -> Array:
+    drift = settings.drift
+    return 1.0 + (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
+
+
+LOAD = Disturbance(
+    "a constant force", lambda settings: settings.load != 0.0, force=lambda s, time: np.full(len(time), s.load)
+)
+PUSH = Disturbance("a person's push", lambda settings: settings.push.force != 0.0, force=_push)
+DRIFT = Disturbance("springs that change", lambda settings: settings.drift.scale != 1.0, scale=_drift)

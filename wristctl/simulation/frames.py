@@ -2,38 +2,41 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.plant import Sensor
+from wristctl.seeds import Entropy
+from wristctl.simulation.observer import Schedule
 
 Array = NDArray[np.float64]
-Ticks = NDArray[np.int64]
 
 
-class Frames(NamedTuple):
-    """F frames: control ticks of capture and arrival (F,), noise [rad] and 1 or 0 for seen or dropped (F, 2, count)."""
-
-    captures: Ticks
-    arrivals: Ticks
-    readings: Array
-
-
-def frames(sensor: Sensor, period: float, horizon: float, seeds: NDArray[np.int64]) -> Frames:
-    """The frames of rollouts of `horizon` [s] with this control period [s].
-
-    Every seed of `seeds` (count,) has its own stream beside the sensor's, whatever stands beside it in the batch.
-    """
+def schedule(sensor: Sensor, period: float, horizon: float) -> Schedule:
+    """Control ticks at which the frames of `horizon` [s] are taken and at which they arrive, (F,) each."""
     times = np.arange(int(horizon * sensor.frame_rate) + 1) / sensor.frame_rate
     captures = np.rint(times / period).astype(np.int64)
     delay = int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))
-    streams = {seed: np.random.default_rng([sensor.seed, seed]) for seed in map(int, np.unique(seeds))}
-    drawn = {seed: _reading(rng, len(times), sensor) for seed, rng in streams.items()}
-    return Frames(captures, captures + delay, np.stack([drawn[int(seed)] for seed in seeds], axis=-1))
+    return Schedule(captures, captures + delay)
 
 
-def _reading(rng: np.random.Generator, count: int, sensor: Sensor) -> Array:
-    noise = np.deg2rad(sensor.noise_deg) * rng.standard_normal(count)
-    return np.stack([noise, (rng.random(count) >= sensor.dropped).astype(float)], axis=1)
+def readings(count: int, sensors: Sequence[Sensor], streams: Sequence[Entropy]) -> Array:
+    """Of `count` frames of each rollout the noise [rad], and 1 or 0 for seen or dropped, (rollouts, count, 2).
+
+    Rollouts of the same stream meet the same draws, whatever stands beside them in the batch; each camera scales them
+    by its own noise and share of dropped frames.
+    """
+    drawn = {each: _draws(each, count) for each in dict.fromkeys(streams)}
+    found = np.empty((len(streams), count, 2))
+    for own, sensor, stream in zip(found, sensors, streams, strict=True):
+        normal, even = drawn[stream]
+        own[:, 0] = np.deg2rad(sensor.noise_deg) * normal
+        own[:, 1] = even >= sensor.dropped
+    return found
+
+
+def _draws(stream: Entropy, count: int) -> tuple[Array, Array]:
+    rng = np.random.default_rng(stream)
+    return rng.standard_normal(count), rng.random(count)

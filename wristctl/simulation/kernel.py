@@ -5,26 +5,26 @@ reference -> law -> allocation -> actuator -> plant with its disturbances -> met
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from wristctl.control.law import now_of, wrist_of
-from wristctl.control.response import respond
+from wristctl.control.law import now_of
+from wristctl.control.response import Controlled, respond
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import ARC_LIMIT
 from wristctl.lanes.lane import where
-from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import actuate, pulls
-from wristctl.simulation.disturbances import disturb
-from wristctl.simulation.metrics import SUMS, gather, goals_of
-from wristctl.simulation.observer import expect, of_block, watch
-from wristctl.wrist.allocation import TENDONS_PER_SIDE, torque_of
-from wristctl.wrist.integrator import step
+from wristctl.lanes.parts import block_of
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.actuator import Drive, actuate, pulls, read_motor
+from wristctl.simulation.observer import go_on, sense
+from wristctl.simulation.sums import SUMS, gather, goals_of
+from wristctl.wrist.allocation import torque_of
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, tip_angle
 from wristctl.wrist.segments import load_segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 RECORDED = (
     "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
 )  # fmt: skip
-"""Columns of a recorded sample, followed by the angle of each segment: tensions as commanded and as they act, and the
+"""Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, and the
 angle that the law sees. theta is nan where the lane has failed."""
 
 _ALIVE = SUMS.index("alive")
@@ -33,104 +33,154 @@ _SIDE = float(TENDONS_PER_SIDE)
 _NAN = float("nan")
 
 
-@compiled
-def run_blocks(
-    law: Any, plant: Any, model: Any, limits: Any, gains: Any, goals: Any, courses: Any, which: Any, memory: Any,
-    state: Any, sums: Any, record: Any, drive: Any, motors: Any, watched: Any, disturbed: Any, now: Any, target: Any,
-    period: float, substeps: int, ticks: int, begin: int, end: int, first: int, last: int,
-    segments: Any,
-) -> None:  # fmt: skip
-    """Advance blocks `begin` to `end`, one by one, from sample `first` to `last`, `ticks` control periods each.
+class Setup(NamedTuple):
+    """What is the same for all lanes. `level` is the actuator's, None where it is ideal."""
 
-    `gains`, `goals`, `which`, `memory`, `state`, `sums`, `record`, `motors` and `watched` have the block as their
-    first axis. Each lane follows `courses[which]`, [motion, sample, (angle, rate, acceleration)], continued between
-    samples by its own derivatives; `state`, `memory` and `sums` carry the loop on, so that a long run may be done in
-    pieces. `record` takes each sample's values, or has no samples. `drive` with its state `motors` are the actuators,
-    `watched` is a camera with its observer, `disturbed` holds (tip force, stiffness scale) of each sample; each of the
-    three is None where it is ideal or absent, and then not compiled in. `now` and `target` are scratch rows. A lane
-    leaves the game when a segment bends beyond a full turn.
+    law: Any
+    plant: Any
+    coordinates: Any
+    level: Any
+    period: float
+    substeps: int
+    ticks: int
+
+
+class Course(NamedTuple):
+    """What happens over time, on the sample grid, and the ticks of frames.
+
+    `references` [motion, sample, (angle, rate, acceleration)], continued between samples by its own derivatives;
+    `acting` [case, sample, (tip force, stiffness scale)] or None; `schedule` of the frames or None.
     """
-    for block in range(begin, end):
-        _run_block(
-            law, plant, model, limits, gains[block], goals[block], courses, which[block], memory[block], state[block],
-            sums[block], record[block], drive, motors[block], of_block(watched, block), disturbed, now, target,
-            period, substeps, ticks, first, last, segments,
-        )  # fmt: skip
+
+    references: Any
+    acting: Any
+    schedule: Any
+
+
+class World(NamedTuple):
+    """Values that stay, [block, row, lane]; with one block only they are every block's."""
+
+    plant: Any
+    model: Any
+    limits: Any
+    motor: Any
+    gains: Any
+    goals: Any
+
+
+class State(NamedTuple):
+    """What goes on, by block first: a long run may be done in pieces.
+
+    `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates.
+    `record` [block, sample, column, lane] takes each sample's values, or has no samples. `watch` is the camera with its
+    observer, None where sensors are ideal.
+    """
+
+    which: Any
+    case: Any
+    memory: Any
+    coordinates: Any
+    motors: Any
+    sums: Any
+    record: Any
+    watch: Any
+
+
+class Scratch(NamedTuple):
+    """Rows to work on: what the law sees, the reference (3,), and the disturbance (2,)."""
+
+    now: Any
+    target: Any
+    acting: Any
+
+
+class Span(NamedTuple):
+    """Blocks `begin` to `end`, samples `first` to `last`."""
+
+    begin: int
+    end: int
+    first: int
+    last: int
+
+
+def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, span: Any) -> None:
+    """Advance the span's blocks, one by one, over its samples of `setup.ticks` control periods each.
+
+    A lane leaves the game when its plant does (a segment bends beyond a full turn). What is None is not compiled in.
+    """
+    for block in range(span.begin, span.end):
+        _run_block(setup, course, block_of(world, block), block_of(state, block), scratch, span.first, span.last)
 
 
 @compiled
-def _run_block(
-    law: Any, plant: Any, model: Any, limits: Any, gains: Any, goals: Any, courses: Any, which: Any, memory: Any,
-    state: Any, sums: Any, record: Any, drive: Any, motors: Any, watched: Any, disturbed: Any, now: Any, target: Any,
-    period: float, substeps: int, ticks: int, first: int, last: int, segments: Any,
-) -> None:  # fmt: skip
-    undisturbed = load_segments(rows_of(plant))
-    wrist = undisturbed
-    motor = rows_of(motors)
-    known, seen, view = load_segments(rows_of(model)), wrist_of(model), now_of(now)
-    bound, gain, goal, kept, sum_ = rows_of(limits), rows_of(gains), goals_of(goals), rows_of(memory), rows_of(sums)
+def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, first: int, last: int) -> None:
+    cut, period, ticks = setup.coordinates, setup.period, setup.ticks
+    undisturbed = parameters_of(setup.plant, rows_of(world.plant))
+    known, drive = load_segments(rows_of(world.model)), _drive(setup.level, world.motor)
+    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
+    view, bound, goal = now_of(scratch.now), rows_of(world.limits), goals_of(world.goals)
+    motor, sum_ = rows_of(state.motors), rows_of(state.sums)
     low, high = _SIDE * bound[0], _SIDE * bound[1]
-    signals, reference = rows_of(now), rows_of(target)
-    n = len(segments)
-    theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
-    old_theta, old_omega = lanes_like(theta), lanes_like(theta)
+    n = len(cut)
+    q, rates = part(rows_of(state.coordinates), 0, cut), part(rows_of(state.coordinates), n, cut)
     zero = 0.0 * low
-    h = period / substeps + zero
-    targets = target.reshape(3, len(which))
+    h = period / setup.substeps + zero
+    targets, acts = scratch.target.reshape(3, len(state.which)), scratch.acting.reshape(2, len(state.case))
+    acting = rows_of(scratch.acting)
     for sample in range(first, last):
-        for signal in range(3):
-            for lane in range(len(which)):
-                targets[signal, lane] = courses[which[lane], sample, signal]
-        if disturbed is not None:
-            wrist = disturb(undisturbed, disturbed[sample, 0], disturbed[sample, 1])
+        _gather(course.references, state.which, sample, targets)
+        plant = _under(course.acting, state.case, sample, acts, acting, undisturbed)
         for tick in range(ticks):
-            since = tick * period
-            angle, rate = zero, zero
-            for i in range(n):
-                angle = angle + theta[i]
-                rate = rate + omega[i]
-            angle_seen, rate_seen = angle, rate
             now_tick = sample * ticks + tick
-            if watched is not None:
-                camera, observer = watched
-                watch(camera, observer, drive, known, now_tick, angle, period)
-                angle_seen, rate_seen = rows_of(observer.now)[0], rows_of(observer.now)[1]
+            angle, rate = tip_angle(plant, q, rates)
+            seen, seen_rate = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
             wanted, torque_low, torque_high, plus, minus = respond(
-                law, view, signals, seen, known, gain, kept, angle_seen, rate_seen, reference, since, low, high, period
+                control, known, seen, seen_rate, (low, high), tick * period, period
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
-            acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
+            acting_plus, acting_minus = pulls(drive, plant, q, rates, 1.0, given_plus, given_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
-            if tick == 0 and sample < record.shape[0]:
-                row = rows_of(record[sample])
+            if tick == 0 and sample < state.record.shape[0]:
+                row = rows_of(state.record[sample])
                 row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
                 row[1] = rate
                 row[2] = wanted
-                row[3] = torque_of(angle_seen, known, plus, minus)
+                row[3] = torque_of(seen, known, plus, minus)
                 row[4] = plus / _SIDE
                 row[5] = minus / _SIDE
                 row[6] = acting_plus / _SIDE
                 row[7] = acting_minus / _SIDE
-                row[8] = angle_seen
+                row[8] = seen
                 for i in range(n):
-                    row[_COLUMNS + i] = theta[i]
-            if watched is not None:
-                _, observer = watched
-                expect(observer, drive, known, now_tick, given_plus, given_minus, period)
-            for _ in range(substeps):
-                for i in range(n):
-                    old_theta[i] = theta[i]
-                    old_omega[i] = omega[i]
-                if drive is not None:
-                    acting_plus, acting_minus = pulls(drive, wrist, theta, omega, 1.0, given_plus, given_minus)
-                step(wrist, theta, omega, acting_plus, acting_minus, h)
-                alive = sum_[_ALIVE]
-                for i in range(n):
-                    alive = where(abs(theta[i]) < ARC_LIMIT, alive, zero)
-                for i in range(n):
-                    theta[i] = where(alive > zero, theta[i], old_theta[i])
-                    omega[i] = where(alive > zero, omega[i], zero)
-                sum_[_ALIVE] = alive
+                    row[_COLUMNS + i] = q[i]
+            go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
+            for _ in range(setup.substeps):
+                acting_plus, acting_minus = pulls(drive, plant, q, rates, 1.0, given_plus, given_minus)
+                sum_[_ALIVE] = advance_or_stop(plant, q, rates, acting_plus, acting_minus, h, sum_[_ALIVE])
+
+
+@compiled
+def _drive(level: Any, motor: Any) -> Any:
+    if level is None:
+        return None
+    return Drive(level, read_motor(rows_of(motor)))
+
+
+@compiled
+def _gather(tables: Any, which: Any, sample: int, out: Any) -> None:
+    """Each lane's own values of one sample, from tables [case, sample, value] into [value, lane]."""
+    for value in range(out.shape[0]):
+        for lane in range(len(which)):
+            out[value, lane] = tables[which[lane], sample, value]
+
+
+@compiled
+def _under(tables: Any, which: Any, sample: int, out: Any, acting: Any, plant: Any) -> Any:
+    """The plant under one sample's disturbances, which are gathered into `out`, the memory of the rows `acting`."""
+    if tables is None:
+        return plant
+    _gather(tables, which, sample, out)
+    return disturbed(plant, acting[0], acting[1])

@@ -1,138 +1,78 @@
-"""Metrics of one rollout, gathered tick by tick, each with formula, unit and direction.
+"""Metrics of one closed loop, each with formula, unit and heading: the entries of `wristctl.config.tables.METRICS`.
 
 e = theta - theta_ref (E12), sampled at the control ticks; T is the horizon. The move is the time until the reference
 rests; a reference that does not rest before the horizon has neither settling time nor overshoot. Tensions are those
-that act, of one tendon of each side.
+that act, of one tendon of each side. Of all metrics less is better.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import where
-from wristctl.lanes.rows import rows_named, rows_of
+from wristctl.config.tables import METRICS as _TABLE
+from wristctl.config.tables import Table
+from wristctl.simulation.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Metric:
-    """What a number means; of all of them less is better."""
-
-    unit: str
-    formula: str
-
-
-METRICS: dict[str, Metric] = {
-    "rmse": Metric("rad", "sqrt(mean e^2) over the horizon"),
-    "rmse_move": Metric("rad", "sqrt(mean e^2) until the reference rests; over the horizon for a step"),
-    "rmse_settled": Metric("rad", "sqrt(mean e^2) after the settling time (2 %)"),
-    "settling": Metric("s", "last instant outside +-2 % of the move around the final reference; never: nan"),
-    "settling_5": Metric("s", "the same for +-5 %"),
-    "steady_state": Metric("rad", "mean |e| over the last 10 % of the horizon"),
-    "overshoot": Metric("%", "largest passing of the final reference over the last move, from that move's beginning"),
-    "iae": Metric("rad s", "integral of |e|"),
-    "peak_tension": Metric("N", "largest tension of a tendon"),
-    "rms_tension": Metric("N", "sqrt(mean of both sides' squared tensions)"),
-    "chattering": Metric("N/s", "total variation of both sides' tensions per second"),
-    "saturation": Metric("", "share of time in which the wanted torque was out of the tendons' reach"),
-    "slack": Metric("", "share of time in which a tendon was slack"),
-}
-
-SUMS = (
-    "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
-    "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "plus", "minus", "alive",
-)  # fmt: skip
-"""Running sums of a lane, from which `summary` makes the metrics."""
-
-GOALS = ("final", "move", "begin", "rest", "horizon")
-"""What metrics need of the reference: final angle and last move [rad], when it begins and rests, horizon [s]."""
 
 _LEAST_MOVE = 1e-9
 """Move [rad] below which there is nothing to settle on."""
 
-goals_of = rows_named(GOALS)
-(
-    _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
-    _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _PLUS, _MINUS, _ALIVE,
-) = range(len(SUMS))  # fmt: skip
+
+class Totals(NamedTuple):
+    """What was summed up over rollouts: `sums` and `goals` by their names in `simulation.sums`, each (count,)."""
+
+    sums: Mapping[str, Array]
+    goals: Mapping[str, Array]
+    period: float
+    """Between two ticks [s]."""
 
 
-@compiled
-def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: Any, minus: Any, saturated: Any) -> None:
-    """Add one tick: the error at `time`, the tensions [N] commanded then, and 1 where the torque was out of reach."""
-    error = theta - theta_ref
-    squared = error * error
-    size = abs(theta - goals.final)
-    moving = where(time <= goals.rest, 1.0, 0.0 * time)
-    late = where(time >= 0.9 * goals.horizon, 1.0, 0.0 * time)
-    sums[_SQUARED] = sums[_SQUARED] + squared
-    sums[_SQUARED_MOVE] = sums[_SQUARED_MOVE] + moving * squared
-    sums[_ABSOLUTE] = sums[_ABSOLUTE] + abs(error)
-    sums[_LATE] = sums[_LATE] + late * abs(error)
-    sums[_LATE_COUNT] = sums[_LATE_COUNT] + late
-    move = abs(goals.move)
-    outside = size > 0.02 * move
-    sums[_EXIT_2] = where(outside, time, sums[_EXIT_2])
-    sums[_SQUARED_EXIT] = where(outside, sums[_SQUARED], sums[_SQUARED_EXIT])
-    sums[_EXIT_5] = where(size > 0.05 * move, time, sums[_EXIT_5])
-    passed = where(goals.move < 0.0, goals.final - theta, theta - goals.final)
-    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= goals.begin, passed, 0.0 * passed))
-    sums[_PEAK] = maximum(sums[_PEAK], maximum(plus, minus))
-    sums[_SQUARED_TENSION] = sums[_SQUARED_TENSION] + 0.5 * (plus * plus + minus * minus)
-    change = abs(plus - sums[_PLUS]) + abs(minus - sums[_MINUS])
-    sums[_VARIATION] = sums[_VARIATION] + where(sums[_TICKS] > 0.0, change, 0.0 * change)
-    sums[_PLUS] = plus
-    sums[_MINUS] = minus
-    sums[_SATURATED] = sums[_SATURATED] + saturated
-    sums[_SLACK] = sums[_SLACK] + where((plus <= 0.0) | (minus <= 0.0), 1.0, 0.0 * plus)
-    sums[_TICKS] = sums[_TICKS] + 1.0
-    sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
+@dataclass(frozen=True)
+class Metric:
+    """One number of a closed loop; it comes from running sums (of many rollouts at once) or from a trajectory."""
+
+    unit: str
+    formula: str
+    of_totals: Callable[[Totals], Array] | None = None
+    of_trajectory: Callable[[Trajectory], float] | None = None
+    heading: str = ""
+    """Over its column where people read a table; without one it is in data files only."""
+    of_error: bool = True
+    """Whether it is of the error, and so means nothing where the wrist has diverged."""
+    never: Callable[[float], float] | None = None
+    """What `never` (nan) counts in tuning, by the horizon [s]; None: such gains have failed."""
 
 
-def summary(sums: Array, goals: Array, period: float) -> dict[str, Array]:
-    """Metrics of each lane from rows (count, SUMS) and (count, GOALS); all nan but the tensions where it diverged."""
-    of = dict(zip(SUMS, sums.T, strict=True))
-    goal = dict(zip(GOALS, goals.T, strict=True))
-    ticks = of["ticks"]
-    after = np.round(ticks - of["exit_2"] / period) - 1.0
-    step = goal["rest"] <= 0.0
+METRICS: Table[Metric] = _TABLE
+
+
+def summary(totals: Totals) -> dict[str, Array]:
+    """The metrics that come from sums, each (count,); of the error nan where the wrist has diverged."""
+    alive = totals.sums["alive"] > 0.0
+    found = {}
     with np.errstate(divide="ignore", invalid="ignore"):
-        rests = (goal["rest"] < goal["horizon"]) & (np.abs(goal["move"]) > _LEAST_MOVE)
-        settled = rests & (of["exit_2"] < goal["horizon"] - 1.5 * period)
-        result = {
-            "rmse": np.sqrt(of["squared"] / ticks),
-            "rmse_move": np.sqrt(np.where(step, of["squared"] / ticks, of["squared_move"] / of["ticks_move"])),
-            "rmse_settled": np.where(settled, np.sqrt((of["squared"] - of["squared_exit"]).clip(0.0) / after), np.nan),
-            "settling": np.where(settled, of["exit_2"], np.nan),
-            "settling_5": np.where(rests & (of["exit_5"] < goal["horizon"] - 1.5 * period), of["exit_5"], np.nan),
-            "steady_state": of["late"] / of["late_count"],
-            "overshoot": np.where(rests, 100.0 * of["overshoot"] / np.abs(goal["move"]), np.nan),
-            "iae": of["absolute"] * period,
-        }
-    alive = of["alive"] > 0.0
-    result = {name: np.where(alive, value, np.nan) for name, value in result.items()}
-    result["peak_tension"] = of["peak"]
-    result["rms_tension"] = np.sqrt(of["squared_tension"] / ticks)
-    result["chattering"] = of["variation"] / goal["horizon"]
-    result["saturation"] = of["saturated"] / ticks
-    result["slack"] = of["slack"] / ticks
-    return result
+        for name, metric in summed().items():
+            assert metric.of_totals is not None
+            value = metric.of_totals(totals)
+            found[name] = np.where(alive, value, np.nan) if metric.of_error else value
+    return found
 
 
-@compiled
-def _replay(series: Any, goals: Any, sums: Any, period: float) -> None:
-    goal = goals_of(goals)
-    total = rows_of(sums)
-    for tick in range(series.shape[0]):
-        row = rows_of(series[tick])
-        gather(total, goal, tick * period + 0.0 * row[0], row[0], row[1], row[2], row[3], row[4])
+def summed() -> dict[str, Metric]:
+    """The metrics that come from sums, by name: those that a recorded series has."""
+    return {name: metric for name, metric in METRICS.items() if metric.of_totals is not None}
+
+
+def of_trajectory(trajectory: Trajectory) -> dict[str, float]:
+    """The metrics that come from a trajectory."""
+    chosen = {name: metric.of_trajectory for name, metric in METRICS.items() if metric.of_trajectory is not None}
+    return {name: float(value(trajectory)) for name, value in chosen.items()}
 
 
 def metrics_of(
@@ -148,11 +88,123 @@ def metrics_of(
 
     `final` is the final reference angle, reached from 0, and `rest` the time at which the reference rests.
     """
-    count = len(theta)
-    flags = np.zeros(count) if saturated is None else np.asarray(saturated, float)
-    series = np.column_stack([theta, theta_ref, tension, flags])
-    goals = np.array([final, final, 0.0, rest, count * period])
-    sums = np.zeros(len(SUMS))
-    sums[_ALIVE] = 1.0
-    _replay(series, goals, sums, period)
-    return {name: float(value[0]) for name, value in summary(sums[None], goals[None], period).items()}
+    from wristctl.simulation.sums import GOALS, SUMS, sums_of  # compiled code, which the table does not need
+
+    flags = np.zeros(len(theta)) if saturated is None else np.asarray(saturated, float)
+    goals = np.array([final, final, 0.0, rest, len(theta) * period])
+    sums = sums_of(period, np.column_stack([theta, theta_ref, tension, flags]), goals)
+    totals = Totals(dict(zip(SUMS, sums[:, None], strict=True)), dict(zip(GOALS, goals[:, None], strict=True)), period)
+    return {name: float(value[0]) for name, value in summary(totals).items()}
+
+
+def _rests(of: Totals) -> Any:
+    return (of.goals["rest"] < of.goals["horizon"]) & (np.abs(of.goals["move"]) > _LEAST_MOVE)
+
+
+def _settled(of: Totals, exit_: str) -> Any:
+    return _rests(of) & (of.sums[exit_] < of.goals["horizon"] - 1.5 * of.period)
+
+
+def _rmse_move(of: Totals) -> Array:
+    sums, step = of.sums, of.goals["rest"] <= 0.0
+    return np.sqrt(np.where(step, sums["squared"] / sums["ticks"], sums["squared_move"] / sums["ticks_move"]))
+
+
+def _rmse_settled(of: Totals) -> Array:
+    sums = of.sums
+    after = np.round(sums["ticks"] - sums["exit_2"] / of.period) - 1.0
+    rest = np.sqrt((sums["squared"] - sums["squared_exit"]).clip(0.0) / after)
+    return np.where(_settled(of, "exit_2"), rest, np.nan)
+
+
+def _settling(of: Totals) -> Array:
+    return np.where(_settled(of, "exit_2"), of.sums["exit_2"], np.nan)
+
+
+def _settling_5(of: Totals) -> Array:
+    return np.where(_settled(of, "exit_5"), of.sums["exit_5"], np.nan)
+
+
+def _overshoot(of: Totals) -> Array:
+    return np.where(_rests(of), 100.0 * of.sums["overshoot"] / np.abs(of.goals["move"]), np.nan)
+
+
+def _away(trajectory: Trajectory) -> Array:
+    """Distance of the tip from where it should be [m], (T,)."""
+    distance: Array = np.linalg.norm(trajectory.tip - trajectory.tip_desired, axis=1)
+    return distance
+
+
+RMSE = Metric(
+    "rad",
+    "sqrt(mean e^2) over the horizon",
+    lambda of: np.sqrt(of.sums["squared"] / of.sums["ticks"]),
+    heading="RMSE [rad]",
+)
+RMSE_MOVE = Metric("rad", "sqrt(mean e^2) until the reference rests; over the horizon for a step", _rmse_move)
+RMSE_SETTLED = Metric("rad", "sqrt(mean e^2) after the settling time (2 %)", _rmse_settled)
+SETTLING = Metric(
+    "s",
+    "last instant outside +-2 % of the move around the final reference; never: nan",
+    _settling,
+    heading="settling [s]",
+    never=lambda horizon: horizon,
+)
+SETTLING_5 = Metric("s", "the same for +-5 %", _settling_5, never=lambda horizon: horizon)
+STEADY_STATE = Metric(
+    "rad",
+    "mean |e| over the last 10 % of the horizon",
+    lambda of: of.sums["late"] / of.sums["late_count"],
+    heading="steady [rad]",
+)
+OVERSHOOT = Metric(
+    "%",
+    "largest passing of the final reference over the last move, from that move's beginning",
+    _overshoot,
+    heading="overshoot [%]",
+)
+IAE = Metric("rad s", "integral of |e|", lambda of: of.sums["absolute"] * of.period)
+PEAK_TENSION = Metric(
+    "N", "largest tension of a tendon", lambda of: of.sums["peak"], heading="peak [N]", of_error=False
+)
+RMS_TENSION = Metric(
+    "N",
+    "sqrt(mean of both sides' squared tensions)",
+    lambda of: np.sqrt(of.sums["squared_tension"] / of.sums["ticks"]),
+    of_error=False,
+)
+CHATTERING = Metric(
+    "N/s",
+    "total variation of both sides' tensions per second",
+    lambda of: of.sums["variation"] / of.goals["horizon"],
+    heading="chattering [N/s]",
+    of_error=False,
+)
+SATURATION = Metric(
+    "",
+    "share of time in which the wanted torque was out of the tendons' reach",
+    lambda of: of.sums["saturated"] / of.sums["ticks"],
+    heading="saturated",
+    of_error=False,
+)
+SLACK = Metric(
+    "", "share of time in which a tendon was slack", lambda of: of.sums["slack"] / of.sums["ticks"], of_error=False
+)
+RMSE_DESIRED = Metric(
+    "rad",
+    "RMSE against the true wanted angle",
+    of_trajectory=lambda course: np.sqrt(np.mean((course.theta - course.theta_desired) ** 2)),
+)
+TIP_RMSE = Metric(
+    "mm",
+    "RMSE of the tip's distance from the wanted position",
+    of_trajectory=lambda course: 1e3 * np.sqrt(np.mean(_away(course) ** 2)),
+)
+TIP_STEADY = Metric(
+    "mm",
+    "mean distance of the tip from the wanted position over the last 10 %",
+    of_trajectory=lambda course: 1e3 * _away(course)[-max(1, len(course.time) // 10) :].mean(),
+)
+OUTSIDE_DOMAIN = Metric(
+    "", "share of the wanted tips outside the network's trained domain", of_trajectory=lambda course: course.outside
+)

@@ -7,20 +7,20 @@ what the motors have delivered since. The gain is the stationary one for the fra
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.config.plant import Sensor
+from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
-from wristctl.lanes.blocks import lanes_of, spread
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import Drive, at_rest, pulls, tendon_stiffness
-from wristctl.simulation.frames import frames
+from wristctl.simulation.actuator import at_rest, drive_of, pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
+from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
 
 Array = NDArray[np.float64]
@@ -41,18 +41,25 @@ class Observer(NamedTuple):
     at: Any
 
 
-class Watch(NamedTuple):
-    """One block's camera: its Frames, pictures taken (F,), and the next frame to take and to arrive, `turn`."""
+class Schedule(NamedTuple):
+    """Ticks at which frames are taken and at which they arrive, (F,) each; the same for all lanes."""
 
     captures: Any
     arrivals: Any
+
+
+class Watch(NamedTuple):
+    """One block's camera: what is added to each frame and whether it is seen (F, 2), pictures taken (F,), the next
+    frame to take and to arrive, `turn`; and the observer behind it."""
+
     readings: Any
     pictures: Any
     turn: Any
+    observer: Any
 
 
 @compiled
-def predict(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> None:
+def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> None:
     """Advance x by one control period, linearly implicit in damping and stiffness."""
     theta, rate = part(x, 0, _ONE), part(x, 1, _ONE)
     angle, speed, load = x[0], x[1], x[2]
@@ -67,64 +74,83 @@ def predict(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> 
 
 
 @compiled
-def watch(camera: Any, observer: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
+def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
     """Take a frame of the true angle where one is due, and fuse the frame that arrives at this tick, if any."""
-    turn = camera.turn
+    turn, readings, pictures = watch.turn, watch.readings, watch.pictures
     taken, arrived = turn[0], turn[1]
-    if taken < len(camera.captures) and camera.captures[taken] == tick:
-        rows_of(camera.pictures)[taken] = angle + rows_of(camera.readings[taken])[0]
+    if taken < len(schedule.captures) and schedule.captures[taken] == tick:
+        rows_of(pictures)[taken] = angle + rows_of(readings[taken])[0]
         turn[0] = taken + 1
-    if arrived < turn[0] and camera.arrivals[arrived] == tick:
-        seen = rows_of(camera.readings[arrived])[1]
-        fuse(observer, drive, known, camera.captures[arrived], 0.0, tick, rows_of(camera.pictures)[arrived], seen, h)
+    if arrived < turn[0] and schedule.arrivals[arrived] == tick:
+        seen, captured = rows_of(readings[arrived])[1], schedule.captures[arrived]
+        fuse(watch.observer, drive, known, (captured, tick), 0.0, rows_of(pictures)[arrived], seen, h)
         turn[1] = arrived + 1
 
 
 @compiled
-def fuse(
-    observer: Any, drive: Any, known: Any, captured: int, since: float, tick: int, angle: Any, seen: Any, h: float
-) -> None:
-    """Fuse an angle taken `since` seconds after tick `captured` (where `seen` is 1, not 0), and predict up to `tick`.
+def sense(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
+    """Angle and rate as the law sees them: as they are, or, behind a camera, as the observer makes them out."""
+    if watch is None:
+        return angle, rate
+    sample(schedule, watch, drive, known, tick, angle, h)
+    now = rows_of(watch.observer.now)
+    return now[0], now[1]
+
+
+@compiled
+def fuse(observer: Any, drive: Any, known: Any, ticks: Any, since: float, angle: Any, seen: Any, h: float) -> None:
+    """Fuse an angle (where `seen` is 1, not 0) taken `since` [s] after the first of two ticks; predict to the other.
 
     What was delivered at every tick from the last fused one on must still be in the ring.
     """
+    captured, tick = ticks
     size = observer.delivered.shape[0]
-    fused, now = rows_of(observer.fused), rows_of(observer.now)
+    gain, fused, now = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now)
     for past in range(observer.at[0], captured):
         sent = rows_of(observer.delivered[past % size])
-        predict(drive, known, fused, sent[0], sent[1], h)
+        propagate(drive, known, fused, sent[0], sent[1], h)
     innovation = seen * (angle - fused[0] - since * fused[1])
     for i in range(3):
-        fused[i] = fused[i] + observer.gain[i] * innovation
+        fused[i] = fused[i] + gain[i] * innovation
         now[i] = fused[i]
     for past in range(captured, tick):
         sent = rows_of(observer.delivered[past % size])
-        predict(drive, known, now, sent[0], sent[1], h)
+        propagate(drive, known, now, sent[0], sent[1], h)
     observer.at[0] = captured
 
 
 @compiled
-def expect(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
-    """Remember what is delivered over this tick and predict over it."""
+def predict(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+    """Remember what is delivered over this tick and go on over it."""
     sent = rows_of(observer.delivered[tick % observer.delivered.shape[0]])
     sent[0] = plus
     sent[1] = minus
-    predict(drive, known, rows_of(observer.now), plus, minus, h)
+    propagate(drive, known, rows_of(observer.now), plus, minus, h)
 
 
 @compiled
-def _predict_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
+def go_on(watch: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+    """`predict` behind a camera; nothing where there is none."""
+    if watch is not None:
+        predict(watch.observer, drive, known, tick, plus, minus, h)
+
+
+@kernel
+def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
     known, x = load_segments(rows_of(model)), rows_of(state)
-    predict(drive, known, x, plus + 0.0 * x[0], minus + 0.0 * x[0], h)
+    zero = 0.0 * x[0]
+    propagate(drive, known, x, plus + zero, minus + zero, h)
 
 
-def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters, period: float) -> Array:
+@lru_cache(maxsize=256)
+def stationary_gain(sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float) -> Array:
     """The Kalman gain (3,) for one frame after another, from the prediction linearised where the wrist is straight."""
-    delivered = at_rest(drive, wrist, np.zeros(1))[[0, 2]]
+    drive = drive_of(actuator)
+    delivered = at_rest(drive, wrist, PCC, np.zeros(1))[[0, 2]]
     small = 1e-6
     states = small * np.eye(4, 3)
     for state in states:
-        _predict_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
+        _propagate_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
     tick = (states[:3] - states[3]).T / small
     unknown = tick[1, 2]  # rate gained in one period per unit of torque
     noise = np.diag([0.0, unknown**2 * sensor.torque_noise**2 / period, sensor.load_drift**2 * period])
@@ -137,63 +163,14 @@ def stationary_gain(sensor: Sensor, drive: Drive | None, wrist: WristParameters,
     for _ in range(500):
         gain = covariance[:, 0] / (covariance[0, 0] + variance)
         covariance = frame @ (covariance - np.outer(gain, covariance[0])) @ frame.T + between
+    gain.setflags(write=False)
     return gain
 
 
 def observer_of(
-    sensor: Sensor, drive: Drive | None, wrist: WristParameters, period: float, ticks: int, theta: float
+    sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float, ticks: int, theta: float
 ) -> Observer:
     """A rollout's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
     start = np.array([theta, 0.0, 0.0])
-    gain = stationary_gain(sensor, drive, wrist, period)
+    gain = stationary_gain(sensor, actuator, wrist, period).copy()
     return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1, np.int64))
-
-
-def cameras_of(
-    sensor: Sensor,
-    drive: Drive | None,
-    wrist: WristParameters,
-    period: float,
-    horizon: float,
-    seeds: NDArray[np.int64],
-    theta: float,
-) -> tuple[Watch, Observer] | None:
-    """Cameras and observers of rollouts with these seeds (count,); None where sensors are ideal.
-
-    All but captures, arrivals and gain have the block as their first axis: `of_block` is one block's.
-    """
-    if sensor.level == "ideal":
-        return None
-    taken = frames(sensor, period, horizon, seeds)
-    longest = int((taken.arrivals - taken.captures).max() + np.diff(taken.captures).max(initial=1)) + 2
-    fresh = observer_of(sensor, drive, wrist, period, longest, theta)
-    lanes = lanes_of(len(seeds))
-    blocks, *wide = lanes.shape
-    watch = Watch(
-        captures=taken.captures,
-        arrivals=taken.arrivals,
-        readings=np.ascontiguousarray(np.moveaxis(taken.readings[..., lanes], 2, 0)),
-        pictures=np.zeros((blocks, len(taken.captures), *wide)),
-        turn=np.zeros((blocks, 2), np.int64),
-    )
-
-    def for_each(values: Array) -> Array:
-        return spread(values.ravel(), len(seeds)).reshape(blocks, *values.shape, *wide)
-
-    own = {name: for_each(getattr(fresh, name)) for name in ("delivered", "fused", "now")}
-    return watch, fresh._replace(**own, at=np.tile(fresh.at, (blocks, 1)))
-
-
-@compiled
-def of_block(watched: Any, block: int) -> Any:
-    """One block's camera and observer; None where there are none."""
-    if watched is None:
-        return None
-    camera, observer = watched
-    own_camera = Watch(
-        camera.captures, camera.arrivals, camera.readings[block], camera.pictures[block], camera.turn[block]
-    )
-    own_observer = Observer(
-        observer.gain, observer.delivered[block], observer.fused[block], observer.now[block], observer.at[block]
-    )
-    return own_camera, own_observer

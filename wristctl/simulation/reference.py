@@ -2,17 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
-from wristctl.config.loop import Reference
+from wristctl.config.loop import DirectionName, Reference
+from wristctl.config.section import Parameter
+from wristctl.config.tables import REFERENCES as _TABLE
+from wristctl.config.tables import Table
 from wristctl.config.wrist import WristParameters
+from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse, arc_path, exact_arc, exact_inverse
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ReferenceKind:
+    """A kind of reference: one or more moves, each from where the last one ended to its target."""
+
+    meaning: str
+    course: Callable[[Reference, Array], Array]
+    """One move from 0 to 1 with two derivatives, (3, T), by the time (T,) since it began; 0 before."""
+    rest: Callable[[Reference, float, float], float]
+    """When the reference rests, by when its last move begins and the horizon (which means never) [s]."""
+    described: Callable[[Reference], str]
+    """A short name of the reference: kind, duration and target."""
+    targets: Literal["end", "angles_deg", "tips"] = "end"
+    """Where its targets stand: one angle or tip at the end, or the leaf with several, one every `duration`."""
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
+
+
+REFERENCES: Table[ReferenceKind] = _TABLE
+
+
+def reference_name(reference: Reference) -> str:
+    """A short name: kind, duration and target."""
+    return REFERENCES[reference.kind].described(reference)
+
+
+def toward(reference: Reference, direction: DirectionName) -> Reference:
+    """The reference whose angles count toward this direction."""
+    return reference if DIRECTIONS[direction].sign > 0 else reference.mirrored()
 
 
 @dataclass(frozen=True)
@@ -60,15 +96,16 @@ def motion(
     Tip targets, or angles with inverse `network` or `exact`, become a tip path (an arc whose angle and length move
     from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
     """
+    kind = REFERENCES[reference.kind]
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
-    targets = np.array(_targets(reference, wrist))
+    targets = np.array(_targets(reference, kind, wrist))
     before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
     arc = np.zeros((2, 3, len(time)))
     arc[:, 0] = before[0][:, None]
     for number, change in enumerate(targets - before):
-        arc += change[:, None, None] * _course(reference, time - number * reference.duration)
+        arc += change[:, None, None] * kind.course(reference, time - number * reference.duration)
     move, begin = float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
-    rest = {"sine": horizon, "step": begin, "multi-step": begin}.get(reference.kind, begin + reference.duration)
+    rest = kind.rest(reference, begin, horizon)
     theta, tip = arc[0], arc_path(arc[0], arc[1])
     if reference.inverse == "none":
         return Motion(time, theta[0], theta[1], theta[2], theta[0], tip.position, move, begin, rest, horizon)
@@ -78,21 +115,11 @@ def motion(
     return Motion(time, *angles, theta[0], tip.position, move, begin, rest, horizon, outside)
 
 
-def _course(reference: Reference, time: Array) -> Array:
-    """The course of one move from 0 to 1 with two derivatives, (3, T), by the time since it began."""
-    if reference.kind in ("step", "multi-step"):
-        return np.stack([np.where(time > -1e-9, 1.0, 0.0), 0.0 * time, 0.0 * time])
-    if reference.kind == "sine":
-        w = 2.0 * np.pi * reference.frequency
-        return 0.5 * np.stack([1.0 - np.cos(w * time), w * np.sin(w * time), w * w * np.cos(w * time)])
-    return np.stack(minimum_jerk(time, reference.duration))
-
-
-def _targets(reference: Reference, wrist: WristParameters) -> list[tuple[float, float]]:
+def _targets(reference: Reference, kind: ReferenceKind, wrist: WristParameters) -> list[tuple[float, float]]:
     """Angle [rad] and arc length [m] of each target in turn."""
-    if reference.kind == "tip-path":
+    if kind.targets == "tips":
         return [_tip_target(tip, "reference.tips", wrist) for tip in reference.tips]
-    if reference.kind == "multi-step":
+    if kind.targets == "angles_deg":
         return [_angle_target(angle, "reference.angles_deg", wrist) for angle in reference.angles_deg]
     if reference.tip is not None:
         return [_tip_target(reference.tip, "reference.tip", wrist)]

@@ -11,18 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.loop import Loop
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, Controller
-from wristctl.lanes.blocks import lanes_of, spread, to_rows, width
+from wristctl.control.law import Controller
+from wristctl.lanes.blocks import to_rows
 from wristctl.lanes.cores import cores
-from wristctl.simulation.actuator import at_rest, drive_of
-from wristctl.simulation.disturbances import course
-from wristctl.simulation.kernel import RECORDED, run_blocks
-from wristctl.simulation.metrics import SUMS, summary
-from wristctl.simulation.observer import cameras_of
-from wristctl.simulation.plant import plant_of
+from wristctl.seeds import Entropy
+from wristctl.simulation.batch import Batch, Lanes, Start, batch
+from wristctl.simulation.frames import schedule
+from wristctl.simulation.kernel import RECORDED, Span, run_blocks
+from wristctl.simulation.metrics import Totals, summary
 from wristctl.simulation.reference import Motion
-from wristctl.wrist.segments import segments
+from wristctl.simulation.sums import GOALS, SUMS
+from wristctl.simulation.worlds import World
+from wristctl.wrist.plant import kernel_of
 
 Array = NDArray[np.float64]
 
@@ -46,15 +48,10 @@ class Outcome:
         assert self.samples is not None
         return self.samples[rollout, :, RECORDED.index(name)]
 
-    def segment_theta(self, rollout: int) -> Array:
-        """Angles of the plant's segments, (T, n) [rad]."""
+    def coordinates(self, rollout: int) -> Array:
+        """The plant's coordinates, the angles of its segments, (T, q) [rad]."""
         assert self.samples is not None
         return self.samples[rollout, :, len(RECORDED) :]
-
-
-def sample_period(loop: Loop) -> float:
-    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
-    return max(loop.control_period, round(1e-3 / loop.control_period) * loop.control_period)
 
 
 def rollout(
@@ -62,79 +59,133 @@ def rollout(
     gains: Array,
     motions: Sequence[Motion],
     which: NDArray[np.int64],
-    loop: Loop,
-    wrist: WristParameters,
-    start: Array | None = None,
-    seeds: NDArray[np.int64] | None = None,
+    loop: Loop | Sequence[Loop],
+    wrist: WristParameters | Sequence[WristParameters],
+    start: Start | None = None,
+    streams: Sequence[Entropy] | None = None,
     record: bool = False,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
-    They begin at rest with the segments' angles `start` (n,), straight where none is given. The controller's
-    one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and what stands
-    between command and measurement. `seeds` (count,) number the camera's noise; all have the same where none is given.
+    They begin at rest with the coordinates (q,) that `start` gives for the plant, straight where none is given. The
+    controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and
+    what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
+    ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
+    (count,) are the entropies of the cameras' noise; all meet the same where none is given.
     """
-    count, n = len(gains), loop.plant_segments
-    ticks = max(1, round(sample_period(loop) / loop.control_period))
-    samples = len(motions[0].theta_ref)
-    limit = wrist.tension_limit if loop.limits else np.inf
-    actual = plant_of(wrist, loop.plant)
-    fixed = [segments(actual, n), segments(wrist, 1), np.array([wrist.pretension, limit])]
-    plant, model, limits = (spread(row, width(count))[0] for row in fixed)
-    goal_rows = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[which]
-    rest = np.zeros(n) if start is None else start
-    drive, period = drive_of(loop.actuator), loop.control_period
-    begin_with = {
-        "gains": gains.reshape(count, -1),
-        "goals": goal_rows,
-        "sums": np.array([float(name == "alive") for name in SUMS]),
-        "memory": np.zeros(max(1, controller.memory)),
-        "state": np.concatenate([rest, np.zeros(n)]),
-        "motors": at_rest(drive, actual, rest),
-    }
-    blocks = {name: spread(row, count) for name, row in begin_with.items()}
-    lanes = lanes_of(count)
-    total, *wide = lanes.shape
-    followed = which[lanes].reshape(total, -1)
-    courses = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
-    disturbed = course(loop.disturbances, motions[0].time)
-    streams = np.zeros(count, np.int64) if seeds is None else seeds
-    cameras = cameras_of(loop.sensor, drive, wrist, period, motions[0].horizon, streams, rest.sum())
-    recorded = np.empty((total, samples if record else 0, len(RECORDED) + n, *wide))
-    workers = threads or cores()
-    each = samples * ticks * loop.substeps
-    together = max(1, min(_SLICE_TICKS // each, total // (_SHARES * workers)))
-    law = controller.compiled(count)
-    stop, done = threading.Event(), [0] * total
+    count = len(gains)
+    worlds, world = _worlds(loop, wrist, count)
+    lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
+    groups = _by_frames(worlds, world, motions[0].horizon)
+    done = [
+        _run(controller, gains[own], motions, worlds, _of(lanes, own), start, record, threads, progress)
+        for own in groups
+    ]
+    if len(done) == 1:
+        return done[0]
+    back = np.argsort(np.concatenate(groups), kind="stable")
+    metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in done[0].metrics}
+    failed = np.concatenate([each.failed for each in done])[back]
+    samples = [each.samples for each in done if each.samples is not None]
+    return Outcome(metrics, failed, np.concatenate(samples)[back] if samples else None)
+
+
+def _worlds(
+    loop: Loop | Sequence[Loop], wrist: WristParameters | Sequence[WristParameters], count: int
+) -> tuple[list[World], NDArray[np.int64]]:
+    """The worlds that there are, and which of them each rollout has, (count,)."""
+    if isinstance(loop, Loop) and isinstance(wrist, WristParameters):
+        return [World(loop, wrist)], np.zeros(count, np.int64)
+    loops = [loop] * count if isinstance(loop, Loop) else loop
+    wrists = [wrist] * count if isinstance(wrist, WristParameters) else wrist
+    numbers: dict[tuple[int, int], int] = {}
+    worlds: list[World] = []
+    which = np.empty(count, np.int64)
+    for lane, pair in enumerate(zip(loops, wrists, strict=True)):
+        number = numbers.setdefault((id(pair[0]), id(pair[1])), len(worlds))
+        if number == len(worlds):
+            worlds.append(World(*pair))
+        which[lane] = number
+    if len({_structure(each.loop) for each in worlds}) != 1:
+        raise ValueError("loops of one batch differ in segments, plant, timing, or levels of actuator and sensor")
+    return worlds, which
+
+
+def _structure(loop: Loop) -> tuple[object, ...]:
+    timing = loop.control_period, loop.substeps
+    return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
+
+
+def _by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float) -> list[NDArray[np.intp]]:
+    """Rollouts whose cameras take frames at the same ticks run together."""
+    if len(worlds) == 1 or worlds[0].loop.sensor.level == "ideal":
+        return [np.arange(len(world))]
+    ticks = [schedule(each.loop.sensor, each.loop.control_period, horizon) for each in worlds]
+    keys = [(each.captures.tobytes(), each.arrivals.tobytes()) for each in ticks]
+    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    group = np.array([numbers[key] for key in keys])[world]
+    return [np.flatnonzero(group == number) for number in range(len(numbers))]
+
+
+def _of(lanes: Lanes, own: NDArray[np.intp]) -> Lanes:
+    return Lanes(lanes.motion[own], lanes.world[own], [lanes.streams[each] for each in own])
+
+
+def _run(
+    controller: Controller,
+    gains: Array,
+    motions: Sequence[Motion],
+    worlds: Sequence[World],
+    lanes: Lanes,
+    start: Start | None,
+    record: bool,
+    threads: int | None,
+    progress: Callable[[float], None] | None,
+) -> Outcome:
+    loop, count = worlds[0].loop, len(gains)
+    model = PLANTS[loop.plant.model]
+    done = batch(controller, gains, motions, worlds, lanes, model, start, record)
+    _advance(done, kernel_of(run_blocks, model), threads or cores(), progress)
+    sums = to_rows(done.state.sums, count)
+    goals = to_rows(done.world.goals, count)
+    kept = to_rows(done.state.record.reshape(done.blocks, -1, *done.wide), count) if record else None
+    named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
+    totals = Totals(*named, loop.control_period)
+    samples = None if kept is None else kept.reshape(count, done.samples, -1)
+    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, samples)
+
+
+def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None] | None) -> None:
+    """Run all blocks to the end, on so many threads."""
+    setup, blocks, samples = done.setup, done.blocks, done.samples
+    each = samples * setup.ticks * setup.substeps
+    together = max(1, min(_SLICE_TICKS // each, blocks // (_SHARES * workers)))
+    piece = max(1, _SLICE_TICKS // (setup.ticks * setup.substeps))
+    stop, ended = threading.Event(), [0] * blocks
 
     def run(begin: int) -> None:
-        end = min(begin + together, total)
-        now, target = np.zeros((len(NOW), *wide)), np.zeros((3, *wide))
-        piece = max(1, _SLICE_TICKS // (ticks * loop.substeps))
+        end, scratch = min(begin + together, blocks), done.scratch()
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
             last = min(first + piece, samples)
-            run_blocks(
-                law, plant, model, limits, blocks["gains"], blocks["goals"], courses, followed,
-                blocks["memory"], blocks["state"], blocks["sums"], recorded, drive, blocks["motors"], cameras,
-                disturbed, now, target, period, loop.substeps, ticks, begin, end, first, last, (0,) * n,
-            )  # fmt: skip
-            done[begin:end] = [last] * (end - begin)
+            kernel(setup, done.course, done.world, done.state, scratch, Span(begin, end, first, last))
+            ended[begin:end] = [last] * (end - begin)
 
-    pieces = range(0, total, together)
+    pieces = range(0, blocks, together)
+    if min(workers, len(pieces)) == 1:
+        for begin in pieces:
+            run(begin)
+            if progress is not None:
+                progress(sum(ended) / (blocks * samples))
+        return
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for _ in pool.map(run, pieces) if min(workers, len(pieces)) > 1 else map(run, pieces):
+            for _ in pool.map(run, pieces):
                 if progress is not None:
-                    progress(sum(done) / (total * samples))
+                    progress(sum(ended) / (blocks * samples))
         except BaseException:
             stop.set()
             raise
-
-    sums = to_rows(blocks["sums"], count)
-    kept = to_rows(recorded.reshape(total, -1, *wide), count).reshape(count, samples, -1) if record else None
-    metrics = summary(sums, goal_rows, loop.control_period)
-    return Outcome(metrics, sums[:, SUMS.index("alive")] <= 0.0, kept)

@@ -63,6 +63,8 @@ class Trajectory:
     """Tension as it acts on the wrist, (T, 2); None where it is as commanded or cannot be known."""
     seen: Array | None = None
     """Angle that the controller sees, (T,); None where that is theta."""
+    outside: float = 0.0
+    """Share of the wanted tips outside the domain of the network behind the reference."""
 
     @property
     def error(self) -> Array:
@@ -98,14 +100,3 @@ class Trajectory:
         import pandas as pd
 
         return pd.DataFrame(self.columns())
-
-
-def desired_errors(trajectory: Trajectory) -> dict[str, float]:
-    """RMSE against the true wanted angle [rad]; RMSE and last-10 % mean of the tip's distance from its goal [mm]."""
-    distance = np.linalg.norm(trajectory.tip - trajectory.tip_desired, axis=1)
-    late = distance[-max(1, len(distance) // 10) :]
-    return {
-        "rmse_desired": float(np.sqrt(np.mean((trajectory.theta - trajectory.theta_desired) ** 2))),
-        "tip_rmse_mm": 1e3 * float(np.sqrt(np.mean(distance**2))),
-        "tip_steady_mm": 1e3 * float(late.mean()),
-    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 _DETAILED = 3
 """Comparisons of more loops than this draw the details of the first only."""
 
-_SHOWN = ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension", "saturation")
-_HEADS = ("RMSE [rad]", "settling [s]", "steady [rad]", "overshoot [%]", "chattering [N/s]", "peak [N]", "saturated")
+_FIRST = ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension", "saturation")
+"""Metrics in the order of the printed table's columns; others that have a heading follow."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -56,20 +57,20 @@ class Compared(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's."""
-        from wristctl.comparison.comparison import frame
+        from wristctl.comparison.comparison_data import frame
 
         return frame(self.rows)
 
     def series(self) -> dict[str, np.ndarray]:
         """Courses over time, one row per combination, every fifth sample; SI units."""
-        from wristctl.comparison.comparison import series
+        from wristctl.comparison.comparison_data import series
 
         return dict(series(self.rows))
 
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.comparison.comparison import refuse_tuned_scenarios
+    from wristctl.comparison.comparison import count_rollouts, refuse_tuned_scenarios
 
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -83,21 +84,14 @@ def plan(study: Study, inputs: Inputs) -> str:
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
-    return f"{searched}{planned_rollouts(settings)} rollouts of {settings.horizon:g} s"
-
-
-def planned_rollouts(settings: CompareSettings) -> int:
-    """How many closed loops a comparison runs: one for each combination of what it compares."""
-    count = 1
-    for axis in (settings.rows, settings.loops, settings.references, settings.inverses, settings.directions):
-        count *= len(axis)
-    return count
+    return f"{searched}{count_rollouts(settings)} rollouts of {settings.horizon:g} s"
 
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers."""
     from wristctl.comparison.comparison import compare as run_comparison
-    from wristctl.comparison.comparison import frame, series
+    from wristctl.comparison.comparison_data import frame, repetitions_frame, series
+    from wristctl.comparison.statistics import spread
 
     study, findings, searches = session.study, session.findings, dict[str, "Search"]()
     settings = study.compare
@@ -112,9 +106,12 @@ def compare(session: Session) -> Compared:
         results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
     findings.table("data/comparison.csv", frame(results), units=_units())
     findings.arrays("data/trajectories.npz", series(results))
+    if any(len(result.repeated.failed) > 1 for result in results):
+        findings.table("data/repetitions.csv", repetitions_frame(results), units=_units())
     for result in results:
         name = "_".join((result.loop, result.label, result.inverse, result.reference)).replace(" ", "-")
-        findings.metric(f"rmse_{name}", result.simulation.metrics["rmse"], "rad", "lower")
+        found = spread(result.repeated.metrics["rmse"])
+        findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
     times = _step_times(session, tuned)
     with session.progress("drawing"):
         _draw(findings, settings, results)
@@ -172,27 +169,36 @@ def _units() -> dict[str, str]:
     from wristctl.simulation.metrics import METRICS
 
     own = {name: metric.unit or "1" for name, metric in METRICS.items()}
-    extra = {"rmse_desired": "rad", "tip_rmse_mm": "mm", "tip_steady_mm": "mm", "outside_domain": "1"}
-    paper = {"paper_rmse": "rad", "paper_settling": "s", "paper_steady_state": "rad"}
-    return own | extra | paper
+    ends = {f"{name}_{end}": unit for name, unit in own.items() for end in ("low", "high")}
+    return own | ends | {"paper_rmse": "rad", "paper_settling": "s", "paper_steady_state": "rad"}
 
 
 def _loop_tables(loop: str, results: list[ComparedRow]) -> list[Table]:
-    """A table for each reference on one loop."""
+    """A table for each reference on one loop; of repetitions medians, with the interval of the RMSE's."""
+    from wristctl.simulation.metrics import METRICS
+
+    shown = {name: METRICS[name].heading for name in dict.fromkeys((*_FIRST, *METRICS)) if METRICS[name].heading}
+    times = max(len(result.repeated.failed) for result in results)
+    ends = ("RMSE's 95 % low", "high") if times > 1 else ()
     tables = []
     for reference in dict.fromkeys(result.reference for result in results):
-        rows = [_row(result) for result in results if result.reference == reference]
-        heads = ("controller", "inverse", *_HEADS, "paper's", "verdict")
-        tables.append(Table(f"Loop {loop}, {reference}", heads, rows))
+        rows = [_row(result, shown, bool(ends)) for result in results if result.reference == reference]
+        heads = ("controller", "inverse", *shown.values(), *ends, "paper's", "verdict")
+        medians = f", medians of {times} repetitions" if ends else ""
+        tables.append(Table(f"Loop {loop}, {reference}{medians}", heads, rows))
     return tables
 
 
-def _row(result: ComparedRow) -> tuple[str | float, ...]:
-    metrics = result.simulation.metrics
-    never = "diverged" if result.simulation.failed else "never"
+def _row(result: ComparedRow, shown: Iterable[str], repeated: bool) -> tuple[str | float, ...]:
+    from wristctl.comparison.comparison_data import metrics_of
+    from wristctl.comparison.statistics import spread
+
+    metrics = metrics_of(result)
+    never = "diverged" if result.repeated.failed.any() else "never"
     settling = metrics["settling"] if metrics["settling"] == metrics["settling"] else never
-    values = [settling if name == "settling" else metrics[name] for name in _SHOWN]
-    return (result.label, result.inverse, *values, *_paper(result))
+    values = [settling if name == "settling" else metrics[name] for name in shown]
+    ends = spread(result.repeated.metrics["rmse"])[1:3] if repeated else ()
+    return (result.label, result.inverse, *values, *ends, *_paper(result))
 
 
 def _step_table(times: dict[str, StepTime]) -> Table:
@@ -201,11 +207,12 @@ def _step_table(times: dict[str, StepTime]) -> Table:
 
 
 def _paper(result: ComparedRow) -> tuple[str, str]:
+    from wristctl.comparison.comparison_data import metrics_of
     from wristctl.comparison.paper import T2, verdict
 
     if result.controller not in T2:
         return "", ""
-    metrics = result.simulation.metrics
+    metrics = metrics_of(result)
     printed = " / ".join(f"{value:g}" for value in T2[result.controller])
     return printed, verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"])
 

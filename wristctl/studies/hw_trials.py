@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.records import LiveRun
 from wristctl.report.tables import Table
@@ -58,9 +59,10 @@ def perform_trials(
     cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(session.findings.stream("order")))
     calibration = session.inputs.read("calibration", WristCalibration.load)
-    segments = settings.bench.segments if settings.port is None else None
-    trial_log = TrialLog(run.file("data/log.csv").parent, segments, settings.control_period)
-    experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration)
+    plant = PLANTS[settings.bench.plant.model]
+    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
+    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
+    experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
     film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
     stopped: BaseException | None = None
     try:

@@ -102,7 +102,7 @@ def warn_if_outside(share: float) -> None:
 
 def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop]) -> None:
     """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
-    from wristctl.simulation.plant import plant_of
+    from wristctl.simulation.worlds import plant_of
     from wristctl.wrist.statics import least_stiffness
 
     least = min(least_stiffness(plant_of(wrist, loop.plant), loop.plant_segments) for loop in loops)

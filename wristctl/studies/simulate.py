@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.report.tables import Table
+from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
     check_inverses,
@@ -26,17 +27,24 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.simulation.closed_loop import Repeated
     from wristctl.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Simulated(StudyResult):
-    """One closed loop: its trajectory, and whether the wrist bent beyond a full turn."""
+    """One closed loop, as often as the study says, and whether the wrist ever bent beyond a full turn."""
 
     kind = "simulate"
 
-    trajectory: Trajectory
+    repeated: Repeated
+    """Metrics of every repetition."""
     failed: bool
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of the first repetition."""
+        return self.repeated.first.trajectory
 
     def frame(self) -> pd.DataFrame:
         """The trajectory: time, angles, tip, tensions, ...; SI units."""
@@ -48,7 +56,10 @@ def plan(study: Study, inputs: Inputs) -> str:
     settings = study.simulate
     with under("simulate"):
         check_row(settings, tuned_gains(inputs))
-    return f"one rollout of {settings.horizon:g} s"
+    from wristctl.simulation.draws import is_random
+
+    times = settings.repetitions if is_random(settings.loop) else 1
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s"
 
 
 def simulate(session: Session) -> Simulated:
@@ -56,7 +67,6 @@ def simulate(session: Session) -> Simulated:
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import simulate as run_simulation
-    from wristctl.simulation.metrics import METRICS
     from wristctl.simulation.trajectory import COLUMNS
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
@@ -65,33 +75,47 @@ def simulate(session: Session) -> Simulated:
     network = network_for(session.inputs, wrist, [settings.loop])
     check_inverses(inverses_of([settings.reference]), network)
     with session.progress("compiling and simulating the loop"):
-        done = run_simulation(study, network, tuned_gains(session.inputs))
-    warn_if_outside(done.metrics["outside_domain"])
-    course = done.trajectory
+        repeated = run_simulation(study, network, tuned_gains(session.inputs))
+    course, failed = repeated.first.trajectory, bool(repeated.failed.any())
+    warn_if_outside(course.outside)
     own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
     columns = COLUMNS | own
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
-    rows = []
-    for name, metric in METRICS.items():
-        findings.metric(name, done.metrics[name], unit=metric.unit, better="lower", meaning=metric.formula)
-        rows.append((name, done.metrics[name], metric.unit, metric.formula))
-    for name, unit, formula in (
-        ("rmse_desired", "rad", "RMSE against the true wanted angle"),
-        ("tip_rmse_mm", "mm", "RMSE of the tip's distance from the wanted position"),
-        ("tip_steady_mm", "mm", "mean distance of the tip from the wanted position over the last 10 %"),
-        ("outside_domain", "", "share of the wanted tips outside the network's trained domain"),
-    ):
-        findings.metric(name, done.metrics[name], unit=unit, better="lower", meaning=formula)
-        rows.append((name, done.metrics[name], unit, formula))
+    title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if failed else "")
+    table = _table(findings, title, repeated)
     with session.progress("drawing"):
         findings.figure("angle", angles, [course])
         findings.figure("error", errors, [course])
         findings.figure("tensions", tensions, course)
-        findings.figure("motion", stroboscope, course, wrist)
-    title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if done.failed else "")
-    tables = [Table(title, ("metric", "value", "unit", "meaning"), rows)]
-    return Simulated(session.study, findings, tables, course, done.failed)
+        findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
+    return Simulated(session.study, findings, [table], repeated, failed)
+
+
+def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
+    """Every metric: its value, or of several repetitions the median with its 95 % interval."""
+    import pandas as pd
+
+    from wristctl.comparison.statistics import spread
+    from wristctl.simulation.metrics import METRICS
+
+    once, rows = len(repeated.failed) == 1, list[tuple[object, ...]]()
+    for name, metric in METRICS.items():
+        if once:
+            value = repeated.first.metrics[name]
+            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
+            rows.append((name, value, metric.unit, metric.formula))
+        else:
+            found = spread(repeated.metrics[name])
+            meaning = f"{metric.formula}; median"
+            findings.metric(name, found.median, metric.unit, "lower", found.n, found.interval, meaning)
+            rows.append((name, found.median, found.low, found.high, metric.unit, metric.formula))
+    if once:
+        return Table(title, ("metric", "value", "unit", "meaning"), rows)
+    every = pd.DataFrame({"repetition": range(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics})
+    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in METRICS.items()})
+    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
+    return Table(f"{title}, {len(every)} repetitions", heads, rows)
 
 
 SIMULATE = Procedure(

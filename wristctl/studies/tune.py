@@ -59,6 +59,7 @@ def planned_search(settings: TuneSettings) -> str:
     That is an unknown controller, one without gains, or a scenario on an unknown loop.
     """
     from wristctl.control.table import controller
+    from wristctl.simulation.draws import is_random
     from wristctl.tuning.search import check_loops, check_tunable
 
     check_loops(settings)
@@ -67,7 +68,9 @@ def planned_search(settings: TuneSettings) -> str:
             check_tunable(controller(name))
         except UserError as error:
             raise error.at(f"controllers.{number}") from error
-    rollouts = settings.candidates * settings.iterations * len(settings.scenarios)
+    loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
+    each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
+    rollouts = settings.candidates * settings.iterations * each
     return f"{rollouts} rollouts of {settings.horizon:g} s for each of {', '.join(settings.controllers)}"
 
 

@@ -181,10 +181,10 @@ class ControlLoop:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
         middle = self._reeled() + self._sent * (0.5 * self._period - self._underway)
         plus, minus = self._paths.sides(self._spools.step * middle)
-        self._steering.expect(plus, minus)
+        self._steering.predict(plus, minus)
         self._skipped = max(0, int((self._clock.now() - self.next_tick) / self._period))
         for _ in range(self._skipped):
-            self._steering.expect(plus, minus)
+            self._steering.predict(plus, minus)
         self._timing.overruns += self._skipped
 
     def _reeled(self) -> Array:

@@ -12,6 +12,7 @@ from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.interrupt import undisturbed
+from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown, TickTiming
 from wristctl.trial.halt import Halt, halt
@@ -68,10 +69,10 @@ class Experiment:
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
-        calibration: WristCalibration | None = None,
+        calibration: WristCalibration | None = None, seed: int = 0,
     ) -> None:  # fmt: skip
         self._settings, self._wrist, self._trials, self._log = settings, wrist, trials, kept
-        self._calibration = calibration
+        self._calibration, self._draws = calibration, Draws(seed, "bench")
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
         self._back = controller("feedforward")
@@ -114,7 +115,7 @@ class Experiment:
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(0.0, 0.0, 0.0)
-            steering.expect(float(taut[0]), float(taut[0]))
+            steering.predict(float(taut[0]), float(taut[0]))
         steering.see(0.0, 0.0)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
@@ -160,7 +161,8 @@ class Experiment:
         law, gains = self._laws[trial.row]
         against = -DIRECTIONS[trial.direction].sign * trial.push
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        testbed.begin(start, Disturbances(push=settings.push.model_copy(update={"force": against})))
+        disturbances = Disturbances(push=settings.push.model_copy(update={"force": against}))
+        testbed.begin(start, disturbances, self._draws.camera(trial.scenario, trial.repetition))
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         loop.follow(followed, law, gains, trial.number, faults)
         self._trial_ended(testbed, "ok")

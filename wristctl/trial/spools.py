@@ -20,8 +20,11 @@ from numpy.typing import NDArray
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.functions import clip
+from wristctl.lanes.lane import where
 from wristctl.lanes.rows import rows_of
+from wristctl.simulation.actuator import reeling, spool_target
 from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
@@ -54,7 +57,9 @@ class Spools:
 
     def target(self, tension: Array, taut: Array) -> Array:
         """Positions [steps] at which tendons that are taut when reeled in by `taut` [m] have these tensions [N]."""
-        return (tension / self.stiffness + taut) / self.step
+        reeled = np.empty(len(tension))
+        _targets(tension, self.stiffness, taut, reeled)
+        return reeled / self.step
 
     def tension(self, position: Array, taut: Array) -> Array:
         """Tensions [N] at these positions [steps]; negative by how much a tendon is slack, times its stiffness."""
@@ -66,10 +71,9 @@ class Spools:
         On top of `moving` each spool takes the speed v from which one more period and then braking stay within the
         gap, v^2/(2 a) + h v = |gap|, and changes from `before` by no more than a h: for a small gap v = gap/h.
         """
-        change = self.acceleration * period
-        closing = np.sqrt(change * change + 2.0 * self.acceleration * np.abs(gap)) - change
-        wanted = np.clip(moving + np.copysign(closing, gap), -self.speed, self.speed)
-        return np.clip(wanted, before - change, before + change)
+        rates = np.empty(len(gap))
+        _rates((self.speed, self.acceleration), gap, moving, before, period, rates)
+        return rates
 
 
 def spools_of(actuator: Actuator) -> Spools:
@@ -106,7 +110,25 @@ class Paths:
         return np.where(self._plus, plus, minus)
 
 
-@compiled
+@kernel
+def _targets(tension: Any, stiffness: float, taut: Any, reeled: Any) -> None:
+    pulls, shorter, out = rows_of(tension), rows_of(taut), rows_of(reeled)
+    for axis in range(len(tension)):
+        out[axis] = spool_target(pulls[axis], stiffness, shorter[axis], 0.0)
+
+
+@kernel
+def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates: Any) -> None:
+    speed, acceleration = motor
+    gaps, known, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
+    change = acceleration * period
+    for axis in range(len(gap)):
+        closing = reeling(gaps[axis], acceleration + 0.0 * gaps[axis], period)
+        wanted = clip(known[axis] + where(gaps[axis] < 0.0, -closing, closing), -speed, speed)
+        out[axis] = clip(wanted, last[axis] - change, last[axis] + change)
+
+
+@kernel
 def _paths(model: Any, theta: float, found: Any) -> None:
     known, row = load_segments(rows_of(model)), rows_of(found)
     angle = theta + 0.0 * known.length

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, Controller, now_of, wrist_of
-from wristctl.control.response import respond
-from wristctl.lanes.compiled import compiled
+from wristctl.control.law import NOW, Controller
+from wristctl.control.response import Controlled, respond
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import expect, fuse, observer_of
-from wristctl.wrist.allocation import TENDONS_PER_SIDE, torque_of
+from wristctl.simulation.observer import fuse, observer_of, predict
+from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class Steering:
         self._drive = drive_of(actuator)
         self._model = segments(wrist, 1)
         self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
-        self._observer = observer_of(sensor, self._drive, wrist, period, REMEMBERED, theta)
+        self._observer = observer_of(sensor, actuator, wrist, period, REMEMBERED, theta)
         self._signals, self._target, self._found = (np.zeros(rows) for rows in (len(NOW), 3, 6))
         self._period = period
         self._law: Any = None
@@ -76,35 +77,27 @@ class Steering:
         if not max(int(self._observer.at[0]), self.tick - REMEMBERED + 1) <= tick <= self.tick:
             return False
         since = captured - tick * self._period
-        _fuse(self._observer, self._drive, self._model, tick, since, self.tick, theta, self._period)
+        _fuse(self._observer, self._drive, self._model, (tick, self.tick), since, theta, self._period)
         return True
 
     def respond(self, theta_ref: float, rate_ref: float, acceleration_ref: float) -> Answer:
         """The law's answer to this reference at the present estimate."""
         self._target[:] = theta_ref, rate_ref, acceleration_ref
-        _respond(
-            self._law, self._model, self._bounds, self._gains, self._memory, self._signals, self._target,
-            self._observer.now, self._period, self._found,
-        )  # fmt: skip
+        control = Controlled(self._law, self._signals, self._model, self._gains, self._memory, self._target)
+        _respond(control, self._bounds, self._observer.now, self._period, self._found)
         wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
 
-    def expect(self, reeled_plus: float, reeled_minus: float) -> None:
+    def predict(self, reeled_plus: float, reeled_minus: float) -> None:
         """Go on to the next tick, with the sides reeled in by so much [m] until then."""
-        _expect(self._observer, self._drive, self._model, self.tick, reeled_plus, reeled_minus, self._period)
+        _predict(self._observer, self._drive, self._model, self.tick, reeled_plus, reeled_minus, self._period)
         self.tick += 1
 
 
-@compiled
-def _respond(
-    law: Any, model: Any, bounds: Any, gains: Any, memory: Any, signals: Any, target: Any, now: Any, period: float,
-    found: Any,
-) -> None:  # fmt: skip
-    known, x, bound, row = load_segments(rows_of(model)), rows_of(now), rows_of(bounds), rows_of(found)
-    wanted, low, high, plus, minus = respond(
-        law, now_of(signals), rows_of(signals), wrist_of(model), known, rows_of(gains), rows_of(memory),
-        x[0], x[1], rows_of(target), 0.0, bound[0], bound[1], period,
-    )  # fmt: skip
+@kernel
+def _respond(control: Any, bounds: Any, now: Any, period: float, found: Any) -> None:
+    known, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
+    wanted, low, high, plus, minus = respond(control, known, x[0], x[1], (bound[0], bound[1]), 0.0, period)
     row[0] = wanted
     row[1] = torque_of(x[0], known, plus, minus)
     row[2] = plus
@@ -113,17 +106,15 @@ def _respond(
     row[5] = high
 
 
-@compiled
-def _fuse(
-    observer: Any, drive: Any, model: Any, captured: int, since: float, tick: int, theta: float, h: float
-) -> None:
+@kernel
+def _fuse(observer: Any, drive: Any, model: Any, ticks: Any, since: float, theta: float, h: float) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
-    fuse(observer, drive, known, captured, since, tick, theta + zero, 1.0 + zero, h)
+    fuse(observer, drive, known, ticks, since, theta + zero, 1.0 + zero, h)
 
 
-@compiled
-def _expect(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
+@kernel
+def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
-    expect(observer, drive, known, tick, plus + zero, minus + zero, h)
+    predict(observer, drive, known, tick, plus + zero, minus + zero, h)

@@ -15,6 +15,7 @@ from wristctl.board.transport import Transport, open_transport
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy
 from wristctl.trial.homing import Patience
 from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
 from wristctl.vision.camera import DeviceCamera
@@ -50,8 +51,8 @@ class Testbed(Protocol):
     def face(self, direction: str, patience: Patience) -> None:
         """Turn the wrist so that this direction's plane is the one that bends and is seen."""
 
-    def begin(self, start: float, disturbances: Disturbances) -> None:
-        """A trial's motion starts at `start` on the transport's clock."""
+    def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
+        """A trial's motion starts at `start` on the transport's clock; what is drawn of it comes from this stream."""
 
     def truth(self, since: float) -> Array:
         """Rows (time since then, segment angles, their sum, pulls) of an emulated wrist; none of a real one."""
@@ -88,14 +89,14 @@ class EmulatedTestbed:
         """Turn the bench."""
         self._bench.face(direction)
 
-    def begin(self, start: float, disturbances: Disturbances) -> None:
+    def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """Disturbances and faults count from here."""
-        self._bench.begin(start, disturbances)
+        self._bench.begin(start, disturbances, noise)
 
     def truth(self, since: float) -> Array:
         """What the emulated wrist did since then."""
         truth = self._bench.truth(since)
-        return np.column_stack([truth.time - since, truth.theta, truth.theta.sum(axis=1), truth.pull])
+        return np.column_stack([truth.time - since, truth.theta, truth.angle, truth.pull])
 
     def close(self) -> None:
         """End the eye and the bench."""
@@ -140,7 +141,7 @@ class RealTestbed:
                 patience.wait(_PULSE)
             answer.result()
 
-    def begin(self, start: float, disturbances: Disturbances) -> None:
+    def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """Nobody disturbs a real wrist but a person."""
 
     def truth(self, since: float) -> Array:

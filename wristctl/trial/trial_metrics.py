@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.plant import Push
-from wristctl.simulation.metrics import METRICS, metrics_of
+from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.reference import Motion
 from wristctl.trial.spools import on_plus_side
 from wristctl.trial.trials import Trial, push_seen, recovery
@@ -38,7 +38,7 @@ def evaluated(
     it ends when the estimated load has fallen again. All values are nan where the log is not whole.
     """
     time, theta, error = (course[name].to_numpy(float) for name in ("time", "theta", "error"))
-    names = [*METRICS, *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
+    names = [*summed(), *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
     found = dict.fromkeys(names, math.nan)
     if not len(time) or time[-1] < followed.horizon - 1.5 * period:
         return found

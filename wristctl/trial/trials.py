@@ -29,6 +29,11 @@ class Trial(NamedTuple):
     """Of the settings' rows of controllers."""
 
     @property
+    def scenario(self) -> str:
+        """What its noise goes by: direction and push, whichever row and however often."""
+        return f"{self.direction}, push {self.push:g} N"
+
+    @property
     def plane(self) -> str:
         """The bending plane."""
         return DIRECTIONS[self.direction].plane

@@ -28,4 +28,4 @@ def twin(
         direction=trial.direction,
         horizon=settings.horizon,
     )
-    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned)
+    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned).first

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 
 from wristctl.config.control import Objective, TuneSettings
 from wristctl.config.errors import UserError, meant
+from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
-from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout, sample_period
+from wristctl.simulation.batch import sample_period
+from wristctl.simulation.closed_loop import scenario_of, trajectory
+from wristctl.simulation.draws import Draws, is_random
+from wristctl.simulation.metrics import METRICS, of_trajectory
+from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.rollout import rollout
+from wristctl.simulation.worlds import loops_of, plant_of
 from wristctl.tuning.optimisers import OPTIMISERS
 from wristctl.tuning.space import GainSpace
 from wristctl.wrist.kinematics import Inverse
@@ -44,17 +50,16 @@ class Search:
         return np.minimum.accumulate(self.values.min(axis=1))
 
 
-def objective(outcome: Outcome, weights: Objective, horizon: float) -> Array:
-    """Weighted sum of metrics for each rollout, inf where it failed; what never settles counts the whole horizon."""
-    of = outcome.metrics
-    settling = np.where(np.isnan(of["settling"]), horizon, of["settling"])
-    value = (
-        weights.rmse * of["rmse"]
-        + weights.settling * settling
-        + weights.chattering * of["chattering"]
-        + weights.saturation * of["saturation"]
-    )
-    return np.where(outcome.failed | np.isnan(value), np.inf, value)
+def objective(metrics: Mapping[str, Array], failed: NDArray[np.bool_], weights: Objective, horizon: float) -> Array:
+    """Weighted sum of metrics (count,) for each rollout, inf where it failed.
+
+    What never happens (nan) counts what its metric says, a settling time the whole horizon; without that it has failed.
+    """
+    value = np.zeros(len(failed))
+    for name, weight in weights.weights().items():
+        never, own = METRICS[name].never, metrics[name]
+        value = value + weight * (own if never is None else np.where(np.isnan(own), never(horizon), own))
+    return np.where(failed | np.isnan(value), np.inf, value)
 
 
 def check_loops(settings: TuneSettings) -> None:
@@ -72,29 +77,56 @@ def check_tunable(controller: Controller) -> None:
 
 
 class Evaluator:
-    """Objective of candidate gains of one controller, averaged over the study's tuning scenarios."""
+    """Objective of candidate gains of one controller, averaged over the study's tuning scenarios and repetitions.
+
+    All candidates of all iterations meet the same noise and plants.
+    """
 
     def __init__(self, study: Study, controller: Controller, network: Inverse | None = None) -> None:
         check_loops(study.tune)
         self.study, self.controller = study, controller
+        self.draws = Draws(study.seed, "tuning")
         self.by_loop = {}
         for name, loop in study.tune.loops.items():
             chosen = [scenario.reference for scenario in study.tune.scenarios if scenario.loop == name]
-            period = sample_period(loop)
+            period = sample_period(loop.control_period)
             motions = [motion(reference, study.wrist, study.tune.horizon, period, network) for reference in chosen]
             if motions:
-                self.by_loop[name] = motions
+                self.by_loop[name] = motions, [scenario_of(reference, "ulnar") for reference in chosen]
 
     def __call__(self, gains: Array) -> Array:
         """Objective (P,) of gains (P, g)."""
-        settings, total, count = self.study.tune, np.zeros(len(gains)), 0
-        for name, motions in self.by_loop.items():
-            batch = np.repeat(gains, len(motions), axis=0)
-            which = np.tile(np.arange(len(motions)), len(gains))
-            outcome = rollout(self.controller, batch, motions, which, settings.loops[name], self.study.wrist)
-            total += objective(outcome, settings.objective, settings.horizon).reshape(len(gains), -1).sum(axis=1)
+        total, count = np.zeros(len(gains)), 0
+        for name, (motions, scenarios) in self.by_loop.items():
+            total += self._on(self.study.tune.loops[name], motions, scenarios, gains).sum(axis=1)
             count += len(motions)
         return total / count
+
+    def _on(self, loop: Loop, motions: list[Motion], scenarios: list[str], gains: Array) -> Array:
+        """Objective of each candidate on each of a loop's scenarios, the mean over repetitions, (P, scenarios)."""
+        settings, wrist = self.study.tune, self.study.wrist
+        times = settings.repetitions if is_random(loop) else 1
+        loops = loops_of(loop, [self.draws.plant(each) for each in range(times)])
+        count, lanes = len(motions), len(gains) * len(motions)
+        which = np.repeat(np.tile(np.arange(count), len(gains)), times)
+        streams = [self.draws.camera(scenario, k) for scenario in scenarios for k in range(times)] * len(gains)
+        chosen: Loop | list[Loop] = loop if all(each is loop for each in loops) else loops * lanes
+        recorded = [name for name in settings.objective.weights() if METRICS[name].of_trajectory is not None]
+        outcome = rollout(
+            self.controller, np.repeat(gains, count * times, axis=0), motions, which, chosen, wrist,
+            streams=streams, record=bool(recorded),
+        )  # fmt: skip
+        metrics = dict(outcome.metrics)
+        if recorded:
+            plants = [plant_of(wrist, each.plant) for each in loops]
+            courses = [
+                trajectory(outcome, lane, motions[which[lane]], plants[lane % times], loop.plant.model)
+                for lane in range(len(which))
+            ]
+            metrics |= {name: np.array([of_trajectory(each)[name] for each in courses]) for name in recorded}
+        value = objective(metrics, outcome.failed, settings.objective, settings.horizon)
+        mean: Array = value.reshape(len(gains), count, times).sum(axis=2) / times
+        return mean
 
 
 def search(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from wristctl.config.tables import PLANTS
 from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Image
@@ -29,7 +30,10 @@ _LEVELS = 2**16
 class Scene:
     """A camera before the wrist, with the two markers on flags in front of the bending plane."""
 
-    def __init__(self, settings: SceneSettings, wrist: WristParameters, markers: Markers | None = None) -> None:
+    def __init__(
+        self, settings: SceneSettings, wrist: WristParameters, markers: Markers | None = None, plant: str = "pcc"
+    ) -> None:
+        self._backbone = PLANTS[plant].backbone
         self._settings, self._wrist, self._markers = settings, wrist, markers or Markers()
         self.camera = Pinhole(settings, self._markers.positive)
         numbers = self._markers.base, self._markers.tip
@@ -45,17 +49,17 @@ class Scene:
         return self.camera.view
 
     def render(self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False) -> Image:
-        """A picture (height, width) of segment angles (k, n) [rad] at k instants of the exposure, which it averages.
+        """A picture (height, width) of the plant's coordinates (k, q) at k instants of the exposure, which it averages.
 
         `covered`: a hand lies over the tip's marker; `swapped`: the two markers have changed places.
         """
         instants = np.atleast_2d(theta)
         total = np.zeros(self._still[0].shape, np.float32)
-        drawings = self._projected([moving(each, self._wrist) for each in instants])
+        drawings = self._projected([moving(self._backbone, each, self._wrist) for each in instants])
         for angles, drawing in zip(instants, drawings, strict=True):
             image = self._still[swapped].copy()
             self._draw(image, drawing)
-            place = last_disc(angles, self._wrist)
+            place = last_disc(self._backbone, angles, self._wrist)
             self._with_marker(image, self._prints[not swapped], *place)
             if covered:
                 self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)]))

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.shape import Planar, backbone, capsule, coil, discs, hand, offset_points
+from wristctl.vision.drawn_parts import capsule, coil, hand
+from wristctl.wrist.shape import Backbone, Planar, discs, offset_points
 
 Array = NDArray[np.float64]
 
@@ -52,16 +53,16 @@ def clamp() -> list[Stroke]:
     ]
 
 
-def moving(theta: Array, wrist: WristParameters) -> list[Stroke]:
-    """The wrist with segment angles (n,) [rad], and its hand."""
-    frames = discs(theta, wrist.length, wrist.discs)
+def moving(backbone: Backbone, q: Array, wrist: WristParameters) -> list[Stroke]:
+    """The wrist at its plant's coordinates (q,), and its hand."""
+    frames = discs(backbone, q, wrist)
     centres, normals = frames
     c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
     parts = [
         Stroke(_flat(centres[-1] + normals[-1] * outline, 0.0), 164, "hull")
         for outline in _hand(max(wrist.hand_offset, 0.02))
     ]
-    line, _ = backbone(theta, wrist.length, np.linspace(0.0, wrist.length, 24))
+    line, _ = backbone(wrist, q, np.linspace(0.0, wrist.length, 24))
     parts += _pairs(frames, c, behind=True)
     parts.append(Stroke(_flat(line, 0.0), 92, "line", 4))
     for centre, normal in zip(*frames, strict=True):
@@ -76,9 +77,9 @@ def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:
     return [Stroke(_flat(tip + along * capsule(*ends, 0.0085), depth), 172, "hull") for ends in _FINGERS]
 
 
-def last_disc(theta: Array, wrist: WristParameters) -> tuple[complex, complex]:
+def last_disc(backbone: Backbone, q: Array, wrist: WristParameters) -> tuple[complex, complex]:
     """Centre [m] of the last disc and its unit normal."""
-    centres, normals = discs(theta, wrist.length, wrist.discs)
+    centres, normals = discs(backbone, q, wrist)
     return complex(centres[-1]), complex(normals[-1])
 
 

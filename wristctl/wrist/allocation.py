@@ -12,9 +12,6 @@ from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where
 from wristctl.wrist.tendons import moment_arms
 
-TENDONS_PER_SIDE = 2
-"""Each of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5)."""
-
 
 @compiled
 def reach(theta: Any, wrist: Any, low: Any, high: Any) -> Any:

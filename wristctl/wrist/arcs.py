@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar
 
+ARC_LIMIT = 2.0 * math.pi
+"""Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
+
+
+class Chords(NamedTuple):
+    """Rows of planar vectors: each segment's chord in base axes, and its first three derivatives by its own angle."""
+
+    z: Any
+    dz: Any
+    d2z: Any
+    d3z: Any
+
 
 @compiled
-def chords(theta: Any, length: Any, z: Any, dz: Any, d2z: Any, d3z: Any) -> Any:
-    """Chord z_k of each segment in base axes and its first three derivatives by theta_k; returns exp(i Phi_n).
+def chords(theta: Any, length: Any, arc: Any) -> Any:
+    """Chord z_k of each segment in base axes and its first three derivatives by theta_k, into Chords; exp(i Phi_n).
 
     z_k = exp(i Phi_{k-1}) c(theta_k) exp(i theta_k / 2) with the chord's length c = l sin(x)/x, x = theta_k / 2 (E2).
     """
@@ -26,10 +39,10 @@ def chords(theta: Any, length: Any, z: Any, dz: Any, d2z: Any, d3z: Any) -> Any:
         c1 = -0.5 * length * x * e1
         c2 = 0.25 * length * (s * e2 - e1)
         c3 = 0.125 * length * x * (3.0 * e2 - s * e3)
-        z[k] = c * direction
-        dz[k] = planar(c1, 0.5 * c) * direction
-        d2z[k] = planar(c2 - 0.25 * c, c1) * direction
-        d3z[k] = planar(c3 - 0.75 * c1, 1.5 * c2 - 0.125 * c) * direction
+        arc.z[k] = c * direction
+        arc.dz[k] = planar(c1, 0.5 * c) * direction
+        arc.d2z[k] = planar(c2 - 0.25 * c, c1) * direction
+        arc.d3z[k] = planar(c3 - 0.75 * c1, 1.5 * c2 - 0.125 * c) * direction
         tangent = direction * half_turn
     return tangent
 

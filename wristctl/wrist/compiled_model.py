@@ -1,6 +1,6 @@
 """The compiled model for arrays: states in, terms of E6 out; shapes (..., n), SI units.
 
-`parameters` is one value per field of Segments, shape (12,) or (..., 12), as `segments` makes it.
+`parameters` is one value per field of Segments, shape (p,) or (..., p), as `segments` makes it.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wristctl.lanes.blocks import spread, to_blocks, to_rows
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist import tendons
-from wristctl.wrist.arcs import chords, tip
+from wristctl.wrist.arcs import Chords, chords, tip
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
-from wristctl.wrist.segments import load_segments
+from wristctl.wrist.segments import Segments, load_segments
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Terms(NamedTuple):
     """+ and - side, minus the derivative of the length, (..., n, 2) [m]."""
 
 
-@compiled
+@kernel
 def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
     for block in range(states.shape[0]):
         segment = load_segments(rows_of(parameters[block]))
@@ -72,7 +72,7 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     theta, omega = np.broadcast_arrays(np.asarray(theta, float), np.asarray(omega, float))
     *batch, n = theta.shape
     states = np.concatenate([theta, omega], axis=-1).reshape(-1, 2 * n)
-    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, 12)), len(states))
+    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
     out = np.empty((len(blocks), 3 + 5 * n + n * n, *blocks.shape[2:]))
     _terms(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
@@ -81,7 +81,7 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     return Terms(rows[..., :3], mass, rows[..., 3 : 3 + n], tendon[..., 0, :], tendon[..., 1, :])
 
 
-@compiled
+@kernel
 def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
     for block in range(states.shape[0]):
         segment = load_segments(rows_of(parameters[block]))
@@ -89,14 +89,14 @@ def _linearised(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         n = len(segments)
         theta, omega = part(state, 0, segments), part(state, n, segments)
         acceleration, pulls = part(state, 2 * n, segments), beyond(state, 3 * n)
-        z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+        arc = Chords(planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta))
         mass, by_theta, by_rate = square_like(theta), square_like(theta), square_like(theta)
         r, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta)
-        tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+        tangent = chords(theta, segment.length, arc)
         tendons.tendon_torques(theta, segment, pulls[0], pulls[1], pull, slope)
-        mass_matrix(segment, z, dz, tangent, mass)
-        bias(segment, theta, omega, z, dz, d2z, tangent, pull, r)
-        residual_jacobians(segment, omega, acceleration, z, dz, d2z, d3z, tangent, slope, by_theta, by_rate)
+        mass_matrix(segment, arc, tangent, mass)
+        bias(segment, theta, omega, arc, tangent, pull, r)
+        residual_jacobians(segment, omega, acceleration, arc, tangent, slope, by_theta, by_rate)
         for i in range(n):
             result[i] = r[i]
             for j in range(n):
@@ -116,7 +116,7 @@ def linearised(
     *batch, n = theta.shape
     pulls = np.broadcast_to(pulls, (*batch, 2))
     states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
-    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, 12)), len(states))
+    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
     out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
     _linearised(each, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
@@ -124,7 +124,7 @@ def linearised(
     return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)
 
 
-@compiled
+@kernel
 def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segments: Any) -> None:
     segment, pull = load_segments(rows_of(parameters)), rows_of(pulls)
     n = len(segments)

@@ -16,13 +16,14 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, turn
 from wristctl.lanes.rows import lanes_like, planes_like
-from wristctl.wrist.arcs import chords
+from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.tendons import tendon_torques
 
 
 @compiled
-def mass_matrix(segment: Any, z: Any, dz: Any, tangent: Any, mass: Any) -> None:
+def mass_matrix(segment: Any, arc: Any, tangent: Any, mass: Any) -> None:
     """M = sum m J^T J (E7) into `mass`, from the chords and the last tangent."""
+    z, dz = arc.z, arc.dz
     end = planes_like(z)
     end[0] = z[0]
     for k in range(1, len(z)):
@@ -48,11 +49,12 @@ def mass_matrix(segment: Any, z: Any, dz: Any, tangent: Any, mass: Any) -> None:
 
 
 @compiled
-def bias(segment: Any, theta: Any, omega: Any, z: Any, dz: Any, d2z: Any, tangent: Any, pull: Any, r: Any) -> None:
+def bias(segment: Any, theta: Any, omega: Any, arc: Any, tangent: Any, pull: Any, r: Any) -> None:
     """r at theta'' = 0, so that M theta'' + bias = r, by Newton and Euler: forces outward to tip, torques back.
 
     `pull` holds the tendons' torque on each segment.
     """
+    z, dz, d2z = arc.z, arc.dz, arc.d2z
     force = planes_like(z)
     weight = planar(segment.gravity_x, segment.gravity_y)
     spin = 0.0 * segment.length
@@ -79,9 +81,9 @@ def bias(segment: Any, theta: Any, omega: Any, z: Any, dz: Any, d2z: Any, tangen
 @compiled
 def equation_of_motion(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, mass: Any, r: Any) -> None:
     """M and the remaining terms of E6, so that M theta'' + r = 0."""
-    z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+    arc = Chords(planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta))
     pull, slope = lanes_like(theta), lanes_like(theta)
-    tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    tangent = chords(theta, segment.length, arc)
     tendon_torques(theta, segment, plus, minus, pull, slope)
-    mass_matrix(segment, z, dz, tangent, mass)
-    bias(segment, theta, omega, z, dz, d2z, tangent, pull, r)
+    mass_matrix(segment, arc, tangent, mass)
+    bias(segment, theta, omega, arc, tangent, pull, r)

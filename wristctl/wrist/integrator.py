@@ -14,7 +14,7 @@ from typing import Any
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
-from wristctl.wrist.arcs import chords
+from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
@@ -40,24 +40,24 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     n = len(theta)
     hg = 0.5 * h
     per_h, per_hg = 1.0 / h, 2.0 / h
-    z, dz, d2z, d3z = planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta)
+    arc = Chords(planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta))
     mass, other_mass, lu, by_theta = square_like(theta), square_like(theta), square_like(theta), square_like(theta)
     a0, a, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k1, l1, k2, l2 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k3, l3, k4, l4 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
 
-    tangent = chords(theta, segment.length, z, dz, d2z, d3z)
+    tangent = chords(theta, segment.length, arc)
     tendon_torques(theta, segment, plus, minus, pull, slope)
-    mass_matrix(segment, z, dz, tangent, mass)
-    bias(segment, theta, omega, z, dz, d2z, tangent, pull, a0)
+    mass_matrix(segment, arc, tangent, mass)
+    bias(segment, theta, omega, arc, tangent, pull, a0)
     for i in range(n):
         a0[i] = -a0[i]
         for j in range(n):
             other_mass[i, j] = mass[i, j]
     factorise(other_mass)
     solve(other_mass, a0)
-    residual_jacobians(segment, omega, a0, z, dz, d2z, d3z, tangent, slope, by_theta, lu)
+    residual_jacobians(segment, omega, a0, arc, tangent, slope, by_theta, lu)
     for i in range(n):
         for j in range(n):
             lu[i, j] = per_hg * mass[i, j] + lu[i, j] + hg * by_theta[i, j]

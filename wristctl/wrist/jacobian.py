@@ -16,22 +16,13 @@ from wristctl.lanes.rows import planes_like
 
 @compiled
 def residual_jacobians(
-    segment: Any,
-    omega: Any,
-    acceleration: Any,
-    z: Any,
-    dz: Any,
-    d2z: Any,
-    d3z: Any,
-    tangent: Any,
-    slope: Any,
-    by_theta: Any,
-    by_rate: Any,
+    segment: Any, omega: Any, acceleration: Any, arc: Any, tangent: Any, slope: Any, by_theta: Any, by_rate: Any
 ) -> None:
     """dr/d(theta) and dr/d(rate) at the given accelerations, into two n x n matrices [i, j].
 
     `slope` holds the derivative of the tendons' torque on each segment by its angle.
     """
+    z, dz, d2z, d3z = arc.z, arc.dz, arc.d2z, arc.d3z
     n = len(z)
     pivot, end, middle = planes_like(z), planes_like(z), planes_like(z)
     velocity, force = planes_like(z), planes_like(z)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.parts import tuple_of
 
 
 class Segments(NamedTuple):
-    """Parameters of a wrist of n equal segments, in this order in memory; SI units."""
+    """Parameters of a wrist of n equal segments; SI units. This is their one order, in memory and everywhere."""
 
     length: Any
     mass: Any
@@ -28,12 +28,8 @@ class Segments(NamedTuple):
     force_y: Any
 
 
-@compiled
-def load_segments(rows: Any) -> Any:
-    """Segments of lanes from rows of lanes."""
-    return Segments(
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10], rows[11]
-    )
+load_segments = tuple_of(Segments)
+"""Segments of lanes from rows of lanes, in compiled code."""
 
 
 def segments(wrist: WristParameters, n: int, force: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float64]:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.config.wrist import WristParameters
 from wristctl.wrist.kinematics import arc_tip
 
 Array = NDArray[np.float64]
 Planar = NDArray[np.complex128]
+Backbone = Callable[[WristParameters, Array, Array], tuple[Planar, Planar]]
+"""A plant's points and unit tangents, (m,) each, at its coordinates (q,) and the arc lengths (m,) [m]."""
 
-_FINGERTIPS = ((1.7, -0.35), (1.82, -0.12), (1.75, 0.12), (1.5, 0.35))
 
-
-def backbone(segment_theta: Array, length: float, at: Array) -> tuple[Planar, Planar]:
-    """Points and unit tangents of a chain of arcs of total `length` [m] at the arc lengths `at` (m,) [m]; each (m,)."""
-    each = length / len(segment_theta)
+def arcs_backbone(wrist: WristParameters, segment_theta: Array, at: Array) -> tuple[Planar, Planar]:
+    """Points and unit tangents of a chain of equal arcs at the arc lengths `at` (m,) [m]; each (m,)."""
+    each = wrist.length / len(segment_theta)
     along = np.clip(at[:, None] - each * np.arange(len(segment_theta)), 0.0, each)
     bent = segment_theta * along / each
     before = np.cumsum(segment_theta) - segment_theta
@@ -26,40 +27,12 @@ def backbone(segment_theta: Array, length: float, at: Array) -> tuple[Planar, Pl
     return points, np.exp(1j * bent.sum(axis=1))
 
 
-def discs(segment_theta: Array, length: float, count: int) -> tuple[Planar, Planar]:
-    """Centres and unit normals (along the backbone) of `count` discs, the first at the base, the last at the tip."""
-    return backbone(segment_theta, length, np.linspace(0.0, length, count))
+def discs(line: Backbone, q: Array, wrist: WristParameters) -> tuple[Planar, Planar]:
+    """Centres and unit normals (along the backbone) of a wrist's discs, the first at the base, the last at the tip."""
+    return line(wrist, q, np.linspace(0.0, wrist.length, wrist.discs))
 
 
 def offset_points(frames: tuple[Planar, Planar], offset: float) -> Planar:
     """Points of the discs at `offset` [m] from the backbone, toward +y on the straight wrist."""
     centres, normals = frames
     return centres + 1j * offset * normals
-
-
-def coil(start: Any, end: Any, radius: float, turns: int = 4) -> Planar:
-    """A spring from start to end (complex), seen from the side; of several, (k, 1), one in each row."""
-    share = np.linspace(0.0, 1.0, 16 * turns + 1)
-    across = 1j * (end - start) / abs(end - start)
-    points: Planar = start + share * (end - start) + radius * np.sin(2.0 * np.pi * turns * share) * across
-    return points
-
-
-def capsule(start: complex, end: complex, radius: float) -> Planar:
-    """Outline of everything within `radius` of the line from start to end."""
-    half = radius * np.exp(1j * np.linspace(-0.5 * np.pi, 0.5 * np.pi, 16))
-    along = (end - start) / abs(end - start)
-    return np.concatenate([end + along * half, start - along * half])
-
-
-def hand(size: float, edge_on: bool) -> list[Planar]:
-    """Outlines of a hand's parts beyond a disc at 0 facing +x; it is about twice `size` [m] long.
-
-    Seen on the palm with the little finger toward +y, or `edge_on` with the palm toward +y.
-    """
-    if edge_on:
-        parts = [((0.15, 0.0), (0.95, 0.0), 0.15), ((1.0, 0.0), (1.85, 0.12), 0.1), ((0.45, 0.12), (0.95, 0.38), 0.09)]
-    else:
-        fingers = [((0.9, 0.85 * end), (tip, end), 0.09) for tip, end in _FINGERTIPS]
-        parts = [((0.36, 0.0), (0.72, 0.0), 0.36), *fingers, ((0.45, -0.28), (0.95, -0.68), 0.1)]
-    return [size * capsule(complex(*start), complex(*end), radius) for start, end, radius in parts]

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.allocation import TENDONS_PER_SIDE
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 Array = NDArray[np.float64]
 

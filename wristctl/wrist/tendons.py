@@ -11,6 +11,9 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 
+TENDONS_PER_SIDE = 2
+"""Each of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5)."""
+
 
 @compiled
 def moment_arms(theta: Any, segment: Any) -> Any:

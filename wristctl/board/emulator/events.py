@@ -7,13 +7,13 @@ from wristctl.board.emulator.registers import IO_FIRST, IO_LAST, SPH, SPL
 from wristctl.board.emulator.timers import BASE, LIMIT, ORIGIN, PRESCALE, TEMP, TIMERS, TOP, timer_events
 from wristctl.board.emulator.usart import UCSRA, UDRE, byte_arrived, byte_sent
 from wristctl.board.emulator.watchdog import MCUSR, WDE, WDRF, WDTCSR, restart_watchdog, watchdog_expired
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 
 POWER_ON, EXTERNAL = 0x01, 0x02
 """Causes of a reset as MCUSR shows them, beside WDRF."""
 
 
-@compiled
+@kernel
 def reset(chip: Chip, cause: int) -> None:
     """Reset: I/O registers and the program counter; registers and RAM keep what they hold."""
     memory = chip.memory

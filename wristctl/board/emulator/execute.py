@@ -35,14 +35,14 @@ from wristctl.board.emulator.registers import (
 )
 from wristctl.board.emulator.usart import start_line
 from wristctl.board.emulator.watchdog import restart_watchdog
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 
 _X, _Y, _Z = 26, 28, 30
 _INTERRUPT_CYCLES, _WAKING_CYCLES = 5, 5
 _SLEEP_ENABLE, _SLEEP_MODE = 0x01, 0x0E
 
 
-@compiled
+@kernel
 def run(chip: Chip, until: int) -> int:
     """Execute until cycle `until`, or until something stops it: RUNNING, or what else `chip.halt` says."""
     memory, program = chip.memory, chip.program

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wristctl.board.emulator.chip import BUFFER_FULL, Chip
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 
 LETTERS = "ABCDEFGHJKL"
 PIN = tuple(0x20 + 3 * p if p < 7 else 0x100 + 3 * (p - 7) for p in range(11))
@@ -14,7 +14,7 @@ PIN = tuple(0x20 + 3 * p if p < 7 else 0x100 + 3 * (p - 7) for p in range(11))
 _PIN, _LETTER = np.array(PIN), np.array([ord(letter) for letter in LETTERS])
 
 
-@compiled
+@kernel
 def levels(chip: Chip, port: int) -> int:
     """What reading PINx gives: outputs their latch, inputs what drives them, else their pull-up."""
     pin = _PIN[port]

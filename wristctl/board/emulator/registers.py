@@ -9,7 +9,7 @@ from wristctl.board.emulator.ports import PIN, levels, write_port
 from wristctl.board.emulator.timers import TIFR, TIMERS, read_timer, write_timer
 from wristctl.board.emulator.usart import UCSRA, UCSRB, UDR, read_byte, write_byte, write_control
 from wristctl.board.emulator.watchdog import WDTCSR, write_watchdog
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kernel
 
 SPL, SPH, SREG = 0x5D, 0x5E, 0x5F
 RAMPZ, EIND, SMCR, SPMCSR = 0x5B, 0x5C, 0x53, 0x57
@@ -36,7 +36,7 @@ def _device_table() -> list[tuple[int, int]]:
 _DEVICE = np.array(_device_table())
 
 
-@compiled
+@kernel
 def read(chip: Chip, address: int) -> int:
     """What a load from this address gives."""
     if IO_FIRST <= address <= IO_LAST:
@@ -50,7 +50,7 @@ def read(chip: Chip, address: int) -> int:
     return chip.memory[address]
 
 
-@compiled
+@kernel
 def write(chip: Chip, address: int, value: int) -> None:
     """What a store to this address does."""
     memory = chip.memory

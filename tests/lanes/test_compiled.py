@@ -1,0 +1,105 @@
+"""Where compiled code is kept: by what it is made of, and without a word to the rest of the process."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import TypeGuard
+
+import numba
+import pytest
+
+import wristctl
+from wristctl.lanes import compiled as module
+from wristctl.lanes.compiled import TRIED, cache_folder, caching, sources
+
+PACKAGE = Path(wristctl.__file__).parent
+CONFIG = ("wristctl.config", "wristctl.records")
+EVERYTHING = "wristctl.simulation.rollout, wristctl.bench.virtual_bench, wristctl.trial.steering, wristctl.learning"
+
+
+def test_importing_all_compiled_code_leaves_numbas_settings_alone() -> None:
+    code = (
+        f"import numba; before = numba.config.CACHE_DIR; import {EVERYTHING}; print(before == numba.config.CACHE_DIR)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
+def test_a_function_rests_on_what_it_imports_and_on_nothing_else() -> None:
+    names = {file.relative_to(PACKAGE).as_posix() for file in sources(PACKAGE / "simulation" / "kernel.py")}
+    assert {"simulation/kernel.py", "wrist/integrator.py", "wrist/jacobian.py", "lanes/lane.py"} <= names
+    assert not any(name.startswith(("config/", "records/", "vision/", "board/", "cli/")) for name in names)
+
+
+def test_another_line_in_an_imported_file_is_another_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_kernels", lambda: tmp_path / "kernels")
+    law, helper = tmp_path / "law.py", tmp_path / "helper.py"
+    law.write_text("from helper import gain\n")
+    helper.write_text("gain = 1.0\n")
+    assert sources(law) == [helper, law]
+    before = cache_folder(law)
+    for forget in (cache_folder, module._read):
+        forget.cache_clear()  # what another process does not know
+    helper.write_text("gain = 2.0\n")
+    after = cache_folder(law)
+    assert before is not None and after is not None and before != after
+    cache_folder.cache_clear()
+
+
+def test_where_nothing_can_be_written_nothing_is_kept_and_the_setting_comes_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(module, "_kernels", lambda: tmp_path / "file")
+    source = tmp_path / "source.py"
+    source.write_text("x = 1\n")
+    with caching(source) as cached:
+        assert not cached
+
+
+def test_the_setting_comes_back_whatever_happens_meanwhile() -> None:
+    before = numba.config.CACHE_DIR
+    with pytest.raises(ZeroDivisionError), caching(PACKAGE / "lanes" / "lane.py") as cached:
+        assert cached and before != numba.config.CACHE_DIR
+        raise ZeroDivisionError
+    assert before == numba.config.CACHE_DIR
+
+
+def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_arguments() -> None:
+    """A comment in the configuration compiles nothing anew, so no number there may decide what is compiled."""
+    seen = 0
+    for file in PACKAGE.rglob("*.py"):
+        tree = ast.parse(file.read_text())
+        imports = [n for n in tree.body if isinstance(n, ast.ImportFrom) and (n.module or "").startswith(CONFIG)]
+        foreign = {alias.asname or alias.name for each in imports for alias in each.names}
+        kernels = {a.id for n in ast.walk(tree) if isinstance(n, ast.Call) for a in n.args[:1] if _is_kernel(n, a)}
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef) and (node.name in kernels or _decorated(node)):
+                seen += 1
+                used = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+                assert not used & foreign, f"{file}: {node.name} uses {used & foreign}"
+                given = [*node.args.posonlyargs, *node.args.args]
+                assert len(given) <= 8, f"{file}: {node.name} takes {len(given)}"
+    assert seen > 100
+
+
+def _decorated(node: ast.FunctionDef) -> bool:
+    return any(isinstance(each, ast.Name) and each.id in ("compiled", "kernel") for each in node.decorator_list)
+
+
+def _is_kernel(call: ast.Call, argument: ast.expr) -> TypeGuard[ast.Name]:
+    """Compiled for each plant: `kernel_of(function, model)`."""
+    return isinstance(call.func, ast.Name) and call.func.id == "kernel_of" and isinstance(argument, ast.Name)
+
+
+def test_a_numba_that_nobody_has_tried_is_named() -> None:
+    code = "import numba; numba.__version__ = '9.1.0'; import wristctl.lanes.compiled"
+    done = subprocess.run([sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=True)
+    assert f"numba 9.1.0: wristctl was tried with {TRIED} only" in done.stderr
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        subprocess.run([sys.executable, "-W", "error::UserWarning", "-c", "import wristctl.lanes.compiled"], check=True)

@@ -1,0 +1,115 @@
+"""Rows and NamedTuples in compiled code, for a rollout alone and for a block: what is read, written and cut off."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.parts import block_of, replacing, tuple_of
+from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_named, rows_of, square_like
+from wristctl.lanes.types import LANES
+
+WIDE = pytest.mark.parametrize("wide", [(), (LANES,)], ids=["alone", "a block"])
+
+
+class Motor(NamedTuple):
+    speed: Any
+    torque: Any
+
+
+class Parts(NamedTuple):
+    """Arrays by block, an array of one block, a number, nothing, and a NamedTuple of its own."""
+
+    state: Any
+    shared: Any
+    period: float
+    camera: Any
+    motor: Any
+
+
+_read, _faster = tuple_of(Motor), replacing("torque")
+_motor_of = rows_named(Motor._fields)
+
+
+@compiled
+def _rows(given: Any, out: Any, segments: Any) -> None:
+    row, result = rows_of(given), rows_of(out)
+    first, rest = part(row, 1, segments), beyond(row, 3)
+    result[0] = row[0]
+    result[1] = first[0] + first[1]
+    result[2] = rest[0]
+    result[3] = float(len(first)) + 0.0 * row[0]
+    matrix, scratch, vectors = square_like(first), lanes_like(first), planes_like(first)
+    for i in range(len(first)):
+        scratch[i] = 10.0 * first[i]
+        for j in range(len(first)):
+            matrix[i, j] = first[i] - 2.0 * first[j]
+    result[4] = matrix[0, 1]
+    result[5] = matrix[1, 0]
+    result[6] = scratch[1]
+    result[7] = float(len(matrix) + len(vectors)) + 0.0 * row[0]
+
+
+@compiled
+def _tuples(given: Any, out: Any) -> None:
+    motor, result = _read(rows_of(given)), rows_of(out)
+    changed = _faster(motor, (3.0 * motor.torque,))
+    result[0] = changed.speed
+    result[1] = changed.torque
+    result[2] = _motor_of(given).torque
+
+
+@compiled
+def _add(parts: Any, block: int) -> None:
+    own = block_of(parts, block)
+    rows_of(own.state)[0] = rows_of(own.state)[0] + own.period * rows_of(own.shared)[0]
+    rows_of(own.motor.speed)[0] = rows_of(own.state)[0]
+
+
+def numbers(rows: int, wide: tuple[int, ...]) -> Any:
+    return np.random.default_rng(0).normal(size=(rows, *wide))
+
+
+@WIDE
+def test_rows_are_cut_indexed_and_backed_by_scratch_of_their_own(wide: tuple[int, ...]) -> None:
+    given, out = numbers(5, wide), np.empty((8, *wide))
+    _rows(given, out, (0, 0))
+    a, b = given[1], given[2]
+    wanted = [given[0], a + b, given[3], 2.0 + 0.0 * a, a - 2.0 * b, b - 2.0 * a, 10.0 * b, 4.0 + 0.0 * a]
+    np.testing.assert_allclose(out, wanted, rtol=1e-15)
+
+
+@WIDE
+def test_tuples_are_read_by_their_own_order_and_changed_by_name(wide: tuple[int, ...]) -> None:
+    given, out = numbers(2, wide), np.empty((3, *wide))
+    _tuples(given, out)
+    np.testing.assert_array_equal(out, [given[0], 3.0 * given[1], given[1]])
+
+
+@WIDE
+def test_a_block_takes_its_own_part_and_one_block_is_every_blocks(wide: tuple[int, ...]) -> None:
+    motor = Motor(np.zeros((3, 1, *wide)), 7)
+    parts = Parts(np.ones((3, 1, *wide)), np.full((1, 1, *wide), 4.0), 0.5, None, motor)
+    for block in (0, 2):
+        _add(parts, block)
+    assert [float(each.flat[0]) for each in parts.state] == [3.0, 1.0, 3.0]
+    assert [float(each.flat[0]) for each in motor.speed] == [3.0, 0.0, 3.0]
+
+
+def test_rows_are_views_of_contiguous_doubles_and_of_nothing_else() -> None:
+    for wrong in (np.zeros((4, 2 * LANES))[:, ::2], np.zeros((2, LANES), np.float32), np.zeros((2, 2, LANES))):
+        with pytest.raises(TypingError):
+            _tuples(wrong, np.zeros((3, LANES)))
+
+
+def test_an_unknown_name_of_a_row_is_refused_when_it_is_compiled() -> None:
+    def reads(given: Any) -> Any:
+        return _motor_of(given).weight
+
+    with pytest.raises(TypingError, match="weight"):
+        numba.njit(reads)(np.zeros((2, LANES)))

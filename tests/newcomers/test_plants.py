@@ -1,0 +1,131 @@
+"""What every plant behind the contract must be: its functions agree with each other, and with rest and energy.
+
+The plants of the table, and one from elsewhere.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Disturbances, Plant
+from wristctl.config.tables import PLANTS
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.wrist.plant import PlantModel, poses
+
+HERE = Path(__file__).parent
+WRIST = WristParameters()
+
+
+@pytest.fixture(autouse=True, params=["pcc", "hinge"])
+def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
+    """Each plant, known under its name for one test."""
+    monkeypatch.syspath_prepend(str(HERE))
+    if request.param == "hinge":
+        from elsewhere.hinge import HINGE
+
+        monkeypatch.setitem(PLANTS, "hinge", HINGE)
+    found: PlantModel = PLANTS[request.param]
+    return found
+
+
+def run(model: PlantModel, loop: dict[str, Any] | None = None, angle: float = 20.0, horizon: float = 4.0) -> Outcome:
+    """Feedforward to an angle."""
+    law = controller("feedforward")
+    settings = Loop.model_validate({"plant": Plant(model=model.name), "plant_segments": 2, **(loop or {})})
+    followed = motion(Reference(angle_deg=angle), WRIST, horizon, 1e-3)
+    one = np.zeros(1, np.int64)
+    return rollout(law, np.zeros((1, 0)), [followed], one, settings, WRIST, record=True, threads=1)
+
+
+def some(model: PlantModel, count: int = 9) -> np.ndarray:
+    """Coordinates (count, q), the straight wrist among them."""
+    drawn = np.random.default_rng(0).uniform(-0.6, 0.6, (count, model.coordinates(2)))
+    drawn[0] = 0.0
+    return drawn
+
+
+def test_the_jacobian_is_the_derivative_of_the_tip(model: PlantModel) -> None:
+    q, small = some(model), 1e-6
+    found = poses(model, WRIST, 2, q).jacobian
+    for k in range(q.shape[1]):
+        nudge = small * np.eye(q.shape[1])[k]
+        ahead, behind = (poses(model, WRIST, 2, q + side * nudge) for side in (1.0, -1.0))
+        np.testing.assert_allclose(found[:, :2, k], (ahead.tip - behind.tip) / (2.0 * small), atol=1e-9)
+        np.testing.assert_allclose(found[:, 2, k], (ahead.angle - behind.angle) / (2.0 * small), atol=1e-9)
+
+
+def test_compiled_and_plain_functions_say_the_same_of_tip_and_backbone(model: PlantModel) -> None:
+    q = some(model)
+    found = poses(model, WRIST, 2, q)
+    np.testing.assert_allclose(found.tip, model.tips(WRIST, q), atol=1e-14)
+    np.testing.assert_allclose(found.angle, model.angle(q), atol=1e-14)
+    for own, tip, angle in zip(q, found.tip, found.angle, strict=True):
+        line, along = model.backbone(WRIST, own, np.array([0.0, WRIST.length]))
+        np.testing.assert_allclose(line, [0.0, tip[0] + 1j * tip[1]], atol=1e-14)
+        assert along[-1] == pytest.approx(np.exp(1j * angle), abs=1e-14)
+
+
+def test_tendons_shorten_on_the_side_to_which_the_wrist_bends_and_are_the_wrists_length_when_straight(
+    model: PlantModel,
+) -> None:
+    straight = np.zeros(model.coordinates(2))
+    np.testing.assert_allclose(model.taut(WRIST, straight), WRIST.length, rtol=1e-14)
+    plus, minus = model.taut(WRIST, straight + 0.2)
+    assert plus < WRIST.length < minus
+
+
+def test_a_wrist_is_the_mirror_image_of_itself(model: PlantModel) -> None:
+    right, left = run(model, angle=20.0), run(model, angle=-20.0)
+    np.testing.assert_allclose(left.column("theta", 0), -right.column("theta", 0), atol=1e-12)
+    np.testing.assert_allclose(left.column("tension_plus", 0), right.column("tension_minus", 0), atol=1e-9)
+
+
+def test_a_load_bends_the_wrist_toward_it_and_a_stiffer_one_less(model: PlantModel) -> None:
+    free, loaded = (run(model, {"disturbances": Disturbances(load=force)}) for force in (0.0, 0.2))
+    stiff = run(model, {"disturbances": Disturbances(load=0.2), "plant": Plant(model=model.name, stiffness_scale=4.0)})
+    stiff_free = run(model, {"plant": Plant(model=model.name, stiffness_scale=4.0)})
+    bend = float((loaded.column("theta", 0) - free.column("theta", 0))[-1])
+    assert bend > 0.01 and float((stiff.column("theta", 0) - stiff_free.column("theta", 0))[-1]) < 0.5 * bend
+
+
+def test_elastic_tendons_begin_at_pretension_and_a_held_wrist_stays(model: PlantModel) -> None:
+    done = run(model, {"actuator": Actuator(level="tendon")}, angle=0.0, horizon=0.5)
+    assert np.abs(done.column("theta", 0)).max() < 1e-6
+    step = 20e3 * Actuator().step_length
+    for side in ("plus", "minus"):
+        np.testing.assert_allclose(done.column(f"acting_{side}", 0), WRIST.pretension, atol=step)
+
+
+def test_the_tips_speed_is_the_jacobian_times_the_coordinates_rate(model: PlantModel) -> None:
+    done = run(model)
+    q = done.coordinates(0)[::20]
+    found = poses(model, WRIST, 2, q)
+    rate = np.gradient(done.coordinates(0), 1e-3, axis=0)[::20]
+    speed = np.einsum("tik,tk->ti", found.jacobian, rate)
+    expected = np.gradient(model.tips(WRIST, done.coordinates(0)), 1e-3, axis=0)[::20]
+    np.testing.assert_allclose(speed[1:-1, :2], expected[1:-1], atol=1e-6)
+    np.testing.assert_allclose(speed[1:-1, 2], done.column("rate", 0)[::20][1:-1], atol=1e-3)
+
+
+def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it_was(model: PlantModel) -> None:
+    """The paper's printed PID, a thousand times too strong for a period of 1 ms and tendons without a limit."""
+    law, followed = controller("pid"), motion(Reference(), WRIST, 1.0, 1e-3)
+    loop = Loop(plant=Plant(model=model.name), plant_segments=2, limits=False)
+    gains = np.array([gains_of(law, "printed")])
+    done = rollout(law, gains, [followed], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
+    assert done.failed[0] and np.isnan(done.metrics["rmse"][0])
+    theta = done.coordinates(0)
+    assert np.isfinite(theta).all() and (theta[-1] == theta[-100]).all()
+
+
+def test_every_plant_is_registered_under_its_own_name(model: PlantModel) -> None:
+    assert PLANTS[model.name] is model and Path(sys.modules[model.parameters.__module__].__file__ or "") == model.source

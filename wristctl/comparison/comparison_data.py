@@ -1,0 +1,101 @@
+"""A comparison as data: courses over time, and every metric beside the paper's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.paper import T2, verdict
+from wristctl.comparison.statistics import spread
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[np.float64]]:
+    """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
+
+    segment_theta (results, T, segments) is for drawing, hence in single precision; nan beyond a plant's segments.
+    """
+    courses = [result.simulation.trajectory for result in results]
+    columns = {
+        "theta": [c.theta for c in courses],
+        "tip_x": [c.tip[:, 0] for c in courses],
+        "tip_y": [c.tip[:, 1] for c in courses],
+        "theta_ref": [c.theta_ref for c in courses],
+        "theta_desired": [c.theta_desired for c in courses],
+        "tension_plus": [c.tension[:, 0] for c in courses],
+        "tension_minus": [c.tension[:, 1] for c in courses],
+        "time": [c.time for c in courses],
+    }
+    most = max(c.segment_theta.shape[1] for c in courses)
+    columns["segment_theta"] = [
+        np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
+    ]
+    stacked = {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
+    return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
+
+
+def metrics_of(result: ComparedRow) -> dict[str, float]:
+    """The metrics of a row: medians where it was repeated."""
+    repeated = result.repeated
+    if len(repeated.failed) == 1:
+        return result.simulation.metrics
+    return {name: spread(values).median for name, values in repeated.metrics.items()}
+
+
+def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
+    """Every metric of every result beside the paper's T2, one row each.
+
+    Where rows were repeated a metric is the median, `<metric>_low` and `<metric>_high` are the ends of its 95 %
+    interval, `repetitions` says how many there were and `failed` whether any of them failed.
+    """
+    import pandas as pd
+
+    repeated = any(len(result.repeated.failed) > 1 for result in results)
+    rows = []
+    for result in results:
+        metrics, printed = metrics_of(result), T2.get(result.controller)
+        row: dict[str, Any] = _names(result) | {"failed": bool(result.repeated.failed.any())} | metrics
+        if repeated:
+            spreads = {name: spread(values) for name, values in result.repeated.metrics.items()}
+            row |= {f"{name}_low": each.low for name, each in spreads.items()}
+            row |= {f"{name}_high": each.high for name, each in spreads.items()}
+            row["repetitions"] = len(result.repeated.failed)
+        row |= {
+            "paper_rmse": printed.rmse if printed else np.nan,
+            "paper_settling": printed.settling if printed else np.nan,
+            "paper_steady_state": printed.steady_state if printed else np.nan,
+            "verdict": verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"]),
+        }
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def repetitions_frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
+    """Every repetition of every result, one row each."""
+    import pandas as pd
+
+    return pd.DataFrame(
+        [
+            _names(result)
+            | {"repetition": k, "failed": bool(result.repeated.failed[k])}
+            | {name: values[k] for name, values in result.repeated.metrics.items()}
+            for result in results
+            for k in range(len(result.repeated.failed))
+        ]
+    )
+
+
+def _names(result: ComparedRow) -> dict[str, Any]:
+    return {
+        "loop": result.loop,
+        "reference": result.reference,
+        "controller": result.controller,
+        "gains": result.gains,
+        "inverse": result.inverse,
+    }

@@ -1,0 +1,131 @@
+"""Tables of what a study may name: controllers, references, disturbances, metrics, optimisers, plants.
+
+Each is a mapping from the name in a study to what it names, which is imported when it is first asked for: here stand
+names and places only. A newcomer in this package is one file and one line here; one from elsewhere puts itself into a
+table, `CONTROLLERS["lqr"] = LQR`. The configuration's choices, errors, completion and the page of choices
+(docs/choices.md) come from these tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, MutableMapping
+from importlib import import_module
+from typing import Any, Generic, TypeVar
+
+from wristctl.config.errors import UserError, meant
+
+T = TypeVar("T")
+
+
+class Table(MutableMapping[str, T], Generic[T]):
+    """Entries by name; those given as "module:attribute" are imported when asked for. Names are cheap to list."""
+
+    def __init__(self, what: str, entries: Mapping[str, str]) -> None:
+        self.what = what
+        """What an entry is, in a word."""
+        self._entries: dict[str, Any] = dict(entries)
+
+    def __getitem__(self, name: str) -> T:
+        entry = self._entries[name]
+        if isinstance(entry, str):
+            module, _, attribute = entry.partition(":")
+            entry = self._entries[name] = getattr(import_module(module), attribute)
+        found: T = entry
+        return found
+
+    def __setitem__(self, name: str, entry: T) -> None:
+        self._entries[name] = entry
+
+    def __delitem__(self, name: str) -> None:
+        del self._entries[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def named(self, name: str) -> T:
+        """The entry of this name; UserError with the nearest name if there is none."""
+        if name not in self:
+            raise UserError(f"unknown {self.what} '{name}'", self.what, meant(name, self))
+        return self[name]
+
+
+CONTROLLERS: Table[Any] = Table(
+    "controller",
+    {
+        "smc": "wristctl.control.smc:SMC",
+        "pid": "wristctl.control.pid:PID",
+        "mrac": "wristctl.control.mrac:MRAC",
+        "gvsc": "wristctl.control.gvsc:GVSC",
+        "nc": "wristctl.control.nc:NC",
+        "smc-tracking": "wristctl.control.smc_tracking:SMC_TRACKING",
+        "super-twisting": "wristctl.control.super_twisting:SUPER_TWISTING",
+        "computed-torque": "wristctl.control.computed_torque:COMPUTED_TORQUE",
+        "feedforward": "wristctl.control.feedforward:FEEDFORWARD",
+    },
+)
+"""Of `wristctl.control.law.Controller`."""
+
+REFERENCES: Table[Any] = Table(
+    "reference",
+    {
+        "step": "wristctl.simulation.references:STEP",
+        "minimum-jerk": "wristctl.simulation.references:MINIMUM_JERK",
+        "sine": "wristctl.simulation.references:SINE",
+        "multi-step": "wristctl.simulation.references:MULTI_STEP",
+        "tip-path": "wristctl.simulation.references:TIP_PATH",
+    },
+)
+"""Of `wristctl.simulation.reference.ReferenceKind`."""
+
+DISTURBANCES: Table[Any] = Table(
+    "disturbance",
+    {
+        "push": "wristctl.simulation.disturbances:PUSH",
+        "load": "wristctl.simulation.disturbances:LOAD",
+        "drift": "wristctl.simulation.disturbances:DRIFT",
+    },
+)
+"""Of `wristctl.simulation.disturbances.Disturbance`."""
+
+METRICS: Table[Any] = Table(
+    "metric",
+    {
+        "rmse": "wristctl.simulation.metrics:RMSE",
+        "rmse_move": "wristctl.simulation.metrics:RMSE_MOVE",
+        "rmse_settled": "wristctl.simulation.metrics:RMSE_SETTLED",
+        "settling": "wristctl.simulation.metrics:SETTLING",
+        "settling_5": "wristctl.simulation.metrics:SETTLING_5",
+        "steady_state": "wristctl.simulation.metrics:STEADY_STATE",
+        "overshoot": "wristctl.simulation.metrics:OVERSHOOT",
+        "iae": "wristctl.simulation.metrics:IAE",
+        "peak_tension": "wristctl.simulation.metrics:PEAK_TENSION",
+        "rms_tension": "wristctl.simulation.metrics:RMS_TENSION",
+        "chattering": "wristctl.simulation.metrics:CHATTERING",
+        "saturation": "wristctl.simulation.metrics:SATURATION",
+        "slack": "wristctl.simulation.metrics:SLACK",
+        "rmse_desired": "wristctl.simulation.metrics:RMSE_DESIRED",
+        "tip_rmse_mm": "wristctl.simulation.metrics:TIP_RMSE",
+        "tip_steady_mm": "wristctl.simulation.metrics:TIP_STEADY",
+        "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
+    },
+)
+"""Of `wristctl.simulation.metrics.Metric`."""
+
+OPTIMISERS: Table[Any] = Table(
+    "optimiser",
+    {
+        "pso": "wristctl.tuning.optimisers.pso:ParticleSwarm",
+        "differential-evolution": "wristctl.tuning.optimisers.differential_evolution:DifferentialEvolution",
+        "random": "wristctl.tuning.optimisers.random_search:RandomSearch",
+    },
+)
+"""Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
+
+PLANTS: Table[Any] = Table("plant", {"pcc": "wristctl.wrist.pcc:PCC"})
+"""Of `wristctl.wrist.plant.PlantModel`."""

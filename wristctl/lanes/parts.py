@@ -1,0 +1,96 @@
+"""NamedTuples in compiled code: read from rows, changed by name, and taken one block at a time.
+
+What a NamedTuple holds is listed once, in its class; everything here goes by that list.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba.core.typing.templates import signature
+from numba.extending import intrinsic
+
+from wristctl.lanes.rows import load_row
+from wristctl.lanes.types import RowsType
+
+
+def tuple_of(kind: Any) -> Any:
+    """An intrinsic that reads the first rows into the NamedTuple `kind`, in the order of its fields."""
+    count = len(kind._fields)
+
+    @intrinsic
+    def read(typingctx: Any, rows: RowsType) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+            numbers = [ir.Constant(ir.IntType(64), at) for at in range(count)]
+            return context.make_tuple(
+                builder, sig.return_type, [load_row(builder, rows, args[0], each) for each in numbers]
+            )
+
+        return signature(numba.types.NamedUniTuple(rows.element, count, kind), rows), codegen
+
+    return read
+
+
+def replacing(*names: str) -> Any:
+    """An intrinsic (record, values): the NamedTuple with these fields replaced by as many values of their types."""
+
+    @intrinsic
+    def replaced(typingctx: Any, record: numba.types.BaseNamedTuple, values: numba.types.BaseTuple) -> Any:
+        places = [record.fields.index(name) for name in names]
+        wanted = numba.types.Tuple(tuple(record.types[at] for at in places))
+
+        def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+            changed, result = args
+            for number, at in enumerate(places):
+                value = builder.extract_value(result, number)
+                changed = builder.insert_value(changed, value, at)
+            return changed
+
+        return signature(record, record, wanted), codegen
+
+    return replaced
+
+
+def _own(array: Any, block: Any) -> Any:
+    return array[min(block, len(array) - 1)]
+
+
+@intrinsic
+def block_of(typingctx: Any, parts: Any, block: numba.types.Integer) -> Any:
+    """One block's part of a NamedTuple of arrays [block, ...]: an array of one block is every block's.
+
+    Numbers, functions and None stay as they are, NamedTuples within are taken apart likewise.
+    """
+    if not isinstance(parts, numba.types.BaseNamedTuple):
+        return None
+    kinds = [_block_type(each) for each in parts.types]
+    result = numba.types.NamedTuple(kinds, parts.instance_class)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        whole, index = args
+        return _taken(context, builder, sig.args, whole, index)
+
+    return signature(result, parts, block), codegen
+
+
+def _block_type(kind: Any) -> Any:
+    if isinstance(kind, numba.types.Array):
+        return kind.copy(ndim=kind.ndim - 1) if kind.ndim > 1 else kind.dtype
+    if isinstance(kind, numba.types.BaseNamedTuple):
+        return numba.types.NamedTuple([_block_type(each) for each in kind.types], kind.instance_class)
+    return kind
+
+
+def _taken(context: Any, builder: Any, kinds: Any, whole: Any, block: Any) -> Any:
+    parts, index = kinds
+    found = []
+    for at, kind in enumerate(parts.types):
+        own = builder.extract_value(whole, at)
+        if isinstance(kind, numba.types.Array):
+            own = context.compile_internal(builder, _own, signature(_block_type(kind), kind, index), [own, block])
+        elif isinstance(kind, numba.types.BaseNamedTuple):
+            own = _taken(context, builder, (kind, index), own, block)
+        found.append(own)
+    return context.make_tuple(builder, _block_type(parts), found)

@@ -1,0 +1,13 @@
+"""Random streams: every one of them has a name under the root seed of a study."""
+
+from __future__ import annotations
+
+import hashlib
+
+Entropy = tuple[int, ...]
+"""Of a random stream, for `numpy.random.default_rng` or `numpy.random.SeedSequence`."""
+
+
+def stream(seed: int, name: str) -> tuple[int, int]:
+    """Entropy of the named random stream under a root seed."""
+    return seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")

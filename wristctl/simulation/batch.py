@@ -1,0 +1,167 @@
+"""A batch of rollouts as the kernel wants it: its parts as blocks of lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, Controller
+from wristctl.lanes.blocks import lanes_of, spread
+from wristctl.seeds import Entropy
+from wristctl.simulation.actuator import Drive, at_rest, level_of, motor_of
+from wristctl.simulation.disturbances import acting
+from wristctl.simulation.frames import readings, schedule
+from wristctl.simulation.kernel import RECORDED, Course, Scratch, Setup, State
+from wristctl.simulation.kernel import World as Values
+from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
+from wristctl.simulation.reference import Motion
+from wristctl.simulation.sums import SUMS
+from wristctl.simulation.worlds import World, plant_of
+from wristctl.wrist.plant import PlantModel
+from wristctl.wrist.segments import segments
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Start = Callable[[WristParameters], Array]
+"""The coordinates (q,) at which a plant begins, at rest."""
+
+
+class Batch(NamedTuple):
+    """What `run_blocks` is given, and how many blocks and samples there are."""
+
+    setup: Setup
+    course: Course
+    world: Values
+    state: State
+    blocks: int
+    samples: int
+    wide: tuple[int, ...]
+    """(LANES,), or () for a rollout alone."""
+
+    def scratch(self) -> Scratch:
+        """Rows to work on, for one thread."""
+        now, target, case = (np.zeros((rows, *self.wide)) for rows in (len(NOW), 3, 2))
+        return Scratch(now, target, case)
+
+
+class Lanes(NamedTuple):
+    """Which of the motions, worlds and streams each rollout has, (count,) each."""
+
+    motion: Indices
+    world: Indices
+    streams: Sequence[Entropy]
+
+
+def batch(
+    controller: Controller,
+    gains: Array,
+    motions: Sequence[Motion],
+    worlds: Sequence[World],
+    lanes: Lanes,
+    model: PlantModel,
+    start: Start | None,
+    record: bool,
+) -> Batch:
+    """The batch of `rollout`; all worlds have the same structure, timing and frames."""
+    loop, count = worlds[0].loop, len(gains)
+    n, period = loop.plant_segments, loop.control_period
+    k, level = model.coordinates(n), level_of(loop.actuator)
+    ticks, samples = max(1, round(sample_period(period) / period)), len(motions[0].theta_ref)
+    followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
+    wide = followed.shape[1:]
+    actual = [plant_of(each.wrist, each.loop.plant) for each in worlds]
+    rest = np.zeros((len(worlds), k)) if start is None else np.array([start(each) for each in actual])
+    motors = [motor_of(each.loop.actuator) for each in worlds]
+
+    def of_worlds(row: Callable[[int], Array]) -> Array:
+        """A row of each world's as blocks; of one world as one block for all."""
+        if len(worlds) == 1:
+            return spread(row(0), max(1, *wide, 1))[:1]
+        return spread(np.array([row(each) for each in range(len(worlds))])[lanes.world], count)
+
+    def limits(each: int) -> Array:
+        world = worlds[each]
+        return np.array([world.wrist.pretension, world.wrist.tension_limit if world.loop.limits else np.inf])
+
+    def at_the_motors(each: int) -> Array:
+        drive = None if level is None else Drive(level, motors[each])
+        return at_rest(drive, actual[each], model, rest[each])
+
+    goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
+    values = Values(
+        plant=of_worlds(lambda each: model.values(actual[each], n)),
+        model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
+        limits=of_worlds(limits),
+        motor=of_worlds(lambda each: np.array(motors[each])),
+        gains=spread(gains.reshape(count, -1), count),
+        goals=spread(goals, count),
+    )
+    kinds = list(dict.fromkeys(each.loop.disturbances for each in worlds))
+    cases = [acting(each, motions[0].time) for each in kinds]
+    case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[lanes.world]
+    watch, frames = _watch(worlds, lanes, motions[0].horizon, model, rest)
+    state = State(
+        which=lanes.motion[followed].reshape(blocks, -1),
+        case=case[followed].reshape(blocks, -1),
+        memory=spread(np.zeros(max(1, controller.memory)), count),
+        coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[lanes.world], count),
+        motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[lanes.world], count),
+        sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
+        record=np.empty((blocks, samples if record else 0, len(RECORDED) + k, *wide)),
+        watch=watch,
+    )
+    references = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
+    course = Course(references, _stacked(cases, samples), frames)
+    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.substeps, ticks)
+    return Batch(setup, course, values, state, blocks, samples, wide)
+
+
+def sample_period(control_period: float) -> float:
+    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
+    return max(control_period, round(1e-3 / control_period) * control_period)
+
+
+def _stacked(cases: Sequence[Array | None], samples: int) -> Array | None:
+    """Each case's disturbances, (cases, T, 2); None where nothing acts in any of them."""
+    if all(case is None for case in cases):
+        return None
+    nothing = np.tile((0.0, 1.0), (samples, 1))
+    return np.array([nothing if case is None else case for case in cases])
+
+
+def _watch(
+    worlds: Sequence[World], lanes: Lanes, horizon: float, model: PlantModel, rest: Array
+) -> tuple[Watch | None, Schedule | None]:
+    """Cameras with their observers by block; none where sensors are ideal."""
+    loop, count = worlds[0].loop, len(lanes.motion)
+    if loop.sensor.level == "ideal":
+        return None, None
+    frames = schedule(loop.sensor, loop.control_period, horizon)
+    longest = int((frames.arrivals - frames.captures).max() + np.diff(frames.captures).max(initial=1)) + 2
+    sensors = [each.loop.sensor for each in worlds]
+    taken = readings(len(frames.captures), [sensors[each] for each in lanes.world], lanes.streams)
+    order = lanes_of(count)
+    blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
+    lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
+    by_block = np.moveaxis(lanes_last.reshape(*lanes_last.shape[:2], blocks, *wide), 2, 0)
+    own = [_observer(each, model, angle, longest) for each, angle in zip(worlds, rest, strict=True)]
+
+    def of_observers(name: str) -> Array:
+        rows = np.array([getattr(each, name).ravel() for each in own])[lanes.world]
+        shape = getattr(own[0], name).shape
+        return spread(rows, count).reshape(blocks, *shape, *wide)
+
+    fields = {name: of_observers(name) for name in ("gain", "delivered", "fused", "now")}
+    observer = Observer(**fields, at=np.zeros((blocks, 1), np.int64))
+    pictures = np.zeros((blocks, len(frames.captures), *wide))
+    turn = np.zeros((blocks, 2), np.int64)
+    return Watch(np.ascontiguousarray(by_block), pictures, turn, observer), frames
+
+
+def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:
+    loop, wrist = world
+    return observer_of(loop.sensor, loop.actuator, wrist, loop.control_period, ticks, float(model.angle(q)))

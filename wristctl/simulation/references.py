@@ -1,0 +1,70 @@
+"""The kinds of references: the entries of `wristctl.config.tables.REFERENCES`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.config.loop import Reference
+from wristctl.simulation.reference import ReferenceKind, minimum_jerk
+
+Array = NDArray[np.float64]
+
+
+def _step(reference: Reference, time: Array) -> Array:
+    return np.stack([np.where(time > -1e-9, 1.0, 0.0), 0.0 * time, 0.0 * time])
+
+
+def _sine(reference: Reference, time: Array) -> Array:
+    w = 2.0 * np.pi * reference.frequency
+    return 0.5 * np.stack([1.0 - np.cos(w * time), w * np.sin(w * time), w * w * np.cos(w * time)])
+
+
+def _minimum_jerk(reference: Reference, time: Array) -> Array:
+    return np.stack(minimum_jerk(time, reference.duration))
+
+
+def _millimetres(tip: tuple[float, float]) -> str:
+    return f"{1e3 * tip[0]:.3g}, {1e3 * tip[1]:.3g}"
+
+
+def _target(reference: Reference) -> str:
+    return f"{reference.end_deg:g} deg" if reference.tip is None else f"tip {_millimetres(reference.tip)} mm"
+
+
+STEP = ReferenceKind(
+    "a jump to an angle or a tip position",
+    course=_step,
+    rest=lambda reference, begin, horizon: begin,
+    described=lambda reference: f"step {_target(reference)}",
+)
+MINIMUM_JERK = ReferenceKind(
+    "a smooth move of `duration` to an angle or a tip position (Flash and Hogan 1985)",
+    course=_minimum_jerk,
+    rest=lambda reference, begin, horizon: begin + reference.duration,
+    described=lambda reference: f"minimum jerk {reference.duration:g} s {_target(reference)}",
+)
+SINE = ReferenceKind(
+    "swinging between straight and the angle at `frequency`",
+    course=_sine,
+    rest=lambda reference, begin, horizon: horizon,
+    described=lambda reference: f"sine {reference.frequency:g} Hz {_target(reference)}",
+)
+MULTI_STEP = ReferenceKind(
+    "jumps through `angles_deg`, one each `duration`",
+    course=_step,
+    rest=lambda reference, begin, horizon: begin,
+    described=lambda reference: (
+        f"steps {reference.duration:g} s {' '.join(f'{angle:g}' for angle in reference.angles_deg)} deg"
+    ),
+    targets="angles_deg",
+)
+TIP_PATH = ReferenceKind(
+    "smooth moves of `duration` through tip positions",
+    course=_minimum_jerk,
+    rest=lambda reference, begin, horizon: begin + reference.duration,
+    described=lambda reference: (
+        f"tip path {reference.duration:g} s {' '.join(_millimetres(tip) for tip in reference.tips)}"
+    ),
+    targets="tips",
+)

@@ -1,0 +1,232 @@
+"""What every plant is: the contract behind which rollouts, the emulated bench and identification move a wrist.
+
+A plant is one file: the NamedTuple of its parameters, and functions of lanes on them and on its coordinates q with
+their rates. Compiled code is handed a PlantModel, reads its parameters by `parameters_of`, and calls the functions
+below; which plant's they are follows from the parameters' type, so that each kernel is compiled for its plant alone.
+`wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.tables.PLANTS`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
+from numpy.typing import NDArray
+
+from wristctl.config.errors import UserError
+from wristctl.config.tables import PLANTS as _TABLE
+from wristctl.config.tables import Table
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
+from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.lane import dot, planar, where
+from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.wrist.shape import Backbone
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlantModel:
+    """A kind of plant; the compiled functions have the arguments of this module's of the same name."""
+
+    name: str
+    parameters: Any
+    """NamedTuple class of its parameters, all lanes; a class of its own, which tells plants apart."""
+    coordinates: Callable[[int], int]
+    """Number of coordinates q of a wrist cut into so many segments."""
+    values: Callable[[WristParameters, int], Array]
+    """The parameters' values of a wrist cut into so many segments, in their order."""
+    advance: Any
+    tip_angle: Any
+    stretch: Any
+    within: Any
+    disturbed: Any
+    tip_pose: Any
+    tip_jacobian: Any
+    angle: Callable[[Array], Array]
+    """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+    tips: Callable[[WristParameters, Array], Array]
+    """Tips (T, 2) [m] at coordinates (T, q)."""
+    taut: Callable[[WristParameters, Array], Array]
+    """Lengths (2,) [m] of the + and the - side's taut tendons at coordinates (q,)."""
+    backbone: Backbone
+    """For pictures."""
+    equilibrium: Callable[[WristParameters, int, tuple[float, float]], Array] | None = None
+    """Coordinates (q,) at rest under tensions [N per tendon, + and - side]; None where the plant cannot tell."""
+
+    def __post_init__(self) -> None:
+        _MODELS[self.parameters] = self
+
+    @property
+    def source(self) -> Path:
+        """The file that defines it."""
+        return Path(str(sys.modules[self.parameters.__module__].__file__))
+
+    def rest(self, wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
+        """`equilibrium`, and a UserError where the plant cannot tell it."""
+        if self.equilibrium is None:
+            raise UserError(f"plant {self.name} knows no equilibrium", "start", "start: straight")
+        return self.equilibrium(wrist, n, tensions)
+
+
+PLANTS: Table[PlantModel] = _TABLE
+_MODELS: dict[Any, PlantModel] = {}
+
+
+class PlantType(numba.types.Type):
+    """A plant model in compiled code: nothing but a type."""
+
+    def __init__(self, parameters: Any) -> None:
+        self.parameters = parameters
+        super().__init__(name=f"plant({parameters.__module__}.{parameters.__qualname__})")
+
+
+register_model(PlantType)(models.OpaqueModel)
+
+
+@typeof_impl.register(PlantModel)
+def _type_of(model: PlantModel, context: Any) -> PlantType:
+    return PlantType(model.parameters)
+
+
+@unbox(PlantType)
+def _nothing(kind: PlantType, model: Any, context: Any) -> NativeValue:
+    return NativeValue(context.context.get_dummy_value())
+
+
+def parameters_of(model: Any, rows: Any) -> Any:
+    """The model's parameters, read from rows of lanes."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(parameters_of)
+def _parameters_of(model: Any, rows: Any) -> Any:
+    if not isinstance(model, PlantType):
+        return None
+    read = tuple_of(model.parameters)
+
+    def parameters(model: Any, rows: Any) -> Any:
+        return read(rows)
+
+    return parameters
+
+
+def advance(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any) -> None:
+    """Move coordinates and rates on by h [s] under held pulls [N] of the + and the - side's tendons together."""
+    raise NotImplementedError("compiled code only")
+
+
+def tip_angle(plant: Any, q: Any, rate: Any) -> Any:
+    """Bending angle of the last disc [rad] and its rate [rad/s]."""
+    raise NotImplementedError("compiled code only")
+
+
+def stretch(plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
+    """What pulls where both sides have reeled in `plus` and `minus` [m] since they were taut on the straight wrist.
+
+    Elongation of the + and the - side's tendons [m], negative where slack; the bend that they are wrapped by [rad]; and
+    the speeds at which they slide along the discs [m/s], positive shortening.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+def within(plant: Any, q: Any) -> Any:
+    """Where the coordinates are ones that the plant can have."""
+    raise NotImplementedError("compiled code only")
+
+
+def disturbed(plant: Any, force: Any, scale: Any) -> Any:
+    """The plant with a force on the last disc [N, across the straight wrist] and its stiffness scaled."""
+    raise NotImplementedError("compiled code only")
+
+
+def tip_pose(plant: Any, q: Any) -> Any:
+    """Centre of the last disc and the unit tangent there, planar."""
+    raise NotImplementedError("compiled code only")
+
+
+def tip_jacobian(plant: Any, q: Any, place: Any, angle: Any) -> None:
+    """Derivatives of the last disc's centre (planar rows) and of its angle (rows) by each coordinate."""
+    raise NotImplementedError("compiled code only")
+
+
+def _by_plant(function: Any) -> None:
+    @overload(function, strict=False, jit_options={"error_model": "numpy", "nogil": True, "forceinline": True})
+    def own(plant: Any, *others: Any) -> Any:
+        model = _MODELS.get(plant.instance_class) if isinstance(plant, numba.types.BaseNamedTuple) else None
+        return None if model is None else getattr(model, function.__name__).py_func
+
+
+for _function in (advance, tip_angle, stretch, within, disturbed, tip_pose, tip_jacobian):
+    _by_plant(_function)
+
+
+@compiled
+def advance_or_stop(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any, alive: Any) -> Any:
+    """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
+    before = lanes_like(q)
+    for i in range(len(q)):
+        before[i] = q[i]
+    advance(plant, q, rate, plus, minus, h)
+    zero = 0.0 * alive
+    alive = where(within(plant, q), alive, zero)
+    for i in range(len(q)):
+        q[i] = where(alive > zero, q[i], before[i])
+        rate[i] = where(alive > zero, rate[i], zero)
+    return alive
+
+
+@cache
+def kernel_of(function: Any, model: PlantModel) -> Any:
+    """A function of Python as a kernel that moves plants of this model; its cache goes by that one's source too."""
+    return kernel(function, model.source)
+
+
+class Pose(NamedTuple):
+    """The last disc of a plant at coordinates (B, q)."""
+
+    tip: Array
+    """x, y [m] of its centre, (B, 2)."""
+    angle: Array
+    """(B,) [rad]"""
+    jacobian: Array
+    """Derivatives of x, y and angle by the coordinates, (B, 3, q)."""
+
+
+def _poses(model: Any, values: Any, states: Any, out: Any, cut: Any) -> None:
+    for block in range(states.shape[0]):
+        plant, result = parameters_of(model, rows_of(values)), rows_of(out[block])
+        n = len(cut)
+        q, rate = part(rows_of(states[block]), 0, cut), part(rows_of(states[block]), n, cut)
+        place, turning = planes_like(q), lanes_like(q)
+        angle, zero = tip_angle(plant, q, rate)
+        position, _ = tip_pose(plant, q)
+        tip_jacobian(plant, q, place, turning)
+        along, across = planar(1.0 + zero, zero), planar(zero, 1.0 + zero)
+        result[0] = dot(position, along)
+        result[1] = dot(position, across)
+        result[2] = angle
+        for k in range(n):
+            result[3 + k] = dot(place[k], along)
+            result[3 + n + k] = dot(place[k], across)
+            result[3 + 2 * n + k] = turning[k]
+
+
+def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
+    """Where the last disc is at coordinates q (B, q) of a wrist cut into n segments."""
+    count, k = q.shape
+    states = to_blocks(np.concatenate([q, np.zeros((count, k))], axis=1))
+    out = np.empty((len(states), 3 + 3 * k, *states.shape[2:]))
+    values = spread(model.values(wrist, n), width(count))[0]
+    kernel_of(_poses, model)(model, values, states, out, (0,) * k)
+    rows = to_rows(out, count)
+    return Pose(rows[:, :2], rows[:, 2], rows[:, 3:].reshape(count, 3, k))
