@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import inspect
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +17,36 @@ import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
-    "cli", "studies", "report", "comparison", "tuning", "learning", "identification", "trial", "bench", "vision",
-    "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt", "seeds",
+    "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
+    "trial", "bench", "vision", "board", "simulation", "control", "wrist", "lanes", "records", "config", "interrupt",
+    "seeds", "version",
 )  # fmt: skip
+
+
+FACE = {
+    "audit", "compare", "gen_data", "identify", "load_study", "open_run", "runs", "simulate", "train", "tune",
+}  # fmt: skip
+
+SMALL = """
+seed: 1
+gen-data: {samples: 40}
+train: {hidden: [4], epochs: 2, workers: 1}
+tune:
+  controllers: [smc, pid]
+  candidates: 2
+  iterations: 1
+  horizon: 0.2
+  loops: {fast: {plant_segments: 1}}
+  scenarios: [{loop: fast, reference: {kind: step, angle_deg: 20}}]
+compare:
+  horizon: 0.2
+  loops: {fast: {plant_segments: 1}}
+  references: [{duration: 0.1}]
+  inverses: [network]
+  rows: [{controller: pid, gains: tuned}]
+simulate: {horizon: 0.2}
+"""
+"""As README's study, in a moment."""
 
 
 def test_a_notebook_can_simulate_from_overrides() -> None:
@@ -26,20 +57,70 @@ def test_a_notebook_can_simulate_from_overrides() -> None:
     assert frame["theta"].iloc[-1] == pytest.approx(frame["theta_desired"].iloc[-1], abs=1e-3)
 
 
+def test_the_readmes_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    file = tmp_path / "experiments" / "paper.yaml"
+    file.parent.mkdir()
+    file.write_text(SMALL)
+    assert re.findall(r"experiments/[\w-]+\.yaml", code) == ["experiments/paper.yaml"]
+    monkeypatch.chdir(tmp_path)
+    wristctl.train(wristctl.load_study(file), out="results")
+    known: dict[str, Any] = {}
+    exec(code, known)
+    assert wristctl.runs()["kind"].tolist() == ["train", "tune"] and known["tuned"].run.state == "ok"
+    assert known["done"].trajectory.label == "smc/tuned" and (tmp_path / "angle.png").is_file()
+    assert known["compared"].rows[0].inverse == "network"
+
+
+def test_dir_shows_the_face_and_every_function_of_it_is_explained() -> None:
+    assert (
+        {name for name in dir(wristctl) if not name.startswith("_")} == FACE == set(wristctl.__all__) - {"__version__"}
+    )
+    for name in FACE:
+        function = getattr(wristctl, name)
+        text, given = inspect.getdoc(function), inspect.signature(function).parameters
+        assert text and "Raises UserError" in " ".join(text.split()), name
+        missing = [each for each in given if f"`{each}" not in text and each not in ("study", "file")]
+        assert not missing, f"{name} does not explain {missing}"
+    assert str(inspect.getdoc(wristctl.api)).startswith("The functions that")
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        wristctl.__getattr__("simulat")
+
+
 def test_import_is_light() -> None:
     heavy = "{'torch', 'scipy', 'pandas', 'matplotlib', 'cv2', 'numba', 'numpy'}"
-    code = f"import sys, wristctl; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+    for code in ("import wristctl; dir(wristctl)", "import wristctl.api, wristctl; wristctl.load_study()"):
+        code = f"import sys; {code}; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
+
+
+def _imported(tree: ast.AST) -> Iterator[str]:
+    """The modules of wristctl that a module imports, wherever in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (each.name for each in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports name the whole path"
+            yield from (f"{node.module}.{each.name}" for each in node.names)
+
+
+def _layer(module: str) -> str:
+    """The package or file of wristctl that a module is in; a name that the face imports is where it has it from."""
+    name = [*module.split("."), "__init__"][1]
+    if name in LAYERS:
+        return name
+    face = ast.parse((PACKAGE / "__init__.py").read_text()).body
+    origins = [each for node in face if isinstance(node, ast.ImportFrom) for each in _imported(node)]
+    return next((_layer(each) for each in origins if each.endswith(f".{name}")), "__init__")
 
 
 def test_imports_between_packages_point_down_only() -> None:
     for file in PACKAGE.rglob("*.py"):
-        own = file.relative_to(PACKAGE).parts[0]
-        if file.parent == PACKAGE:
-            continue
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wristctl."):
-                other = str(node.module).split(".")[1]
+        own = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        for module in _imported(ast.parse(file.read_text())):
+            if module.split(".")[0] == "wristctl":
+                other = _layer(module)
                 assert LAYERS.index(other) >= LAYERS.index(own), f"{file}: {own} imports {other}"
 
 

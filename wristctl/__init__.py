@@ -6,41 +6,59 @@ In a notebook:
 
     study = wristctl.load_study("experiments/paper.yaml", "simulate.gains=exchanged")
     done = wristctl.simulate(study)
-    done.trajectory.frame()                      # a DataFrame
-    done.metrics["rmse"]
+    done.frame()                                 # a DataFrame
+    done.metrics["rmse"]                         # rad
+    done.figures["angle"]                        # drawn now
+    wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
+
+`gen_data`, `train`, `tune`, `compare`, `identify` and `audit` go the same way; see wristctl.api.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-__all__ = ["__version__", "load_study", "open_run", "simulate"]
+from wristctl.version import __version__
 
 if TYPE_CHECKING:
-    from wristctl.config.study import Study
-    from wristctl.records import open_run
-    from wristctl.simulation.closed_loop import simulate
+    from wristctl.api import (
+        audit,
+        compare,
+        gen_data,
+        identify,
+        load_study,
+        open_run,
+        runs,
+        simulate,
+        train,
+        tune,
+    )
 
-
-def load_study(file: str | None = None, *overrides: str) -> Study:
-    """The study of a YAML file, or of defaults only, with overrides such as "wrist.length=0.09"."""
-    from pathlib import Path
-
-    from wristctl.config.load import load_study as load
-
-    return load([Path(file)] if file else [], list(overrides))
+__all__ = [
+    "__version__",
+    "audit",
+    "compare",
+    "gen_data",
+    "identify",
+    "load_study",
+    "open_run",
+    "runs",
+    "simulate",
+    "train",
+    "tune",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """Heavy parts are imported when first asked for, so that `import wristctl` stays light."""
-    if name == "simulate":
-        from wristctl.simulation.closed_loop import simulate
+    """The functions are imported when one is first asked for, so that `import wristctl` stays light."""
+    if name not in (*__all__, "api"):
+        raise AttributeError(f"module 'wristctl' has no attribute {name!r}")
+    api = import_module("wristctl.api")
+    globals()[name] = found = api if name == "api" else getattr(api, name)
+    return found
 
-        return lambda *given: simulate(*given).first
-    if name == "open_run":
-        from wristctl.records import open_run
 
-        return open_run
-    raise AttributeError(f"module 'wristctl' has no attribute {name!r}")
+def __dir__() -> list[str]:
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

@@ -8,15 +8,14 @@ import re
 import select
 import time
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import typer
 
-from wristctl.cli.operator import operator
+from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
-from wristctl.cli.trial_panel import trials_shown
+from wristctl.studies.session import Session
 from wristctl.trial.log import LOG
 from wristctl.trial.trials import Trial
 
@@ -30,7 +29,7 @@ class Screen:
         self._master, slave = pty.openpty()
         self._file = os.fdopen(slave, "w", encoding="utf-8")
         self.console = Terminal(file=self._file, width=100, color_system=None)
-        self.session: Any = SimpleNamespace(console=self.console, quiet=False, flags=frozenset())
+        self.operator, self.session = TerminalOperator(self.console, False, frozenset()), cast("Session", None)
 
     def read(self, seconds: float) -> str:
         """What comes in this time."""
@@ -71,7 +70,7 @@ def row(trial: int, degrees: float, verdict: str = "") -> dict[str, Any]:
 
 
 def test_the_panel_tells_the_newest_angle_and_verdict_and_counts_the_trials_that_are_done(screen: Screen) -> None:
-    with trials_shown(screen.session, TRIALS) as take:
+    with screen.operator.watch(TRIALS, screen.session) as take:
         screen.panel("homing")
         take(row(-1, 0.5))
         assert "━" not in screen.panel("0.50 deg")
@@ -97,10 +96,10 @@ def test_the_panel_gives_way_to_a_question_and_comes_back(screen: Screen, monkey
         return "yes"
 
     monkeypatch.setattr(typer, "prompt", answered)
-    with trials_shown(screen.session, TRIALS) as take:
+    with screen.operator.watch(TRIALS, screen.session) as take:
         take(row(0, 1.0))
         screen.panel("1.00 deg")
-        operator(screen.session)("Turn the wrist.")
+        screen.operator.confirm("Turn the wrist.")
         take(row(0, 2.0))
         screen.panel("2.00 deg")
     assert beside == [""]

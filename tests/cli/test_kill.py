@@ -1,4 +1,4 @@
-"""However a command is killed, no directory looks complete that is not, and none stops the listing."""
+"""Wherever a command is killed, no directory looks complete that is not, and none stops the listing."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import importlib
 import inspect
 import os
 import random
+import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from wristctl.cli.app import COMMANDS
@@ -16,7 +16,6 @@ from wristctl.records import list_runs
 
 ROOT = Path(__file__).parents[2]
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
-KILLS = 50 if THOROUGH else 3
 FAST = ("--set", "loops={fast: {plant_segments: 1}}")
 MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
 QUICK = ("--epochs", "5", "--set", "hidden=[8]", "--set", "gen-data.samples=100")
@@ -46,54 +45,66 @@ def _that_write() -> list[str]:
     ]
 
 
-def _start(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
-    argv = [sys.executable, "-P", "-m", "wristctl", *arguments]
+_TOLD = """
+import os, signal, sys
+at, results, told = int(sys.argv.pop(1)), os.path.abspath("results"), 0
+def tell(event, given):
+    global told
+    writes = event == "open" and given[2] & (os.O_WRONLY | os.O_RDWR)
+    path = given[0] if writes or event in ("os.mkdir", "os.rename", "os.remove") else ""
+    if isinstance(path, str | os.PathLike) and os.path.abspath(path).startswith(results + os.sep):
+        told += 1
+        if told == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        name = given[1] if event == "os.rename" else path
+        os.write(2, f"{event} {os.path.basename(name)}\\n".encode())
+sys.addaudithook(tell)
+from wristctl.cli.app import main
+main()
+"""
+"""wristctl, which tells each file it is about to change in results/, and is killed before the change number `at`."""
+
+
+def _told(folder: Path, at: int, *arguments: str) -> tuple[int, list[str]]:
+    """Exit code, and the changes made."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(argv, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
-def _duration(folder: Path, *arguments: str) -> float:
-    """How long the command takes once its loops are compiled [s]."""
-    took = []
-    for _ in range(2 if THOROUGH else 1):
-        began = time.monotonic()
-        assert _start(folder, *arguments).wait() == 0, arguments
-        took.append(time.monotonic() - began)
-    return took[-1]
+    command = [sys.executable, "-P", "-c", _TOLD, str(at), *arguments, "-q"]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, [line for line in done.stderr.splitlines() if line.startswith(("os.", "open "))]
 
 
 def test_every_command_that_makes_a_run_is_known() -> None:
     assert set(QUICKLY) | {"identify", "hw-run", "track"} == set(_that_write())
 
 
-def test_killed_at_random_moments_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:
+def test_killed_before_any_change_of_a_file_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:
     everything = [(name, *options) for name, ways in QUICKLY.items() for options in ways]
-    typed = everything if THOROUGH else everything[:1]
-    durations = {each: _duration(tmp_path, *each) for each in typed}
-    whole = {run.id for run in list_runs(tmp_path / "results")}
-    moments = random.Random(8)
+    drawn = random.Random(8)
+    (tmp_path / "results").mkdir()
+    known: set[str] = set()
     states = []
-    for number in range(5 * KILLS):
-        if number >= KILLS and "crashed" in states:
-            break
-        each = typed[number % len(typed)]
-        child = _start(tmp_path, *each)
-        time.sleep(durations[each] * moments.uniform(0.2, 1.0))
-        child.kill()
-        ended = child.wait()
-        for run in list_runs(tmp_path / "results"):
-            if run.id not in whole:
-                whole.add(run.id)
-                states.append(run.state)
-                assert run.state in ("ok", "crashed", "broken")
+    for each in everything if THOROUGH else everything[:1]:
+        code, changes = _told(tmp_path, 0, *each)
+        assert code == 0, each
+        known |= {run.id for run in list_runs(tmp_path / "results")}
+        sealing = changes.index("os.rename SHA256SUMS") + 1
+        moments = [2, *(drawn.sample(range(3, len(changes)), 6) if THOROUGH else ())]
+        for at in (*moments, sealing, sealing + 1):
+            code, changes = _told(tmp_path, at, *each)
+            assert code == -signal.SIGKILL and len(changes) == at - 1
+            new = [run for run in list_runs(tmp_path / "results") if run.id not in known]
+            known |= {run.id for run in new}
+            states += [run.state for run in new]
+            assert [run.state for run in new].count("ok") == changes.count("os.rename SHA256SUMS")
+            for run in new:
                 if run.state == "ok":
-                    assert run.problems() == [], f"{run.path} killed in the end ({ended})"
+                    assert run.problems() == []
                 else:
+                    assert run.state == ("crashed" if (run.path / "run.json").exists() else "broken")
                     assert not (run.path / "SHA256SUMS").exists()
+    assert set(states) == {"broken", "crashed", "ok"}
     listed = subprocess.run(
         [sys.executable, "-P", "-m", "wristctl", "runs", "ls"],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
     )  # fmt: skip
-    assert listed.returncode == 0 and all(name in listed.stdout for name in whole)
-    print(f"{number} kills of {len(typed)} commands: { ({state: states.count(state) for state in set(states)}) }")
-    assert "crashed" in states
+    assert listed.returncode == 0 and all(name in listed.stdout for name in known)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -130,6 +131,57 @@ def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call, tmp_
 def test_a_dry_run_writes_nothing(call, tmp_path: Path, command: str) -> None:
     code, out, _ = call(command, "--dry-run")
     assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())
+
+
+def test_a_dry_run_of_compare_counts_the_directions_too(call) -> None:
+    code, out, _ = call("compare", "--dry-run", "--set", "directions=[ulnar, radial, flexion, extension]",
+                        "--set", "inverses=[none]", "--set", "rows=[{controller: feedforward}]")  # fmt: skip
+    assert code == 0 and "# 36 rollouts of 5 s\n" in out
+
+
+def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call) -> None:
+    search = "tuning={controllers: [smc, pid], candidates: 3, iterations: 5, horizon: 0.2}"
+    code, out, _ = call("compare", "--dry-run", "--set", search, "--set", "rows=[{controller: smc, gains: tuned}]")
+    assert code == 0 and "# a search first: 30 rollouts of 0.2 s for each of smc, pid\n" in out
+
+
+CAMERA = ("--set", "repetitions=8", "--set")
+
+
+def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call) -> None:
+    loop = "loop={plant_segments: 1, sensor: {level: camera}}"
+    code, out, _ = call("simulate", "--set", "horizon=0.3", *CAMERA, loop, "--set", "reference.duration=0.2")
+    run = open_run("latest:simulate")
+    every, known = run.data("repetitions"), run.metrics["rmse"]
+    assert code == 0 and "8 repetitions" in out and re.search(r"metric +median +95 % low +95 % high", out)
+    assert len(every) == 8 and every["rmse"].nunique() == 8
+    assert known["value"] == pytest.approx(every["rmse"].median()) and known["n"] == 8
+    low, high = known["interval"]
+    assert every["rmse"].min() <= low < known["value"] < high <= every["rmse"].max()
+
+    rows = "rows=[{controller: smc-tracking, gains: camera}]"
+    code, out, _ = call("compare", "--horizon", "0.3", *CAMERA, f"loops={{seen: {{{loop[6:]}}}", "--set", rows,
+                        "--set", "references=[{duration: 0.2}]", "--set", "inverses=[none]")  # fmt: skip
+    run = open_run("latest:compare")
+    (row,), every = run.data("comparison").to_dict("records"), run.data("repetitions")
+    assert code == 0 and "medians of 8 repetitions" in out and "RMSE's 95 % low" in out
+    assert row["repetitions"] == len(every) == 8 and row["rmse"] == pytest.approx(every["rmse"].median())
+    assert row["rmse_low"] < row["rmse"] < row["rmse_high"]
+    (known,) = (each for name, each in run.metrics.items() if name.startswith("rmse_seen"))
+    assert (known["value"], known["interval"]) == (row["rmse"], [row["rmse_low"], row["rmse_high"]])
+
+
+def test_a_dry_run_counts_repetitions_where_they_can_differ(call) -> None:
+    one = "{plant_segments: 1}"
+    seen = "{plant_segments: 1, sensor: {level: camera}}"
+    for command, more, said in (
+        ("simulate", f"loop={seen}", "# 8 rollouts of 5 s"),
+        ("simulate", f"loop={one}", "# one rollout of 5 s"),
+        ("compare", f"loops={{a: {one}, b: {seen}}}", "# 54 rollouts of 5 s"),
+        ("tune", f"loops={{default: {seen}}}", "# 38400 rollouts of 5 s for each of smc"),
+    ):
+        code, out, _ = call(command, "--dry-run", *CAMERA, more)
+        assert code == 0 and f"{said}\n" in out
 
 
 def test_a_buckling_wrist_is_a_warning_and_a_mark_in_the_manifest(call) -> None:

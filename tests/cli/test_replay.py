@@ -107,13 +107,13 @@ def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
 
 
 def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Path, data: str) -> None:
-    file = code / "wristctl" / "cli" / "gen_data.py"
+    file = code / "wristctl" / "studies" / "gen_data.py"
     text = file.read_text()
     file.write_text(text.replace("count = len(samples.theta)", "count = len(samples.theta) + 1"))
     status, found = _verdict(wristctl, data)
     file.write_text(text)
     assert status == 3 and all(cause.startswith("code: ") for cause in found["causes"])
-    assert any(cause.startswith("code: cli/gen_data.py: ") for cause in found["causes"])
+    assert any(cause.startswith("code: studies/gen_data.py: ") for cause in found["causes"])
     differing = {each["path"]: each["detail"] for each in found["files"] if each["verdict"] == "differs"}
     assert differing["metrics.json"].endswith("10 before, 11 now") and "data/samples.csv" not in differing
 
@@ -151,6 +151,28 @@ def test_without_another_cause_a_difference_is_nondeterminism(tmp_path: Path) ->
         runs.append(Run(live.path))
     assert causes(*runs) == ["nondeterminism: configuration, code, inputs and environment are the same"]
     assert [each[:2] for each in verdicts(*runs)] == [("data/first.txt", "missing"), ("metrics.json", "differs")]
+
+
+def test_many_changes_are_counted_and_each_output_of_either_run_has_a_verdict(tmp_path: Path) -> None:
+    runs = []
+    for name in ("before", "now"):
+        with start_run("train", Study(), "", tmp_path) as live:
+            live.metric("rmse", 1.0)
+            live.file(f"data/{name}.txt").write_text("here")
+            live.file("timing.json").write_text(name)
+        runs.append(Run(live.path))
+    runs[1].manifest.code.tree_sha256 = 64 * "0"
+    (runs[1].path / "code.txt").write_text("".join(f"{64 * 'a'}  new{number}.py\n" for number in range(3)))
+    (runs[0].path / "code.txt").write_text("".join(f"{64 * 'b'}  old{number}.py\n" for number in range(4)))
+    why = causes(*runs)
+    assert [cause.split(":")[0] for cause in why] == 7 * ["code"] and why[-1] == "code: and 2 more"
+    assert why[1:3] == [f"code: old{number}.py: {12 * 'b'} -> absent" for number in range(2)]
+    assert {each.path: each.verdict for each in verdicts(*runs)} == {
+        "data/before.txt": "missing",
+        "data/now.txt": "added",
+        "metrics.json": "identical",
+        "timing.json": "volatile",
+    }
 
 
 def test_another_result_of_an_input_is_a_cause(tmp_path: Path) -> None:

@@ -29,6 +29,12 @@ def test_ls_shows_what_was_asked_for(call, made: tuple[Run, Run]) -> None:
     listed = json.loads(call("runs", "ls", "--sort", "rmse", "--json")[1])["runs"]
     assert [each["id"] for each in listed] == [network.id, data.id]
     assert listed[0]["inputs"] == [data.id] and listed[0]["metrics"] == {"rmse": 1.0}
+    listed = json.loads(call("runs", "ls", "--sort", "rmse", "--reverse", "--json")[1])["runs"]
+    assert [each["id"] for each in listed] == [data.id, network.id]
+    assert [line.split()[0] for line in call("runs", "ls")[1].splitlines()[2:]] == [data.id, network.id], "oldest first"
+    out = call("runs", "ls", "--newer", "1h")[1]
+    assert data.id in out and network.id in out
+    assert call("runs", "ls", "--older", "1h")[1] == "no runs in results that meet this\n"
     code, _, err = call("runs", "ls", "--where", "rsme<1")
     assert code == 2 and "did you mean 'rmse'?" in err
 
@@ -41,6 +47,11 @@ def test_diff_names_each_part_that_differs(call, made: tuple[Run, Run]) -> None:
     assert found["code"] == found["environment"] == {}
     out = call("runs", "diff", data.id, network.id)[1]
     assert "rmse         2      1      -1         -50" in out
+    assert f"before  {data.id}\nafter   {network.id}\n" in out
+    out = call("runs", "diff", network.id, data.id)[1]
+    assert "rmse         1      2       1         100" in out
+    inputs = json.loads(call("runs", "diff", network.id, data.id, "--json")[1])["inputs"]
+    assert inputs == {"data": {"before": data.result_hash, "after": None}}
     assert "nothing differs" in call("runs", "diff", data.id, data.id)[1]
 
 
@@ -51,6 +62,34 @@ def test_verify_names_the_file_and_fails(call, made: tuple[Run, Run]) -> None:
     code, out, err = call("runs", "verify")
     assert code == 3 and "metrics.json: hash does not match" in out and "1 of 2 runs" in err
     assert call("runs", "verify", data.id)[0] == 0
+
+
+@pytest.mark.parametrize("damage", ["flipped", "torn", "gone"])
+def test_a_damaged_manifest_is_named_by_verify_and_refused_as_an_input(
+    call, made: tuple[Run, Run], damage: str
+) -> None:
+    data, network = made
+    manifest = data.path / "run.json"
+    whole = manifest.read_bytes()
+    if damage == "gone":
+        manifest.unlink()
+    else:
+        manifest.write_bytes(whole[:99] if damage == "torn" else whole.replace(b'"gen-data"', b'"gen-eata"', 1))
+    what = "sealed file is missing" if damage == "gone" else "hash does not match what was sealed"
+    for refs in ((), (data.id,), ("latest:gen-data",)):
+        code, out, err = call("runs", "verify", *refs)
+        assert code == 3 and f"  run.json: {what}" in out, refs
+        assert f"1 of {1 if refs else 2} runs are not as they were sealed" in err
+    for ref in (data.id, str(data.path), "latest:gen-data"):
+        code, _, err = call("train", "--data", ref)
+        assert code == 2 and f"error: {what} - {manifest}" in " ".join(err.split()), ref
+    code, out, _ = call("runs", "replay", network.id)
+    assert code == 3 and f"cause: input: data: {what} ({manifest})" in out
+    for command in ("show", "report"):
+        code, _, err = call("runs", command, data.id)
+        assert code == 2 and f"error: {what}" in " ".join(err.split()), command
+    assert what in call("runs", "ls")[1]
+    assert "broken" in call("runs", "lineage", network.id)[1]
 
 
 def test_rm_asks_and_refuses_to_break_lineage(call, made: tuple[Run, Run], monkeypatch: pytest.MonkeyPatch) -> None:

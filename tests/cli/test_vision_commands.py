@@ -15,11 +15,13 @@ import cv2
 import numpy as np
 import pytest
 
-from wristctl.cli.calibrate_camera import look
+from wristctl.cli.operator import TerminalOperator
+from wristctl.cli.progress import Terminal
 from wristctl.config.vision import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, open_run
 from wristctl.records.manifest import command_of
+from wristctl.studies.camera_views import look
 from wristctl.vision.board_shots import board_shots
 from wristctl.vision.camera import FolderCamera, Frame
 from wristctl.vision.scene import Scene
@@ -153,8 +155,9 @@ def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
     monkeypatch.setattr("typer.prompt", lambda said, **_: asked.append(said))
     progress = contextlib.nullcontext(lambda *_, **__: None)
     session: Any = SimpleNamespace(
-        settings=settings, run=SimpleNamespace(file=file), progress=lambda *_: progress, console=None
-    )
+        study=SimpleNamespace(calibrate_camera=settings), findings=SimpleNamespace(file=file),
+        progress=lambda *_: progress, operator=TerminalOperator(Terminal(), False, frozenset()),
+    )  # fmt: skip
     album = look(session)
     assert len(album.views) == 8 and cameras[0].closed
     assert asked == ["Lay the board in the bending plane, then press Enter"]

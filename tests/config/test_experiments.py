@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import yaml
 
-from wristctl.cli import compare, simulate
 from wristctl.config.control import Row
 from wristctl.config.errors import UserError
 from wristctl.config.explain import located
@@ -21,6 +20,8 @@ from wristctl.config.study import Study
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
 from wristctl.records.start import fingerprint
+from wristctl.studies import compare, simulate
+from wristctl.studies.inputs import Inputs
 
 EXPERIMENTS = sorted((Path(__file__).parents[2] / "experiments").rglob("*.yaml"))
 SECTIONS = {field.alias or name: name for name, field in Study.model_fields.items()}
@@ -144,7 +145,7 @@ def _refusal(file: Path) -> UserError:
         study, origins = read_study([file])
         for plan in (compare.plan, simulate.plan):
             try:
-                plan(study, {})
+                plan(study, Inputs())
             except UserError as error:
                 raise located(error, origins) from error
     return caught.value

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tarfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -35,6 +36,15 @@ def make(results: Path) -> Callable[..., Run]:
         return Run(run.path)
 
     return made
+
+
+@pytest.fixture(scope="session")
+def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results folder of sealed runs made by version 0.1.0, one of every kind; not to be written to."""
+    folder = tmp_path_factory.mktemp("earlier") / "results"
+    with tarfile.open(ROOT / "tests" / "data" / "runs" / "0.1.0.tar.xz") as archive:
+        archive.extractall(folder, filter="data")
+    return folder
 
 
 @pytest.fixture

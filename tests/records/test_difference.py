@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
-from wristctl.records.difference import Change, difference
-from wristctl.records.file_comparison import compare_files
-from wristctl.records.lineage import ancestry, dependents
+from wristctl.records.difference import Change, changes, difference
+from wristctl.records.lineage import Ancestor, ancestry, dependents, input_run
+from wristctl.records.manifest import Code
 from wristctl.records.query import entries
 from wristctl.records.remove import removable, remove
+from wristctl.records.replay import changed_inputs
 from wristctl.records.tags import change_tags, read_tags
 
 
@@ -56,6 +58,85 @@ def test_another_machine_package_and_code_file_are_named(results: Path) -> None:
     assert [each.name for each in found.code] == ["tree", a.file("code.txt").read_text().splitlines()[0][66:]]
 
 
+def test_each_fact_of_the_machine_is_named(results: Path) -> None:
+    a, b = _run(results, "tune", Study()), _run(results, "tune", Study())
+    other = {"python": "3.0.0", "os": "another", "machine": "arm64", "cores": 1000, "threads": {"OMP_NUM_THREADS": "7"}}
+    b.__dict__["manifest"] = a.manifest.model_copy(
+        update={"environment": a.manifest.environment.model_copy(update=other)}
+    )
+    found = {each.name: (each.before, each.after) for each in difference(a, b).environment}
+    before = a.manifest.environment
+    assert found == {
+        **{name: (getattr(before, name), other[name]) for name in ("python", "os", "machine", "cores")},
+        "OMP_NUM_THREADS": (before.threads.get("OMP_NUM_THREADS"), "7"),
+    }
+
+
+def test_the_code_is_named_by_version_commit_and_changes(results: Path) -> None:
+    a, b = _run(results, "tune", Study()), _run(results, "tune", Study())
+    commits = {"before": "0123456789abcdef", "after": "fedcba9876543210"}
+    for run, (name, commit), dirty in zip((a, b), commits.items(), (False, True), strict=True):
+        run.manifest.code = Code(version=name, commit=commit, dirty=dirty, tree_sha256=4 * commit)
+    assert difference(a, b).code == [
+        Change("version", "before", "after"),
+        Change("commit", "0123456789ab", "fedcba987654 with changes"),
+        Change("tree", "0123456789ab", "fedcba987654"),
+    ]
+    b.manifest.code = a.manifest.code.model_copy(update={"commit": None, "tree_sha256": 64 * "0"})
+    assert difference(a, b).code[0] == Change("commit", "0123456789ab", None)
+    b.manifest.code = a.manifest.code.model_copy(update={"version": "2", "commit": None})
+    assert difference(a, b).code == [], "the same files are the same code, whatever they are called"
+
+
+def test_a_value_of_another_type_is_a_change_and_what_is_absent_is_none() -> None:
+    before = {"a": 1, "b": 1, "c": "x", "d": None}
+    after = {"c": "x", "b": True, "a": 1.0, "e": (1, 2)}
+    assert changes(before, after) == [Change("a", 1, 1.0), Change("b", 1, True), Change("e", None, (1, 2))]
+    assert changes(before, before) == []
+
+
+def test_an_input_differs_by_its_result_and_not_by_its_name(results: Path) -> None:
+    first, same, other = (_run(results, "train", Study(), rmse) for rmse in (1.0, 1.0, 2.0))
+    assert first.id != same.id
+    a, b, c = (
+        _run(results, "tune", load_study([], [f"tune.network={read.id}"]), inputs={"network": read})
+        for read in (first, same, other)
+    )
+    assert not any(vars(difference(a, b)).values()), "another run with the same result is no difference"
+    found = difference(a, c)
+    assert found.inputs == [Change("network", first.result_hash, other.result_hash)] and found.config == []
+
+
+def test_an_input_is_looked_for_beside_the_run_and_then_where_it_was(results: Path, tmp_path: Path) -> None:
+    data = _run(results, "gen-data", Study())
+    network = _run(results, "train", Study(), inputs={"data": data})
+    moved = shutil.copytree(results, tmp_path / "moved")
+    (record,) = network.manifest.inputs
+    assert input_run(Run(moved / network.id), record).path == moved / data.id
+    shutil.rmtree(moved / data.id)
+    assert input_run(Run(moved / network.id), record).path == data.path
+    shutil.rmtree(data.path)
+    with pytest.raises(UserError, match="the data run is gone"):
+        input_run(Run(moved / network.id), record)
+
+
+def test_an_input_with_another_result_says_so_in_the_lineage(results: Path) -> None:
+    data = _run(results, "gen-data", Study())
+    network = _run(results, "train", Study(), inputs={"data": data})
+    assert [each.state for each in ancestry(network).inputs] == ["ok"]
+    other = _run(results, "gen-data", Study(), 2.0)
+    shutil.rmtree(data.path)
+    other.path.rename(data.path)
+    assert [each.state for each in ancestry(network).inputs] == ["another result than was read"]
+    assert changed_inputs(network) == [f"input: data: another result than was read ({data.path})"]
+
+
+def test_a_tree_of_lineage_is_drawn(results: Path) -> None:
+    leaf = Ancestor("d", "gen-data", "ok", "data")
+    tree = Ancestor("c", "compare", "ok", "", (Ancestor("n", "train", "ok", "network", (leaf,)), leaf))
+    assert list(tree.lines()) == ["c (ok)", "├─ network: n (ok)", "│  └─ data: d (ok)", "└─ data: d (ok)"]
+
+
 def test_lineage_goes_back_to_the_data_and_forward_to_what_was_built_on_it(results: Path) -> None:
     data = _run(results, "gen-data", Study())
     network = _run(results, "train", Study(), inputs={"data": data})
@@ -78,34 +159,3 @@ def test_lineage_goes_back_to_the_data_and_forward_to_what_was_built_on_it(resul
 def test_a_running_run_cannot_be_removed(results: Path) -> None:
     with start_run("tune", Study(), "", results) as live, pytest.raises(UserError, match="still going on"):
         removable([Run(live.path)], force=True)
-
-
-def test_files_are_alike_within_tolerance_or_differ_at_a_named_place(tmp_path: Path) -> None:
-    time = np.arange(5) / 10
-    a, b = tmp_path / "a.csv", tmp_path / "b.csv"
-    frame = pd.DataFrame({"time": time, "theta": np.sin(time), "rate": np.cos(time)})
-    frame.to_csv(a, index=False)
-    frame.assign(theta=frame["theta"] * (1 + 1e-12)).to_csv(b, index=False)
-    assert compare_files(a, b).verdict == "within tolerance"
-    rate = frame["rate"].to_numpy().copy()
-    rate[3:] += 1e-3
-    frame.assign(rate=rate).to_csv(b, index=False)
-    assert compare_files(a, b) == ("differs", "column rate from time 0.3 s; largest difference 0.001")
-    frame[:-1].to_csv(b, index=False)
-    assert compare_files(a, b) == ("differs", "5 rows of 3 columns before, 4 rows of 3 columns now")
-
-
-def test_arrays_and_text_are_compared_by_their_numbers(tmp_path: Path) -> None:
-    a, b = tmp_path / "a.npz", tmp_path / "b.npz"
-    time, theta = np.arange(4) / 2, np.zeros((2, 4))
-    np.savez(a, time=time, theta=theta)
-    np.savez(b, time=time, theta=theta + np.array([[0, 0, 1, 1], [0, 0, 0, 1]]))
-    assert compare_files(a, b).detail == "array theta from row [0, 2]; largest difference 1"
-    first, second = tmp_path / "a.json", tmp_path / "b.json"
-    first.write_text('{"rmse": 0.1,\n"n": 5}')
-    second.write_text('{"rmse": 0.10000000001,\n"n": 5}')
-    assert compare_files(first, second).verdict == "within tolerance"
-    second.write_text('{"rmse": 0.1,\n"n": 6}')
-    assert compare_files(first, second) == ("differs", "line 2: 5 before, 6 now")
-    second.write_text('{"rmse": 0.1,\n"m": 5}')
-    assert compare_files(first, second) == ("differs", "from line 2")

@@ -32,6 +32,13 @@ def test_latest_passes_over_runs_that_did_not_end_well(make: Make, results: Path
     assert open_run("latest:gen-data", results).path == good.path
 
 
+def test_the_latest_is_the_one_that_began_last_whatever_it_is_called(make: Make, results: Path) -> None:
+    first, last = make(label="a"), make(label="b")
+    last.path.rename(results / "20200101T000000Z-gen-data-b")
+    first.path.rename(results / "renamed")
+    assert open_run("latest:gen-data", results).id == "20200101T000000Z-gen-data-b"
+
+
 def test_the_latest_is_right_whatever_the_index_says(make: Make, results: Path) -> None:
     older, newer = make(label="older"), make(label="newer")
 

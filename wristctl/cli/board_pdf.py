@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from wristctl.cli.options import Debug
 from wristctl.config.errors import UserError
 
 app = typer.Typer(add_completion=False)
@@ -22,7 +23,7 @@ def board_pdf(
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override one: board.square=0.02 [m].")
     ] = None,
-    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False,
+    debug: Debug = False,
 ) -> None:
     """Write the calibration board and the two markers as a PDF, to print at true scale.
 

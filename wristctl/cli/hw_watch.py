@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Out
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS
 from wristctl.config.errors import UserError
 from wristctl.records import Run, open_run
 

@@ -1,24 +1,55 @@
-"""The person beside a real wrist: told what to do, and asked before anything moves."""
+"""The person at the terminal: told what goes on and what to do, and asked before anything moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import typer
 
-from wristctl.cli.command import Session
+from wristctl.cli.progress import PLAIN, Terminal
 from wristctl.config.errors import UserError
+from wristctl.studies.session import Session
+
+if TYPE_CHECKING:
+    from wristctl.trial.control_loop import Shown
+    from wristctl.trial.trials import Trial
+
+YES = {"yes": "Ask nobody before the motors of real hardware move."}
+"""The flag of commands that move motors, and its help."""
 
 
-def operator(session: Session) -> Callable[[str], None]:
-    """Asks on the terminal, and takes nothing but yes; with --yes everything counts as done."""
+@dataclass(frozen=True)
+class TerminalOperator:
+    """Whoever typed the command; with the flag `yes` everything counts as agreed to."""
 
-    def ask(what: str) -> None:
-        with session.console.aside():
+    console: Terminal
+    quiet: bool
+    flags: frozenset[str]
+    """those of the command's flags that were given"""
+
+    def tell(self, text: str) -> None:
+        """A text on stderr, also when the command is to be quiet."""
+        self.console.print(text, **PLAIN)
+
+    def confirm(self, what: str) -> None:
+        """Asks on the terminal, and takes nothing but yes."""
+        with self.console.aside():
             typer.echo(what, err=True)
-            if "yes" in session.flags:
+            if "yes" in self.flags:
                 return
             if typer.prompt("Type yes to go on", default="no", show_default=False, err=True) != "yes":
                 raise UserError("nothing was moved further", fix="type yes, or --yes for scripted use", exit_code=3)
 
-    return ask
+    def wait_for(self, what: str) -> None:
+        """Waits for Enter."""
+        typer.prompt(what, default="", show_default=False, err=True)
+
+    def watch(self, trials: Sequence[Trial], session: Session) -> AbstractContextManager[Shown]:
+        """The trials in a live panel on a terminal, as plain lines elsewhere."""
+        from wristctl.cli.trial_panel import panel_shown, trials_counted
+
+        live = self.console.is_terminal and not self.quiet
+        return panel_shown(self.console, trials) if live else trials_counted(session, trials)

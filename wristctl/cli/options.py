@@ -12,6 +12,11 @@ import typer
 
 from wristctl.cli.completion import study_files
 
+Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
@@ -32,17 +37,17 @@ class Options:
         typer.Option("--set", metavar="KEY=VALUE", help="Override one setting: a.b=value."),
     ] = None
     seed: Annotated[int | None, typer.Option("--seed", help="Root of every random stream.")] = None
-    out: Annotated[Path, typer.Option("--out", help="Folder of run directories.")] = Path("results")
+    out: Out = Path("results")
     label: Annotated[
         str | None, typer.Option("--label", help="Part of the run's name; by default the study file's.")
     ] = None
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the resolved study and the plan; write nothing.")
     ] = False
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")] = False
+    as_json: Json = False
+    quiet: Quiet = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details too.")] = False
-    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks.")] = False
+    debug: Debug = False
 
 
 class Own(NamedTuple):

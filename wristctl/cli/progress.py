@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
 from rich.console import Console
@@ -21,17 +20,14 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from wristctl.cli.tables import number
-
-log = logging.getLogger(__name__)
-
-Event = Callable[..., None]
-Done = Callable[..., None]
+from wristctl.studies.counting import Count, counting
+from wristctl.studies.session import Done, Event
 
 PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
 """How the console prints text that is not rich's markup."""
 
-_LINE_EVERY, _EVENT_EVERY = 10.0, 1.0
+_LINE_EVERY = 10.0
+"""Seconds between two plain lines."""
 
 
 class Terminal(Console):
@@ -88,29 +84,6 @@ def listening(quiet: bool, verbose: bool) -> Iterator[Terminal]:
         logger.removeHandler(handler)
 
 
-@dataclass
-class _Count:
-    """How far something has come, and the figures beside it."""
-
-    what: str
-    total: int | None
-    unit: str
-    count: int = 0
-    figures: dict[str, float] = field(default_factory=dict)
-
-    def beside(self) -> str:
-        return ", ".join(f"{name} {number(float(value))}" for name, value in self.figures.items())
-
-    def line(self) -> str:
-        of = "" if self.total is None else f" of {self.total}"
-        counted = f"{self.count}{of} {self.unit}".rstrip() if self.count else ""
-        shown = ", ".join(part for part in (counted, self.beside()) if part)
-        return f"{self.what}: {shown}" if shown else self.what
-
-    def event(self) -> dict[str, Any]:
-        return {"what": self.what, "total": self.total, "count": self.count, **self.figures}
-
-
 @contextmanager
 def progress(console: Console, event: Event, what: str, total: int | None, unit: str, quiet: bool) -> Iterator[Done]:
     """Show how far `what` has come; yields `done(count, **figures)`, to be called as often as one likes.
@@ -121,29 +94,20 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
     live, lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
     bar = Progress(*_columns(), console=console, transient=True, disable=not live)
     task = bar.add_task(what, total=total, figures="")
-    state = _Count(what, total, unit)
-    began = last_line = time.monotonic()
-    last_event = began - _EVENT_EVERY
+    last_line = time.monotonic()
 
-    def done(count: int = 0, **figures: float) -> None:
-        nonlocal last_line, last_event
-        state.count = count
-        state.figures |= figures
-        bar.update(task, completed=count, figures=state.beside())
+    def show(count: Count) -> None:
+        nonlocal last_line
+        bar.update(task, completed=count.count, figures=count.beside())
         instant = time.monotonic()
-        if instant - last_event >= _EVENT_EVERY:
-            last_event = instant
-            event("progress", **state.event())
         if lines and instant - last_line >= _LINE_EVERY:
             last_line = instant
-            console.print(state.line(), **PLAIN)
+            console.print(count.line(), **PLAIN)
 
     if lines and total is None:
         console.print(f"{what} ...", **PLAIN)
-    with bar:
+    with counting(event, what, total, unit, show) as done, bar:
         yield done
-    event("progress", **state.event())
-    log.info("%s, %.1f s", state.line(), time.monotonic() - began)
 
 
 def _columns() -> tuple[ProgressColumn, ...]:

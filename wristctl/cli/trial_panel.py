@@ -12,7 +12,8 @@ from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table as Grid
 
-from wristctl.cli.command import Session
+from wristctl.cli.progress import Terminal
+from wristctl.studies.session import Session
 from wristctl.trial.control_loop import Shown
 from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import ACTIVE
@@ -45,7 +46,7 @@ class _Panel:
             grid.add_row(name, *values, unit)
         grid.add_row("board", row["state"], "marker", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")
-        title = "between trials" if number < 0 else told(self._trials[number], len(self._trials))
+        title = "between trials" if number < 0 else _title(self._trials[number], len(self._trials))
         whole = Grid.grid()
         whole.add_row(grid)
         whole.add_row(ProgressBar(total=len(self._trials), completed=self._begun - (number >= 0), width=60))
@@ -53,14 +54,16 @@ class _Panel:
 
 
 @contextmanager
-def trials_shown(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
-    """Show each tick that is handed in, and count the trials."""
-    live = session.console.is_terminal and not session.quiet
-    if live:
-        panel = _Panel(trials)
-        with Live(panel, console=session.console, refresh_per_second=_PICTURES, transient=True):
-            yield panel.take
-        return
+def panel_shown(console: Terminal, trials: Sequence[Trial]) -> Iterator[Shown]:
+    """Show each tick that is handed in."""
+    panel = _Panel(trials)
+    with Live(panel, console=console, refresh_per_second=_PICTURES, transient=True):
+        yield panel.take
+
+
+@contextmanager
+def trials_counted(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
+    """Count the trials by the ticks that are handed in."""
     with session.progress("trials", len(trials), "trials") as done:
         begun = -1
 
@@ -74,7 +77,7 @@ def trials_shown(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
         done(begun + 1)
 
 
-def told(trial: Trial, count: int) -> str:
+def _title(trial: Trial, count: int) -> str:
     """A trial in a few words."""
     pushed = f", pushed with {trial.push:g} N" if trial.push else ""
     return f"trial {trial.number + 1} of {count}: {trial.direction}{pushed}"

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wristctl.comparison.paper import FACTOR
 from wristctl.config.audit import Claim, VerdictName
 from wristctl.config.control import CompareSettings, Row
-from wristctl.config.errors import UserError
 from wristctl.config.loop import LOOPS, Reference
 from wristctl.config.study import Study
-from wristctl.records import Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TRAININGS = {"table1": "experiments/table1.yaml", "selection": "experiments/model_selection.yaml"}
 """Evidence that a train run gives, and the experiment it is a run of."""
+
+Metrics = Mapping[str, Mapping[str, Any]]
+"""value, interval and n of a training's metrics, by name"""
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,6 @@ class Judgement:
     reason: str
     shown_by: tuple[str, ...] = ()
     """loops of a comparison, or a key of TRAININGS"""
-
-
-def check_trainings(claims: Sequence[Claim], trainings: Mapping[str, Run]) -> None:
-    """UserError where one of the train runs, by keys of TRAININGS, lacks a metric that a claim asks for."""
-    for claim in claims:
-        run = trainings.get(claim.evidence)
-        if run is not None and claim.metric not in run.metrics:
-            raise UserError(
-                f"claim {claim.id} needs the metric '{claim.metric}', which this run does not have",
-                str(run.path),
-                f"give --{claim.evidence} a run of `wristctl train {TRAININGS[claim.evidence]}`",
-            )
 
 
 def evidence_study(study: Study, claims: Sequence[Claim], loop: str) -> Study:
@@ -62,8 +51,8 @@ def evidence_study(study: Study, claims: Sequence[Claim], loop: str) -> Study:
     return study.model_copy(update={"compare": compared})
 
 
-def judge(claim: Claim, found: Mapping[str, pd.DataFrame], trainings: Mapping[str, Run]) -> Judgement:
-    """Judge one claim by the comparisons of each loop and by the train runs there are, by keys of TRAININGS."""
+def judge(claim: Claim, found: Mapping[str, pd.DataFrame], trainings: Mapping[str, Metrics]) -> Judgement:
+    """Judge one claim by the comparisons of each loop and by the trainings there are, by keys of TRAININGS."""
     if claim.evidence == "text":
         assert claim.verdict is not None
         return Judgement(claim, np.nan, np.nan, claim.verdict, claim.reason)
@@ -72,8 +61,8 @@ def judge(claim: Claim, found: Mapping[str, pd.DataFrame], trainings: Mapping[st
     if claim.evidence == "hardware":
         return Judgement(claim, np.nan, np.nan, "open", claim.reason)
     if claim.evidence in TRAININGS:
-        run = trainings.get(claim.evidence)
-        return _by_training(claim, run) if run else _untrained(claim)
+        metrics = trainings.get(claim.evidence)
+        return _untrained(claim) if metrics is None else _by_training(claim, metrics)
     ranges = {loop: _range(claim, table) for loop, table in found.items()}
     known = {loop: values for loop, values in ranges.items() if values is not None}
     return _by_loops(claim, known)
@@ -94,10 +83,10 @@ def _untrained(claim: Claim) -> Judgement:
     return Judgement(claim, np.nan, np.nan, "open", how)
 
 
-def _by_training(claim: Claim, run: Run) -> Judgement:
+def _by_training(claim: Claim, metrics: Metrics) -> Judgement:
     """Whether the paper's value lies in the 95 % interval over the seeds, or within FACTOR of it."""
     assert claim.value is not None
-    found = run.metrics[str(claim.metric)]
+    found = metrics[str(claim.metric)]
     ours = np.nan if found["value"] is None else float(found["value"])
     low, high = found.get("interval") or (ours, ours)
     slack = 1.0 if claim.exact else FACTOR

@@ -6,16 +6,37 @@ import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+from wristctl.config.wording import Phrase, worded
+
 
 class UserError(Exception):
     """Something the user can mend: what is wrong, where (file, line, key path), how to fix it.
 
-    `exit_code` is 2 for usage and configuration, 3 for a failed check, 4 for hardware, 5 for a safety stop.
+    `exit_code` is 2 for usage and configuration, 3 for a failed check, 4 for hardware, 5 for a safety stop. Place and
+    fix may be phrases with arguments, settings and commands in them, which are worded as the command line has them, or,
+    where `in_python` is set on the way to a notebook, as Python has them.
     """
 
-    def __init__(self, what: str, where: str = "", fix: str = "", exit_code: int = 2) -> None:
+    in_python = False
+
+    def __init__(self, what: str, where: Phrase = "", fix: Phrase = "", exit_code: int = 2) -> None:
         super().__init__(what, where, fix, exit_code)
-        self.what, self.where, self.fix, self.exit_code = what, where, fix, exit_code
+        self.what, self.exit_code = what, exit_code
+        self._where, self._fix = where, fix
+
+    @property
+    def where(self) -> str:
+        """File, line and key path, or whatever tells the place."""
+        return worded(self._where, self.in_python)
+
+    @property
+    def fix(self) -> str:
+        """What to do about it."""
+        return worded(self._fix, self.in_python)
+
+    def at(self, where: Phrase) -> UserError:
+        """The same error at a place that is better known."""
+        return UserError(self.what, where, self._fix, self.exit_code)
 
     def __str__(self) -> str:
         parts = [self.what, self.where, self.fix and f"fix: {self.fix}"]
@@ -28,8 +49,7 @@ def under(path: str) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        where = f"{path}.{error.where}" if error.where else path
-        raise UserError(error.what, where, error.fix, error.exit_code) from error
+        raise error.at(f"{path}.{error.where}" if error.where else path) from error
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:

@@ -11,9 +11,10 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.keys import field_at, keys_of, unit_of
 from wristctl.config.strict_yaml import KeyPath
+from wristctl.config.wording import Phrase
 
 
-def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserError:
+def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     """The most telling of the errors found; `origins` says the file and line (or override) of each key."""
     details = error.errors(include_url=False)
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
@@ -25,11 +26,11 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, str]) -> UserErr
             path = whole = (*path, key)
         elif path and (isinstance(key, int) or field_at((*whole, key))[1] is not field_at(whole)[1]):
             whole = (*whole, key)
-    where = f"{origins[path]}: {'.'.join(map(str, whole))}" if path else ""
+    where = (origins[path], f": {'.'.join(map(str, whole))}") if path else ""
     return UserError(_what(detail), where, _fix(detail))
 
 
-def located(error: UserError, origins: Mapping[KeyPath, str]) -> UserError:
+def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     """The error with the file and line (or override) of the key path that it names; as it is where it names none."""
     path: KeyPath = ()
     for key in error.where.split("."):
@@ -37,7 +38,7 @@ def located(error: UserError, origins: Mapping[KeyPath, str]) -> UserError:
         if at not in origins:
             break
         path = at
-    return UserError(error.what, f"{origins[path]}: {error.where}", error.fix, error.exit_code) if path else error
+    return error.at((origins[path], f": {error.where}")) if path else error
 
 
 def _location(detail: Any) -> KeyPath:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from wristctl.config.strict_yaml import KeyPath
+from wristctl.config.wording import Phrase, worded
 
 log = logging.getLogger(__name__)
 
@@ -16,12 +17,12 @@ FORMER = {
 """The end of a key path, and what has come in its place."""
 
 
-def leave_out_former(data: dict[str, Any], origins: Mapping[KeyPath, str]) -> None:
+def leave_out_former(data: dict[str, Any], origins: Mapping[KeyPath, Phrase]) -> None:
     """Take former keys out of what files say; a warning names each kind of them once, with its first place."""
     found: dict[tuple[str, str], KeyPath] = {}
     _take_out(data, (), found)
     for former, path in found.items():
-        where = f"{origins[path]}: " if path in origins else ""
+        where = f"{worded(origins[path])}: " if path in origins else ""
         log.warning("%s%s is no longer a setting: %s", where, ".".join(map(str, path)), FORMER[former])
 
 

@@ -14,6 +14,7 @@ from wristctl.config.former import leave_out_former
 from wristctl.config.keys import keys_of, section_keys
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
+from wristctl.config.wording import Phrase, Setting
 
 
 def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None) -> Study:
@@ -28,15 +29,15 @@ def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), comman
 
 def read_study(
     files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None
-) -> tuple[Study, Mapping[KeyPath, str]]:
+) -> tuple[Study, Mapping[KeyPath, Phrase]]:
     """As load_study, with the file and line (or override) of each key that was given."""
     data: dict[str, Any] = {}
-    origins: dict[KeyPath, str] = {}
+    origins: dict[KeyPath, Phrase] = {}
     for file in files:
         _merge(data, _read(file), str(file), origins)
     leave_out_former(data, origins)
     for override in overrides:
-        _merge(data, _override(override, command), f"--set {override}", origins)
+        _merge(data, _override(override, command), Setting(override), origins)
     try:
         return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
@@ -60,22 +61,25 @@ def _read(file: Path) -> Document:
 
 def _override(text: str, command: str | None) -> Document:
     dotted, equals, value = text.partition("=")
-    where = f"--set {text}"
+    where = Setting(text)
     if not equals or not dotted:
-        raise UserError("an override is key=value", where, "for example --set wrist.length=0.09")
+        raise UserError("an override is key=value", where, ("for example ", Setting("wrist.length=0.09")))
     keys = dotted.split(".")
     own, top = section_keys(command), keys_of(Study)
     if command and keys[0] in own:
         keys.insert(0, command)
     elif keys[0] not in top:
         raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], [*own, *top]))
-    data = parse_yaml(value, where).data
+    try:
+        data = parse_yaml(value, "").data
+    except UserError as error:
+        raise error.at((where, error.where)) from error
     for key in reversed(keys):
         data = {key: data}
     return Document(data, {})
 
 
-def _merge(data: dict[str, Any], document: Document, source: str, origins: dict[KeyPath, str]) -> None:
+def _merge(data: dict[str, Any], document: Document, source: Phrase, origins: dict[KeyPath, Phrase]) -> None:
     def into(target: dict[str, Any], mapping: Mapping[str, Any], path: KeyPath) -> None:
         for key, value in mapping.items():
             at = (*path, key)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
+from wristctl.config.wording import Setting
 from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
@@ -139,10 +140,11 @@ def refuse(lacking: Mapping[str, float], offered: list[Addition], condition: flo
     best = next((each for each in offered if each.enough), None)
     add = best.what if best else f"repetitions of {min(offered, key=_worst).what}"
     name = next(iter(lacking))
+    fixed = Setting(f"fix.{name}={start[name]:g}", "identify")
     raise UserError(
         f"these trials do not identify {told}; condition number {condition:.3g}",
         "identify",
-        f"add {add}; or hold what you know otherwise, for example --set fix.{name}={start[name]:g}",
+        (f"add {add}; or hold what you know otherwise, for example ", fixed),
         exit_code=3,
     )
 

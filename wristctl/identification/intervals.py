@@ -21,6 +21,8 @@ from wristctl.identification.unknowns import UNKNOWNS
 Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959964
+ALIKE = 0.2
+"""Autocorrelation of neighbouring residuals beyond which the model is said to miss something."""
 _LASTING = 30
 """Frames over which small errors are alike: half a second at 60 a second."""
 
@@ -44,6 +46,11 @@ class Knowledge:
     def half_widths(self) -> Array:
         """Half the 95 % interval of each coordinate."""
         return NORMAL_95 * self.deviation
+
+    @property
+    def misses_something(self) -> bool:
+        """Whether neighbouring residuals are so much alike that not the camera's noise but the model is behind it."""
+        return self.autocorrelation > ALIKE
 
     @property
     def correlation(self) -> Array:

@@ -14,6 +14,7 @@ from safetensors.numpy import save
 from wristctl.config.errors import UserError
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
+from wristctl.config.wording import Call
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing
@@ -118,7 +119,7 @@ def training_record(path: Path) -> dict[str, object]:
 
 def _read(path: Path) -> tuple[_Header, dict[str, Array]]:
     if not path.is_file():
-        raise UserError("there is no such network file", where=str(path), fix="train one with `wristctl train`")
+        raise UserError("there is no such network file", str(path), ("train one with `", Call("train"), "`"))
     try:
         with safe_open(path, "numpy") as file:
             text = (file.metadata() or {}).get(ENTRY)

@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from wristctl.config.learning import NetworkSettings
 from wristctl.wrist.kinematics import Array
 
 LEVEL = 0.05
@@ -77,3 +78,15 @@ def holm(p: Sequence[float]) -> list[float]:
         least = max(least, min(1.0, (len(p) - place) * p[index]))
         corrected[index] = least
     return corrected
+
+
+def trained_alike(networks: Mapping[str, NetworkSettings]) -> dict[str, list[str]]:
+    """Names of networks by how they were trained, `adamw-standardised` for one: only these can be ranked.
+
+    A network that was trained as no other was is left out.
+    """
+    groups: dict[str, list[str]] = {}
+    for name, settings in networks.items():
+        label = f"{settings.optimiser}-{'standardised' if settings.standardise else 'raw'}"
+        groups.setdefault(label, []).append(name)
+    return {label: names for label, names in groups.items() if len(names) > 1}

@@ -8,11 +8,12 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import wristctl
 from wristctl.records.files import files_below, sha256_of, sha256_of_list
 from wristctl.records.manifest import Code
+from wristctl.version import __version__
 
-_PACKAGE = Path(wristctl.__file__).resolve().parent
+_PACKAGE = Path(__file__).resolve().parents[1]
+_SOURCES = ("--", ".", ":(exclude,glob)**/__pycache__/**")
 
 
 def code_state() -> tuple[Code, bytes, str]:
@@ -22,7 +23,7 @@ def code_state() -> tuple[Code, bytes, str]:
     """
     sources = [(name, sha256_of(_PACKAGE / name)) for name in files_below(_PACKAGE) if "__pycache__" not in name]
     listing = "".join(f"{digest}  {name}\n" for name, digest in sources)
-    code = Code(version=wristctl.__version__, tree_sha256=sha256_of_list(sources))
+    code = Code(version=__version__, tree_sha256=sha256_of_list(sources))
     commit = _git("rev-parse", "HEAD")
     if not commit or not _git("ls-files", "--", "__init__.py"):
         return code, b"", listing
@@ -39,8 +40,8 @@ def _patch() -> bytes:
         copy = Path(scratch) / "index"
         if index and (_PACKAGE / index.decode().strip()).is_file():
             shutil.copyfile(_PACKAGE / index.decode().strip(), copy)
-        _git("add", "--intent-to-add", "--", ".", index=copy)
-        return _git("diff", "--binary", "HEAD", "--", ".", index=copy) or b""
+        _git("add", "--intent-to-add", *_SOURCES, index=copy)
+        return _git("diff", "--binary", "HEAD", *_SOURCES, index=copy) or b""
 
 
 def _git(*arguments: str, index: Path | None = None) -> bytes | None:

@@ -16,8 +16,8 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 def environment_state() -> tuple[Environment, str]:
     """The environment, and every installed distribution as `name==version` lines."""
-    about = [each.metadata for each in metadata.distributions()]  # read anew at every mention
-    found = [((each["Name"] or "").lower(), each["Version"]) for each in about]
+    described = [each.metadata for each in metadata.distributions()]  # read anew at every mention
+    found = [((each["Name"] or "").lower(), each["Version"]) for each in described]
     installed = dict(reversed(found))  # the first on the path is the one that is imported
     listing = "".join(f"{name}=={version}\n" for name, version in sorted(installed.items()))
     environment = Environment(

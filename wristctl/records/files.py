@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.wording import OUT
 
 
 @contextmanager
@@ -26,7 +27,7 @@ def replacing(path: Path) -> Iterator[Path]:
         sync(path.parent)
     except OSError as error:
         raise UserError(
-            f"cannot write: {error.strerror or error}", str(path), "free space or choose another --out"
+            f"cannot write: {error.strerror or error}", str(path), ("free space or choose another ", OUT)
         ) from error
     finally:
         temporary.unlink(missing_ok=True)

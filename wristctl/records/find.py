@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
+from wristctl.config.wording import OUT, Call
 from wristctl.records.index import RESULTS, indexed, run_names
 from wristctl.records.manifest import MANIFEST, command_of
-from wristctl.records.run import Run
+from wristctl.records.run import NAME_A_RUN, Run
 
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
@@ -18,7 +19,8 @@ def list_runs(results: Path = RESULTS) -> list[Run]:
 def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     """The run that `ref` names: a path, an id in `results` or its beginning, `latest:<kind>` (that ended ok).
 
-    Raises UserError where there is none, more than one, or what is there is not a run.
+    Raises UserError where there is none, more than one, or what is there is not a run. A run whose manifest was
+    changed after sealing is one still; reading the manifest raises.
     """
     if str(ref).startswith("latest:"):
         return _latest(str(ref), results)
@@ -28,46 +30,54 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     if str(ref) and path.exists():
         return _readable(path)
     if len(path.parts) != 1:
-        raise UserError("no such run", repr(str(ref)), "name a run that `wristctl runs ls` shows")
+        raise UserError("no such run", repr(str(ref)), NAME_A_RUN)
     runs = {run.id: run for run in list_runs(results)}
     if path.name in runs:
         return _readable(runs[path.name].path)
-    begun = [run for run in runs.values() if run.id.startswith(path.name)]
-    if len(begun) == 1:
-        return _readable(begun[0].path)
-    if begun:
+    matches = [run for run in runs.values() if run.id.startswith(path.name)]
+    if len(matches) == 1:
+        return _readable(matches[0].path)
+    if matches:
         raise UserError(
-            f"{len(begun)} runs begin like this",
+            f"{len(matches)} runs begin like this",
             str(ref),
-            f"write more of it: {', '.join(run.id for run in begun[:3])}",
+            f"write more of it: {', '.join(run.id for run in matches[:3])}",
         )
-    fix = meant(path.name, runs) if len(runs) > 0 else "name a path, or the results folder with --out"
+    fix = meant(path.name, runs) if len(runs) > 0 else ("name a path, or the results folder with ", OUT)
     raise UserError("no such run", f"{ref} in {results}", fix)
 
 
 def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
     """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError."""
     run = open_run(ref, results)
-    if kind is not None and run.kind != kind:
-        raise UserError(f"a {run.kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}")
+    found = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
+    if kind not in (None, found):
+        raise UserError(f"a {found} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}")
     if run.state != "ok":
-        raise UserError(f"run is {run.state}, not ok", str(run.path), f"run `wristctl {command_of(run.kind)}` again")
+        again = ("run `", Call(command_of(found)), "` again")
+        raise UserError(f"run is {run.state}, not ok", str(run.path), again)
     run.check()
     return run
 
 
 def _readable(path: Path) -> Run:
     run = Run(path)
-    run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+    if not run.sealed:
+        run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
     return run
 
 
 def _latest(ref: str, results: Path) -> Run:
     kind = ref.removeprefix("latest:")
-    ended = [run for run in indexed(results, renew=False) if run.state == "ok"]
-    found = [run for run in ended if run.kind == kind]
-    if not found:
+    entries = indexed(results, renew=False)
+    ended = [run for run in entries if run.state == "ok"]
+    latest = max((run for run in ended if run.kind == kind), key=lambda run: run.started, default=None)
+    for run in (Run(results / each.id) for each in entries if each.state == "broken"):
+        stamp, _, rest = run.id.partition("-")
+        if rest.startswith(f"{kind}-") and run.sealed and (latest is None or stamp >= latest.id.partition("-")[0]):
+            return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
+    if latest is None:
         kinds = {run.kind for run in ended}
-        fix = meant(kind, kinds) if kinds else f"run `wristctl {command_of(kind)}` first"
+        fix = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
-    return Run(results / max(found, key=lambda run: run.started).id)
+    return Run(results / latest.id)

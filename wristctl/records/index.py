@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError
+from wristctl.config.wording import OUT
 from wristctl.records.manifest import MANIFEST, SUMS
 from wristctl.records.run import Run
 
@@ -48,7 +49,7 @@ def run_names(results: Path) -> list[str]:
         return []
     except OSError as error:
         raise UserError(
-            f"cannot read the results folder: {error.strerror}", str(results), "name it with --out"
+            f"cannot read the results folder: {error.strerror}", str(results), ("name it with ", OUT)
         ) from error
 
 
@@ -60,19 +61,19 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
     index anew where it was not up to date.
     """
     known = _read_index(results)
-    kept: dict[str, Any] = {}
+    current: dict[str, Any] = {}
     found = []
     for name in run_names(results):
         stamp, old = _stamp(f"{results}/{name}"), known.get(name)
         if stamp and old and old[0] == stamp:
-            entry, kept[name] = IndexEntry(**old[1]), old
+            entry, current[name] = IndexEntry(**old[1]), old
         else:
             entry = _entry(Run(results / name))
             if stamp and entry.state not in ("running", "broken", "crashed"):
-                kept[name] = [stamp, asdict(entry)]
+                current[name] = [stamp, asdict(entry)]
         found.append(entry)
-    if renew and kept != known:
-        _write_index(results, kept)
+    if renew and current != known:
+        _write_index(results, current)
     return found
 
 

@@ -22,17 +22,17 @@ class Ancestor:
     role: str = ""
     inputs: tuple[Ancestor, ...] = field(default=())
 
-    def lines(self, head: str = "", rest: str = "") -> Iterator[str]:
+    def lines(self, first_indent: str = "", indent: str = "") -> Iterator[str]:
         """The tree as text, the run itself first."""
         role = f"{self.role}: " if self.role else ""
-        yield f"{head}{role}{self.id} ({self.state})"
+        yield f"{first_indent}{role}{self.id} ({self.state})"
         for number, each in enumerate(self.inputs, 1):
             last = number == len(self.inputs)
-            yield from each.lines(rest + ("└─ " if last else "├─ "), rest + ("   " if last else "│  "))
+            yield from each.lines(indent + ("└─ " if last else "├─ "), indent + ("   " if last else "│  "))
 
 
 def ancestry(run: Run, role: str = "", state: str = "") -> Ancestor:
-    """The tree of runs behind a run; inputs that are gone or are not what was read say so as their state."""
+    """The tree of runs behind a run; inputs that are gone, broken or not what was read say so as their state."""
     inputs = []
     for each in run.manifest.inputs:
         try:
@@ -40,18 +40,27 @@ def ancestry(run: Run, role: str = "", state: str = "") -> Ancestor:
             changed = found.result_hash != each.result_sha256
             inputs.append(ancestry(found, each.role, "another result than was read" if changed else ""))
         except UserError:
-            inputs.append(Ancestor(each.run, each.kind, "gone", each.role))
+            state_now = "broken" if _path_of(run, each) else "gone"
+            inputs.append(Ancestor(each.run, each.kind, state_now, each.role))
     return Ancestor(run.id, run.kind, state or run.state, role, tuple(inputs))
 
 
 def input_run(run: Run, record: Input) -> Run:
-    """The run behind an input: beside the run that read it, or else where it was then. UserError if it is gone."""
-    for path in (run.path.parent / record.run, Path(record.path)):
-        if path.is_dir():
-            found = Run(path)
-            found.manifest  # noqa: B018 - reading it tells a run from a foreign folder
-            return found
-    raise UserError(f"the {record.role} run is gone", record.path, "bring it back beside the run that read it")
+    """The run behind an input: beside the run that read it, or else where it was then.
+
+    Raises UserError where it is gone, or its manifest is not as it was sealed.
+    """
+    path = _path_of(run, record)
+    if path is None:
+        raise UserError(f"the {record.role} run is gone", record.path, "bring it back beside the run that read it")
+    found = Run(path)
+    found.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+    return found
+
+
+def _path_of(run: Run, record: Input) -> Path | None:
+    """The folder of an input, None where it is gone."""
+    return next((path for path in (run.path.parent / record.run, Path(record.path)) if path.is_dir()), None)
 
 
 def dependents(run: Run, results: Path) -> list[str]:

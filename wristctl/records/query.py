@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError, meant
+from wristctl.config.wording import Argument, Phrase
 from wristctl.records.index import RESULTS, IndexEntry, indexed
 from wristctl.records.tags import read_tags
 
@@ -47,27 +48,29 @@ def select(
     ]
     for text in where:
         name, compare, bound = _condition(text)
-        _known(name, chosen, text)
-        chosen = [each for each in chosen if _number(each.value(name)) and compare(each.value(name), bound)]
+        _check_metric(name, chosen, text)
+        chosen = [each for each in chosen if _is_number(each.value(name)) and compare(each.value(name), bound)]
     if newer:
-        chosen = [each for each in chosen if each.started and each.started >= _before(newer, "--newer")]
+        since = _time_ago(newer, "newer")
+        chosen = [each for each in chosen if each.started and each.started >= since]
     if older:
-        chosen = [each for each in chosen if each.started and each.started < _before(older, "--older")]
+        until = _time_ago(older, "older")
+        chosen = [each for each in chosen if each.started and each.started < until]
     return chosen
 
 
 def in_order(found: Sequence[IndexEntry], by: str) -> list[IndexEntry]:
     """Sorted by a field or metric; runs that have none come last."""
-    _known(by, found, f"--sort {by}")
+    _check_metric(by, found, Argument("sort", by))
 
-    def place(each: IndexEntry) -> tuple[bool, Any]:
+    def sort_key(each: IndexEntry) -> tuple[bool, Any]:
         value = each.value(by)
         return (True, "") if value in (None, "") else (False, value)
 
-    return sorted(found, key=place)
+    return sorted(found, key=sort_key)
 
 
-def _known(name: str, found: Sequence[IndexEntry], where: str) -> None:
+def _check_metric(name: str, found: Sequence[IndexEntry], where: Phrase) -> None:
     own = {"id", "kind", "label", "state", "started", "wall_s"}
     names = {metric for each in found for metric in each.metrics} | own
     if found and name not in names:
@@ -81,10 +84,11 @@ def _condition(text: str) -> tuple[str, Any, float]:
             return found[1], _COMPARISONS[found[2]], float(found[3])
     except ValueError:
         pass
-    raise UserError("not a condition on a metric", f"--where {text}", "for example --where 'rmse<1e-3'")
+    example = Argument("where", "rmse<1e-3", quoted=True)
+    raise UserError("not a condition on a metric", Argument("where", text), ("for example ", example))
 
 
-def _before(age: str, option: str) -> str:
+def _time_ago(age: str, option: str) -> str:
     found = re.fullmatch(r"(\d+(?:\.\d+)?)([smhdw])", age, re.ASCII)
     try:
         if found:
@@ -92,8 +96,8 @@ def _before(age: str, option: str) -> str:
             return instant.isoformat(timespec="microseconds")
     except OverflowError:  # before the calendar begins
         pass
-    raise UserError("not an age", f"{option} {age}", "a number with s, m, h, d or w: 12h, 2d")
+    raise UserError("not an age", Argument(option, age), "a number with s, m, h, d or w: 12h, 2d")
 
 
-def _number(value: Any) -> bool:
+def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)

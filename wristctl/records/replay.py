@@ -57,19 +57,20 @@ def causes(original: Run, again: Run) -> list[str]:
     """What differs between the run and its repetition, as likely causes; nondeterminism where nothing does."""
     changed = difference(original, again)
     found = [f"input: {each.name}" for each in changed.inputs]
-    found += [f"config: {_said(each)}" for each in changed.config]
+    found += [f"config: {_change_text(each)}" for each in changed.config]
     if any(path == CONFIG for path, _ in original.problems()):
         found.append("config: config.yaml was changed after the run")
-    found += _summed("code", changed.code)
-    found += _summed("environment", changed.environment)
+    found += _causes_of("code", changed.code)
+    found += _causes_of("environment", changed.environment)
     return found or ["nondeterminism: configuration, code, inputs and environment are the same"]
 
 
-def _summed(what: str, changed: list[Change], most: int = 6) -> list[str]:
+def _causes_of(what: str, changed: list[Change], most: int = 6) -> list[str]:
+    """The first of what changed, one line each, and how many more there are."""
     more = [f"{what}: and {len(changed) - most} more"] if len(changed) > most else []
-    return [f"{what}: {_said(each)}" for each in changed[:most]] + more
+    return [f"{what}: {_change_text(each)}" for each in changed[:most]] + more
 
 
-def _said(change: Change) -> str:
+def _change_text(change: Change) -> str:
     before, after = ("absent" if value is None else value for value in change[1:])
     return f"{change.name}: {before} -> {after}"

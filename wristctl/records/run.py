@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +13,7 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.config.wording import Call
 from wristctl.records.files import files_below, sha256_of
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
@@ -21,9 +23,11 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-_FIX = "name a run that `wristctl runs ls` shows"
-
-ADDED = "file was added after sealing"
+NAME_A_RUN = ("name a run that `", Call("runs ls"), "` shows")
+"""What to do where there is no run."""
+_RESTORE = "restore it or name another run"
+_CHANGED, _MISSING = "hash does not match what was sealed", "sealed file is missing"
+_ADDED = "file was added after sealing"
 
 RunState = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
 
@@ -41,14 +45,22 @@ class Run:
 
     @cached_property
     def manifest(self) -> Manifest:
-        """run.json."""
+        """run.json; UserError where it is not as it was sealed: no word of it is then believed."""
         file = self.path / MANIFEST
+        # the sum first: a run that ends meanwhile writes run.json, and then its sums
+        sealed = (self._sums() or {}).get(MANIFEST)
         try:
-            return Manifest.model_validate_json(file.read_bytes())
+            content = file.read_bytes()
         except OSError as error:
-            raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), _FIX) from error
+            if sealed:
+                raise UserError(_MISSING, str(file), _RESTORE) from error
+            raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), NAME_A_RUN) from error
+        if sealed and hashlib.sha256(content).hexdigest() != sealed:
+            raise UserError(_CHANGED, str(file), _RESTORE)
+        try:
+            return Manifest.model_validate_json(content)
         except ValidationError as error:
-            raise UserError("not a manifest of a wristctl run", str(file), _FIX) from error
+            raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
 
     @property
     def kind(self) -> str:
@@ -56,8 +68,13 @@ class Run:
         return self.manifest.kind
 
     @property
+    def sealed(self) -> bool:
+        """Whether its manifest was sealed, which makes it a run whatever has become of the manifest."""
+        return MANIFEST in (self._sums() or ())
+
+    @property
     def state(self) -> RunState:
-        """How it ended: `crashed` if running by its word but without a lock, `broken` without a manifest."""
+        """How it ended: `crashed` if running by its word but without a lock, `broken` without the manifest it wrote."""
         if is_locked(self.path):
             return "running"
         self.__dict__.pop("manifest", None)
@@ -79,7 +96,7 @@ class Run:
         try:
             found: dict[str, dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else {}
         except ValueError as error:
-            raise UserError("not valid JSON", str(file), f"run `wristctl {command_of(self.kind)}` again") from error
+            raise UserError("not valid JSON", str(file), ("run `", Call(command_of(self.kind)), "` again")) from error
         return found
 
     @property
@@ -103,23 +120,31 @@ class Run:
         return path
 
     def check(self) -> None:
-        """Hash every file again; UserError naming the first that is missing or not as it was sealed."""
+        """Hash every file again; UserError naming run.json, or else the first that is missing or not as sealed."""
+        self.__dict__.pop("manifest", None)
+        again = ("restore it or run `", Call(command_of(self.kind)), "` again")
         for path, what in self.problems():
-            if what != ADDED:
-                fix = f"restore it or run `wristctl {command_of(self.kind)}` again"
-                raise UserError(what, str(self.path / path), fix)
+            if what != _ADDED:
+                raise UserError(what, str(self.path / path), again)
 
     def problems(self) -> list[tuple[str, str]]:
         """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed."""
-        try:
-            lines = (self.path / SUMS).read_text(encoding="utf-8", errors="replace").splitlines()
-        except OSError as error:
-            raise UserError("run is not sealed", str(self.path), "use a run that has ended") from error
-        sealed = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
-        found = [(name, "sealed file is missing") for name in sealed if not (self.path / name).is_file()]
+        sums = self._sums()
+        if sums is None:
+            raise UserError("run is not sealed", str(self.path), "use a run that has ended")
+        found = [(name, _MISSING) for name in sums if not (self.path / name).is_file()]
         for name in files_below(self.path):
-            if name != SUMS and name not in sealed:
-                found.append((name, ADDED))
-            elif name != SUMS and sha256_of(self.path / name) != sealed[name]:
-                found.append((name, "hash does not match what was sealed"))
+            if name != SUMS and name not in sums:
+                found.append((name, _ADDED))
+            elif name != SUMS and sha256_of(self.path / name) != sums[name]:
+                found.append((name, _CHANGED))
         return sorted(found)
+
+    def _sums(self) -> dict[str, str] | None:
+        """SHA256SUMS: the hash of each sealed file by name; None where the run is not sealed."""
+        try:
+            text = (self.path / SUMS).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return None
+        lines = (line.partition("  ") for line in text.split("\n") if line)
+        return {name: digest for digest, _, name in lines}

@@ -17,6 +17,7 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
+from wristctl.config.wording import OUT, Argument
 from wristctl.interrupt import interrupts, undisturbed
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
@@ -72,17 +73,17 @@ def start_run(
                 run = _begin(path, kind, study, label, argv, inputs, digest, page)
             except BaseException as error:
                 shutil.rmtree(path)  # no manifest yet: nothing that could be read
-                raise _of_the_disk(error, path) from error
+                raise _disk_error_of(error, path) from error
             try:
                 yield run
                 with undisturbed():
                     run.end("ok")
             except BaseException as error:
-                told = KeyboardInterrupt() if seen.asked else _of_the_disk(error, path)
+                outcome = KeyboardInterrupt() if seen.asked else _disk_error_of(error, path)
                 with undisturbed():
-                    _end_badly(run, told)
-                if told is not error:
-                    raise told from error
+                    _end_failed(run, outcome)
+                if outcome is not error:
+                    raise outcome from error
                 raise
     finally:
         lock.release()
@@ -92,7 +93,7 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9_.-]{0,60}", label):
         raise UserError(
             "a label holds letters, digits, dots, dashes and underscores",
-            f"--label {label}",
+            Argument("label", label),
             "shorten or respell it",
         )
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
@@ -106,12 +107,12 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         except FileExistsError:
             if not path.is_dir():
                 raise UserError(
-                    "cannot create a run directory: a file is in the way", str(path), "choose another --out"
+                    "cannot create a run directory: a file is in the way", str(path), ("choose another ", OUT)
                 ) from None
             attempt += 1
         except OSError as error:
             what = f"cannot create a run directory: {error.strerror}"
-            raise UserError(what, str(out), "choose a folder you can write to with --out") from error
+            raise UserError(what, str(out), ("choose a folder you can write to with ", OUT)) from error
 
 
 def _begin(
@@ -133,7 +134,7 @@ def _begin(
         with replacing(path / PATCH) as temporary:
             temporary.write_bytes(patch)
         code.patch_sha256 = sha256_of(path / PATCH)
-    read = [
+    records = [
         Input(
             role=each.role,
             kind=each.run.kind,
@@ -154,9 +155,9 @@ def _begin(
             seed=study.seed,
             code=code,
             environment=environment,
-            inputs=read,
+            inputs=records,
             timing=Timing(started=now()),
-            fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in read}),
+            fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in records}),
         ),
         page,
     )
@@ -169,15 +170,15 @@ def fingerprint(config: str, code: Code, environment: Environment, inputs: Mappi
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
-def _of_the_disk(error: BaseException, path: Path) -> BaseException:
+def _disk_error_of(error: BaseException, path: Path) -> BaseException:
     """The user's error behind a full or read-only disk, wherever it was met; any other error as it is."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
-        fix = "free space or choose another --out"
+        fix = ("free space or choose another ", OUT)
         return UserError(f"cannot write: {error.strerror}", str(error.filename or path), fix)
     return error
 
 
-def _end_badly(run: LiveRun, error: BaseException) -> None:
+def _end_failed(run: LiveRun, error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
         run.end("interrupted", 130)
     elif isinstance(error, UserError):

@@ -36,8 +36,8 @@ def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterab
     with (results / ".tags.lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         tags = read_tags(results)
-        own = sorted((set(tags.pop(run, ())) | set(add)) - set(remove))
-        if own:
-            tags[run] = own
+        remaining = sorted((set(tags.pop(run, ())) | set(add)) - set(remove))
+        if remaining:
+            tags[run] = remaining
         write_text(results / TAGS, json.dumps(tags, indent=2, sort_keys=True) + "\n")
-    return own
+    return remaining

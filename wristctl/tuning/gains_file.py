@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.wording import Call
 from wristctl.records.files import write_text
 
 Gains = Mapping[str, Mapping[str, float]]
@@ -23,4 +24,4 @@ def read_gains(path: Path) -> Gains:
         gains = json.loads(path.read_bytes())
         return {str(name): {str(k): float(v) for k, v in each.items()} for name, each in gains.items()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise UserError("not a file of tuned gains", str(path), "name a run of `wristctl tune`") from error
+        raise UserError("not a file of tuned gains", str(path), ("name a run of `", Call("tune"), "`")) from error

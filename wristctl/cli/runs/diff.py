@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import typer
 
 from wristctl.cli.completion import run_ids
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
-from wristctl.cli.tables import Table
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import open_run
 from wristctl.records.difference import Difference, difference
 from wristctl.records.journal import jsonable
+from wristctl.report.tables import Table
 
 _HEADS = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
 
@@ -45,8 +46,8 @@ def _tables(found: Difference) -> Iterator[Table]:
             rows = [(each.name, each.before, each.after, *_change(each.before, each.after)) for each in found.metrics]
             yield Table("Metrics", ("metric", "before", "after", "change", "change [%]"), rows)
         if changes := getattr(found, name):
-            said = [(each.name, _said(each.before), _said(each.after)) for each in changes]
-            yield Table(title, ("what", "before", "after"), said)
+            changed = [(each.name, _text(each.before), _text(each.after)) for each in changes]
+            yield Table(title, ("what", "before", "after"), changed)
 
 
 def _change(before: Any, after: Any) -> tuple[float | None, float | None]:
@@ -55,5 +56,5 @@ def _change(before: Any, after: Any) -> tuple[float | None, float | None]:
     return after - before, 100.0 * (after - before) / abs(before) if before else None
 
 
-def _said(value: Any) -> str:
+def _text(value: Any) -> str:
     return "-" if value is None else str(value)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import open_run
 from wristctl.records.lineage import ancestry, dependents
 

@@ -8,11 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out
-from wristctl.cli.tables import Table
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS
 from wristctl.records.index import IndexEntry
 from wristctl.records.journal import jsonable
 from wristctl.records.query import entries, in_order, select
+from wristctl.report.tables import Table
 
 
 def ls(

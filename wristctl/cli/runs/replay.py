@@ -12,13 +12,14 @@ from typing import Annotated, Any
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
-from wristctl.cli.tables import Table
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.lineage import input_run
 from wristctl.records.manifest import CONFIG, command_of
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
+from wristctl.report.tables import Table
 
 _SAME = ("identical", "within tolerance", "volatile")
 

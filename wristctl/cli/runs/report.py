@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Refs
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS, Refs
 from wristctl.records import open_run
 from wristctl.records.files import write_text
 

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Refs
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS, Refs
 from wristctl.config.errors import UserError
 from wristctl.records import open_run
 from wristctl.records.remove import removable, remove

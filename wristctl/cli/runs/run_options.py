@@ -11,9 +11,6 @@ from wristctl.cli.completion import run_ids
 
 RESULTS = Path("results")
 
-Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
 Ref = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Path, id, beginning of an id, or latest:KIND.", autocompletion=run_ids),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import shlex
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out, Ref
-from wristctl.cli.tables import Table
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import Run, open_run
 from wristctl.records.journal import jsonable
 from wristctl.records.tags import read_tags
+from wristctl.report.tables import Table
 
 
 def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.runs.run_options import RESULTS, Debug, Out, Ref
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import open_run
 from wristctl.records.tags import change_tags
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from wristctl.cli.completion import run_ids
-from wristctl.cli.runs.run_options import RESULTS, Debug, Json, Out
+from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.runs.run_options import RESULTS
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 

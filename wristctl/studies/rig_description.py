@@ -5,7 +5,7 @@ from __future__ import annotations
 from wristctl.config.hw_run import RigSettings
 
 
-def rig_described(settings: RigSettings) -> str:
+def describe_rig(settings: RigSettings) -> str:
     """In one line, the first that a command on a rig says."""
     if settings.port is not None:
         return f"on hardware: board at {settings.port}, camera {settings.camera}"

@@ -1,22 +1,20 @@
-"""What hw-run does in its run directory: the trials with their log, then metrics and tables of them."""
+"""The trials of hw-run with their log, a row for each by the log alone, and how they went."""
 
 from __future__ import annotations
 
-import json
 import logging
-from typing import Any
 
 import cv2
 import numpy as np
 import pandas as pd
 
-from wristctl.cli.command import Session, Table
-from wristctl.cli.loops import network_of, tuned_of
-from wristctl.cli.operator import operator
-from wristctl.cli.trial_panel import trials_shown
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
+from wristctl.records import LiveRun
+from wristctl.report.tables import Table
 from wristctl.simulation.metrics import METRICS
+from wristctl.studies.session import Session
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
@@ -24,9 +22,11 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_metrics import JUDGED, evaluated
 from wristctl.trial.trials import Trial, trials_of
+from wristctl.tuning.gains_file import Gains
 from wristctl.vision.annotate import AnnotatedVideo
 from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
 
@@ -46,35 +46,30 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
 }
 
 
-def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
+def perform_trials(
+    session: Session, bench: WristParameters, network: Inverse | None, tuned: Gains | None
+) -> pd.DataFrame:
     """Do all trials, logged as they go; a row for each. What stops them is raised once everything is kept.
 
-    The controller knows the session's wrist; `bench` is the one that an emulated bench weakens.
+    The controller knows the session's wrist; `bench` is the one that an emulated bench weakens. What moves is logged on
+    the disk as it does: there must be a run directory.
     """
-    settings, run, study = session.settings, session.run, session.study
+    settings, run, study = session.study.hw_run, session.findings.run, session.study
+    assert run is not None
     cv2.setNumThreads(1)
-    trials = trials_of(settings, np.random.default_rng(run.stream("order")))
-    calibration = WristCalibration.load(session.inputs["calibration"]) if "calibration" in session.inputs else None
+    trials = trials_of(settings, np.random.default_rng(session.findings.stream("order")))
+    calibration = session.inputs.read("calibration", WristCalibration.load)
     plant = PLANTS[settings.bench.plant.model]
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
     trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
-    experiment = Experiment(
-        settings,
-        study.wrist,
-        trials,
-        trial_log,
-        network_of(session),
-        tuned_of(session.inputs),
-        calibration,
-        study.seed,
-    )
+    experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
     film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            view, keep = View.of(session.inputs.get("optics")), film.add if film else None
-            testbed = open_testbed(settings, bench, study.seed, view, operator(session), keep)
-        with trials_shown(session, trials) as shown:
+            view, keep = View.of(session.inputs.runs().get("optics")), film.add if film else None
+            testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
+        with session.operator.watch(trials, session) as shown:
             experiment.run(testbed, shown)
     except BaseException as error:
         stopped = error
@@ -86,16 +81,15 @@ def performed(session: Session, bench: WristParameters) -> pd.DataFrame:
         film.close()
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
-    table = _judged(session, experiment, trials)
-    _say_how_it_went(session, experiment, trial_log)
+    table = _evaluate(run, settings, experiment, trials)
+    _summarise(session, experiment, trial_log)
     if stopped is not None:
         raise stopped
     return table
 
 
-def _judged(session: Session, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
+def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
-    settings, run = session.settings, session.run
     courses = pd.read_csv(run.file("data/log.csv"))
     file = run.file("data/truth.csv")
     truths = pd.read_csv(file) if file.is_file() else None
@@ -125,35 +119,37 @@ def _judged(session: Session, experiment: Experiment, trials: list[Trial]) -> pd
     return table
 
 
-def _say_how_it_went(session: Session, experiment: Experiment, trial_log: TrialLog) -> None:
+def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) -> None:
     """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
-    run, settings, timing = session.run, session.settings, experiment.timing
-    run.metric("ticks", len(timing.late), meaning="control ticks")
-    run.metric("overruns", timing.overruns, better="lower", meaning="ticks skipped because one before took too long")
+    findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
+    findings.metric("ticks", len(timing.late), meaning="control ticks")
+    meaning = "ticks skipped because one before took too long"
+    findings.metric("overruns", timing.overruns, better="lower", meaning=meaning)
+    meaning = "from due to begun, of a tick"
     for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
-        run.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning="from due to begun, of a tick")
+        findings.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning=meaning)
     if timing.late and (settings.real_time or settings.port is not None):
         late, median, most = (f"{1e3 * timing.jitter(share):.2f} ms" for share in (0.99, 0.5, 1.0))
-        told = (
+        text = (
             f"{len(timing.late)} ticks of {1e3 * timing.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
             f"most; {timing.overruns} overruns"
         )
-        session.console.print(told, markup=False, highlight=False, soft_wrap=True)
-        run.summary(told)
+        session.operator.tell(text)
+        findings.summary(text)
     if experiment.zero is not None:
-        _write(session, "data/zero.json", experiment.zero.plain())
+        findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:
         return
     stop = experiment.stop
-    _write(session, "data/stop.json", stop.plain())
+    findings.plain("data/stop.json", stop.plain())
     sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
     log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
-    text = last_second(trial_log).text()
-    run.summary(f"{stop.reason}\n\n```\n{text}\n```")
+    text = _last_second(trial_log).text()
+    findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
     log.warning("%s\n%s", stop.reason, text)
 
 
-def last_second(trial_log: TrialLog) -> Table:
+def _last_second(trial_log: TrialLog) -> Table:
     """The last second of ticks, every tenth of it."""
     rows = list(trial_log.last)
     shown = rows[:: -max(1, len(rows) // 10)][::-1]
@@ -170,8 +166,3 @@ def last_second(trial_log: TrialLog) -> Table:
         for row in shown
     ]
     return Table("The last second", columns, cells)
-
-
-def _write(session: Session, name: str, content: Any) -> None:
-    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-    session.run.file(name).write_text(text, encoding="utf-8")

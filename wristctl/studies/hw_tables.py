@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wristctl.cli.command import Session, Table
-from wristctl.cli.loops import network_of, tuned_of
 from wristctl.comparison.paper import EXPERIMENT
 from wristctl.report import trial_figures
+from wristctl.report.tables import Table
 from wristctl.simulation.closed_loop import Simulation
+from wristctl.studies.findings import Findings
+from wristctl.studies.session import Session
 from wristctl.trial.trials import Trial
 from wristctl.trial.twin import twin
+from wristctl.tuning.gains_file import Gains
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
+from wristctl.wrist.kinematics import Inverse
 
 Twins = dict[int, Simulation]
 """The simulation of each trial, by its number."""
@@ -32,21 +35,22 @@ _BY_TRIAL = {
 }  # fmt: skip
 
 
-def reported(session: Session, trials: pd.DataFrame) -> list[Table]:
-    """Tables of all trials; metrics and figures on the way."""
+def trial_tables(
+    session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None
+) -> tuple[list[Table], Twins]:
+    """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
     trials = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
-    twins = _twins(session, trials)
+    twins = _twins(session, trials, network, tuned)
     rows = [*_means(session, trials, twins), *_papers()]
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
     with session.progress("drawing"):
         _draw(session, trials, twins)
-    return [Table("Means over the trials, beside the paper's experiment", _COLUMNS, rows), by_trial]
+    return [Table("Means over the trials, beside the paper's experiment", _COLUMNS, rows), by_trial], twins
 
 
-def _twins(session: Session, trials: pd.DataFrame) -> Twins:
+def _twins(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
     """Each trial in simulation; repetitions share one."""
-    network, tuned = network_of(session), tuned_of(session.inputs)
-    names = [row.label for row in session.settings.rows]
+    names = [row.label for row in session.study.hw_run.rows]
     done: dict[tuple[Any, ...], Simulation] = {}
     found = {}
     with session.progress("simulating the same trials"):
@@ -61,7 +65,7 @@ def _twins(session: Session, trials: pd.DataFrame) -> Twins:
 
 def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tuple[Any, ...]]:
     """A row for each controller with and without a push; a metric for each number."""
-    labels = [row.label for row in session.settings.rows]
+    labels = [row.label for row in session.study.hw_run.rows]
     for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
         group = trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)]
         if group.empty:
@@ -77,7 +81,7 @@ def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tup
             whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
             full = "_".join([*["pushed"] * pushed, name, *whose])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
-            session.run.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
+            session.findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
         yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)
 
 
@@ -88,8 +92,8 @@ def _papers() -> Iterator[tuple[Any, ...]]:
 
 
 def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
-    run, push = session.run, session.settings.push
-    log = pd.read_csv(run.file("data/log.csv"))
+    findings, settings = session.findings, session.study.hw_run
+    push, log = settings.push, _logged(findings, "log")
     courses = []
     for each in trials.to_dict("records"):
         course, simulated = log[log["trial"] == each["trial"]], twins[each["trial"]].trajectory
@@ -109,15 +113,20 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
         ("pushed-", [course for course in courses if course.push is not None]),
     ):
         if some:
-            run.figure(f"{prefix}directions", trial_figures.desired_and_obtained(some))
-            run.figure(f"{prefix}errors", trial_figures.errors(some))
-            row = session.settings.rows[0]
+            findings.figure(f"{prefix}directions", trial_figures.desired_and_obtained, some)
+            findings.figure(f"{prefix}errors", trial_figures.errors, some)
+            row = settings.rows[0]
             first = [each for each in some if each.label == row.label and each.repetition == 0]
-            run.figure(f"{prefix}tensions", trial_figures.tensions(first, row.label))
-    if session.settings.real_time or session.settings.port is not None:
-        between = pd.read_csv(run.file("data/between.csv"))
-        late = np.concatenate([table["late"].to_numpy(float) for table in (log, between)])
-        run.figure("lateness", trial_figures.lateness(late, session.settings.control_period))
+            findings.figure(f"{prefix}tensions", trial_figures.tensions, first, row.label)
+    if settings.real_time or settings.port is not None:
+        both = (log, _logged(findings, "between"))
+        late = np.concatenate([table["late"].to_numpy(float) for table in both])
+        findings.figure("lateness", trial_figures.lateness, late, settings.control_period)
+
+
+def _logged(findings: Findings, name: str) -> pd.DataFrame:
+    assert findings.run is not None
+    return pd.read_csv(findings.run.file(f"data/{name}.csv"))
 
 
 def _sides(course: pd.DataFrame, direction: str) -> Any:

@@ -1,0 +1,110 @@
+"""What a fingerprint and the other hashes of a run are made of."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.study import Study
+from wristctl.records import Run, list_runs, start_run, stream
+from wristctl.records.files import sha256_of_list
+from wristctl.records.manifest import Code, Environment
+from wristctl.records.start import fingerprint
+
+CODE = Code(version="1", commit="c", branch="main", dirty=False, tree_sha256="t")
+ENVIRONMENT = Environment(
+    python="3.11.7", os="Linux-6.1", machine="x86_64", cpu="cpu", cores=2, threads={"OMP_NUM_THREADS": "1"},
+    packages={"numpy": "2.0", "scipy": "1.15"}, packages_sha256="p",
+)  # fmt: skip
+INPUTS = {"network": "n", "tuned": "g"}
+
+
+def _fingerprint(
+    config: str = "config", code: Code = CODE, environment: Environment = ENVIRONMENT, inputs: Any = INPUTS
+) -> str:
+    return fingerprint(config, code, environment, inputs)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"config": "other"},
+        {"code": CODE.model_copy(update={"tree_sha256": "other"})},
+        {"inputs": {}},
+        {"inputs": {"network": "n", "tuned": "other"}},
+        {"inputs": {"network": "g", "tuned": "n"}},
+        {"inputs": {"network": "n", "data": "g"}},
+        {"environment": ENVIRONMENT.model_copy(update={"python": "3.12.0"})},
+        {"environment": ENVIRONMENT.model_copy(update={"machine": "arm64"})},
+        {"environment": ENVIRONMENT.model_copy(update={"cpu": "another"})},
+        {"environment": ENVIRONMENT.model_copy(update={"threads": {"OMP_NUM_THREADS": "2"}})},
+        {"environment": ENVIRONMENT.model_copy(update={"packages": {"numpy": "2.1", "scipy": "1.15"}})},
+    ],
+    ids=lambda changed: str(next(iter(changed))),
+)
+def test_what_decides_a_result_changes_the_fingerprint(changed: dict[str, Any]) -> None:
+    assert _fingerprint(**changed) != _fingerprint()
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"code": CODE.model_copy(update={"version": "2", "commit": None, "branch": "other", "dirty": True})},
+        {"environment": ENVIRONMENT.model_copy(update={"os": "Linux-6.2", "cores": 64, "packages_sha256": "other"})},
+        {"environment": ENVIRONMENT.model_copy(update={"packages": {"scipy": "1.15", "numpy": "2.0"}})},
+        {"inputs": {"tuned": "g", "network": "n"}},
+    ],
+    ids=["name of the code", "other packages", "order of packages", "order of inputs"],
+)
+def test_what_decides_no_result_leaves_the_fingerprint(changed: dict[str, Any]) -> None:
+    assert _fingerprint(**changed) == _fingerprint()
+
+
+def test_the_hashes_of_earlier_runs_are_made_of_the_same(earlier: Path) -> None:
+    for run in list_runs(earlier):
+        manifest = run.manifest
+        results = [(each.path, each.sha256) for each in manifest.outputs if not each.volatile]
+        assert sha256_of_list(results[::-1]) == run.result_hash
+        sources = [line.split("  ")[::-1] for line in run.file("code.txt").read_text().splitlines()]
+        assert sha256_of_list([(name, digest) for name, digest in sources]) == manifest.code.tree_sha256
+        packages = run.file("environment.txt").read_bytes()
+        assert hashlib.sha256(packages).hexdigest() == manifest.environment.packages_sha256
+        inputs = {each.role: each.result_sha256 for each in manifest.inputs}
+        again = fingerprint(manifest.config_sha256, manifest.code, manifest.environment, inputs)
+        assert again == manifest.fingerprint
+        assert manifest.streams == {name: stream(manifest.seed, name) for name in manifest.streams}
+
+
+def test_the_result_hash_covers_results_and_metrics_and_no_other_file(results: Path) -> None:
+    names = {
+        "data/samples.csv": False, "data/wall.csv": True, "models/network.safetensors": False, "figures/a.svg": False,
+        "tables.json": True, "timing.json": True, "checkpoints/0.pt": True,
+    }  # fmt: skip
+
+    def sealed(changed: str = "", metric: float = 1.0) -> Run:
+        with start_run("train", Study(), "", results) as run:
+            for name in names:
+                run.file(name).write_text("changed" if name == changed else "as ever")
+            run.volatile("data/wall.csv")
+            run.metric("rmse", metric)
+        return Run(run.path)
+
+    first = sealed()
+    flags = {each.path: each.volatile for each in first.manifest.outputs}
+    assert flags == {**names, "metrics.json": False}
+    for name, volatile in names.items():
+        assert (sealed(name).result_hash == first.result_hash) == volatile, name
+    assert sealed(metric=2.0).result_hash != first.result_hash
+    readme = first.file("README.md").read_text().splitlines()
+    for name, volatile in flags.items():
+        assert f"- `{name}`" + " (outside the result hash)" * volatile in readme
+
+
+def test_streams_of_other_names_and_seeds_are_others() -> None:
+    drawn = [np.random.default_rng(stream(*each)).random() for each in ((0, "a"), (0, "b"), (1, "a"))]
+    assert len(set(drawn)) == 3
+    assert drawn[0] == np.random.default_rng(stream(0, "a")).random()

@@ -1,0 +1,233 @@
+"""The functions that `import wristctl` offers: what the commands do, for notebooks and scripts.
+
+Each takes a study and returns a result with `.metrics`, `.tables`, `.figures` (drawn when asked for), `.frame()` and
+`.run`. Inputs are named as on the command line (a path, an id, the beginning of one, latest:<kind>), or are `Run`
+objects, or earlier results. With `out=None` nothing is written; with a folder the result is also a sealed run directory
+there, as the command writes it. Nothing is printed: `progress(what, count, total, figures)` is called as it goes on,
+warnings go to the logger "wristctl". What is wrong is a UserError that says what, where and how to mend it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study as _load_study
+from wristctl.config.study import Study
+from wristctl.records import Run
+from wristctl.records import open_run as _open_run
+from wristctl.studies.audit import AUDIT, Audited
+from wristctl.studies.compare import COMPARE, Compared
+from wristctl.studies.counting import Watch, watched
+from wristctl.studies.gen_data import GEN_DATA, Generated
+from wristctl.studies.identify import IDENTIFY, Identified
+from wristctl.studies.perform import perform, prepare, recording
+from wristctl.studies.procedure import Found, Procedure
+from wristctl.studies.simulate import SIMULATE, Simulated
+from wristctl.studies.train import TRAIN, Trained
+from wristctl.studies.tune import TUNE, Tuned
+from wristctl.studies.unattended import Unattended
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Ref = str | Path | Run
+Folder = str | Path
+
+RESULTS = "results"
+"""Where runs are looked for when no folder is given."""
+
+
+@contextmanager
+def _in_python() -> Iterator[None]:
+    """Let errors speak of arguments and functions."""
+    try:
+        yield
+    except UserError as error:
+        error.in_python = True
+        raise
+
+
+@_in_python()
+def load_study(file: str | Path | None = None, *overrides: str) -> Study:
+    """The study of a YAML file, or of defaults only.
+
+    `overrides` such as "wrist.length=0.09" win over the file, later ones over earlier ones; quantities are in the units
+    that `wristctl <command> --dry-run` shows: SI, but for suffixes such as _deg. Raises UserError for an unknown key or
+    a value that cannot be, with file and line, and what was meant.
+    """
+    return _load_study([Path(file)] if file else [], list(overrides))
+
+
+@_in_python()
+def gen_data(
+    study: Study, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Generated:  # fmt: skip
+    """Samples of tip positions [m] and bending angles [rad], by the study's `gen-data` section.
+
+    `run` (simulate or compare) holds the courses to take them from where `source` is `run`. The result has `.samples`;
+    `.frame()` is a row per sample. Raises UserError for a run without courses, or with too few samples.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(GEN_DATA, study, {"run": run}, out, label, progress)
+
+
+@_in_python()
+def train(
+    study: Study, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
+    label: str = "", progress: Watch | None = None,
+) -> Trained:  # fmt: skip
+    """Networks from tip position [m] to bending angle [rad], by the study's `train` section.
+
+    `data` (gen-data) holds the samples; without it those of the study's `gen-data` section are drawn. `resume` is a
+    train run that was stopped, taken up in a run directory. The result has `.network`, `.trials`, `.samples`, `.split`
+    and, of a search, `.choice`; `.frame()` is a row per network and seed. Raises UserError where the split leaves too
+    few samples to judge by, or every training diverged.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress)
+
+
+@_in_python()
+def tune(
+    study: Study, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+) -> Tuned:  # fmt: skip
+    """Gains by search, by the study's `tune` section: the same budget and objective for every controller.
+
+    `network` (train) stands behind references with `inverse: network`; the parameters of `from_identified` (identify)
+    replace the study's. The result has `.gains`, by controller and name in the units of the controller's table, and
+    `.searches`; `.frame()` is a row per candidate. Raises UserError for an unknown controller, one without gains, or a
+    network that is missing.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress)
+
+
+@_in_python()
+def compare(
+    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+) -> Compared:  # fmt: skip
+    """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
+
+    `network` (train) stands behind references with `inverse: network`, `tuned` (tune) behind rows with `gains: tuned`.
+    The result has `.rows`, each with the simulation of its loop; `.frame()` is a row per combination: RMSE [rad],
+    settling [s], tensions [N], ... Raises UserError for unknown controllers or gains, inputs that are missing, or
+    controllers that would be judged on what they were tuned on.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
+
+
+@_in_python()
+def simulate(
+    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Simulated:  # fmt: skip
+    """One closed loop, by the study's `simulate` section.
+
+    `network` (train) stands behind a reference with `inverse: network`, `tuned` (tune) behind `gains: tuned`; the
+    parameters of `from_identified` (identify) replace the study's. The result has `.trajectory` (`.frame()` is its
+    table, SI units) and `.failed`, whether the wrist bent beyond a full turn. Raises UserError for unknown controllers
+    or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    given = {"network": network, "tuned": tuned, "from_identified": from_identified}
+    return _carry_out(SIMULATE, study, given, out, label, progress)
+
+
+@_in_python()
+def identify(
+    study: Study, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Identified:  # fmt: skip
+    """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
+
+    By the study's `identify` section. The result has `.values`, `.fit`, `.knowledge` and `.yaml`, a study file of what
+    was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and
+    where these do not tell every parameter: it says what to add.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(IDENTIFY, study, {"runs": runs}, out, label, progress)
+
+
+@_in_python()
+def audit(
+    study: Study, *, table1: Ref | Trained | None = None, selection: Ref | Trained | None = None,
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+) -> Audited:  # fmt: skip
+    """Every claim of the paper in the study's `audit` section (experiments/claims.yaml has all) with a verdict.
+
+    `table1` and `selection` are trainings by experiments/table1.yaml and experiments/model_selection.yaml; without them
+    the claims that they would decide stay open. The result has `.judgements` and `.comparisons`, by loop; `.frame()` is
+    a row per claim. Raises UserError without claims, and for a training that lacks what a claim asks for.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(AUDIT, study, {"table1": table1, "selection": selection}, out, label, progress)
+
+
+@_in_python()
+def runs(
+    where: str | Sequence[str] = (), *, kind: str | None = None, label: str | None = None, state: str | None = None,
+    tag: str | None = None, newer: str | None = None, older: str | None = None, sort: str = "id", reverse: bool = False,
+    out: Folder = RESULTS,
+) -> pd.DataFrame:  # fmt: skip
+    """The run directories of the folder `out` as a table, oldest first: one row each, its metrics among the columns.
+
+    `where` are conditions on metrics such as "rmse<1e-3"; `kind` and `label` may be patterns with *; `state` is how a
+    run ended, `tag` one that it has; `newer` and `older` are ages: 30m, 12h, 2d; `sort` is a column, `reverse` puts the
+    largest or newest first. Raises UserError for a condition or age that cannot be read, a metric that no run has, or a
+    folder that cannot be read.
+    """
+    import pandas as pd
+
+    from wristctl.records.query import entries, in_order, select
+
+    conditions = [where] if isinstance(where, str) else list(where)
+    found = in_order(select(entries(Path(out)), kind, label, state, tag, conditions, newer, older), sort)
+    own = ["id", "kind", "label", "state", "started", "wall_s", "note", "tags"]
+    rows = [{name: getattr(each, name) for name in own} | each.metrics for each in found]
+    return pd.DataFrame(rows[::-1] if reverse else rows, columns=None if rows else own)
+
+
+@_in_python()
+def open_run(ref: str | Path, out: Folder = RESULTS) -> Run:
+    """The run directory that `ref` names: a path, an id in `out` or its beginning, or latest:<kind> (that ended ok).
+
+    `.data(name)` is one of its tables, `.metrics`, `.config` (the study it ran) and `.file(name)` what they say. Raises
+    UserError where there is none, more than one, or what is there is not a run.
+    """
+    return _open_run(ref, Path(out))
+
+
+def _carry_out(
+    procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
+    progress: Watch | None,
+) -> Found:  # fmt: skip
+    folder, show = Path(RESULTS if out is None else out), watched(progress)
+    prepared = prepare(procedure, study, folder, given)
+    prepared.plan()
+    if out is None:
+        return perform(prepared, None, show, Unattended())
+    with recording(prepared, folder, label, [f"wristctl.{procedure.kind.replace('-', '_')}()"]) as run:
+        return perform(prepared, run, show, Unattended())

@@ -1,0 +1,23 @@
+"""The options that the `hw` commands share, and how they show what a board says of itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Port = Annotated[
+    str | None,
+    typer.Option("--port", help="Serial port, socket://host:port, or emulated; without it the only board found."),
+]
+Baud = Annotated[int, typer.Option("--baud", help="Of the serial line.")]
+Image = Annotated[Path | None, typer.Option("--image", help="Another program than the packaged firmware (Intel hex).")]
+
+BAUD = 250_000
+
+
+def facts_of(values: dict[str, Any]) -> dict[str, Any]:
+    """Names for states, faults and flags; the dictionary in hex."""
+    named = {key: value.name or "none" if hasattr(value, "name") else value for key, value in values.items()}
+    return {**named, "dictionary": f"{values['dictionary']:08x}", "firmware": ".".join(map(str, values["firmware"]))}

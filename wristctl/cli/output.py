@@ -1,0 +1,50 @@
+"""What a command leaves on stdout: its plan, or its tables and the run directory."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from wristctl.config.resolved import resolved_yaml
+from wristctl.config.study import Study
+from wristctl.records import Run
+from wristctl.records.journal import jsonable
+from wristctl.report.tables import Table
+from wristctl.studies.perform import plain_tables
+
+
+def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> None:
+    """The resolved study, every leaf with unit and source, and what would be done."""
+    resolved = resolved_yaml(study, kind)
+    if as_json:
+        shown = {"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan}
+        print(json.dumps(shown, indent=2))
+        return
+    print(resolved, end="")
+    for line in [*plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
+        print(f"# {line}")
+
+
+def print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
+    """The tables as wide as the terminal, then the run directory; or all of the result as one JSON object."""
+    if as_json:
+        run = Run(path)
+        result = {
+            "schema": "wristctl.result/1",
+            "kind": run.kind,
+            "id": run.id,
+            "run": str(path),
+            "state": run.state,
+            "result_sha256": run.result_hash,
+            "metrics": run.metrics,
+            "tables": plain_tables(tables),
+        }
+        print(json.dumps(jsonable(result), indent=2, allow_nan=False))
+        return
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for table in tables:
+        print(table.text(width), end="\n\n")
+    print(path)

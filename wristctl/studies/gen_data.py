@@ -1,0 +1,166 @@
+"""Samples of tip positions and bending angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.config.wording import Argument, Call, Setting
+from wristctl.records import Run
+from wristctl.report.tables import Table
+from wristctl.studies.compare import Compared
+from wristctl.studies.inputs import EarlierRun, Given, Inputs
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.session import Session
+from wristctl.studies.simulate import Simulated
+from wristctl.studies.study_result import StudyResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.learning.dataset import Samples
+    from wristctl.wrist.kinematics import Array
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Generated(StudyResult):
+    """Samples of tip positions [m] and bending angles [rad]."""
+
+    kind = "gen-data"
+
+    samples: Samples
+
+    def frame(self) -> pd.DataFrame:
+        """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
+        from wristctl.report.learning_tables import samples_table
+
+        return samples_table(self.samples)
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """What a run would draw."""
+    settings, wrist = study.gen_data, study.wrist
+    if "run" in inputs and settings.source != "run":
+        fix = Setting("source=run", "gen-data", option=True)
+        raise UserError("a run is given, but source is " + settings.source, "gen-data.source", fix)
+    if settings.source == "run":
+        courses, run = _courses(inputs), inputs.runs().get("run")
+        whose = run.id if run else f"a {inputs['run'].kind} result"
+        return f"at most {settings.samples} of {sum(map(len, courses))} samples of {whose}"
+    begin = f"{settings.samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
+    if settings.source == "plant":
+        tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))
+        low, high = (100.0 * ratio for ratio in settings.payload)
+        return begin + f"{settings.segments} segments, tilted by {tilts} deg, payload {low:g} to {high:g} %"
+    low, high = (1e3 * ratio * wrist.length for ratio in settings.stretch)
+    return begin + f"arc length {low:g} to {high:g} mm"
+
+
+def gen_data(session: Session) -> Generated:
+    """Sample tip positions and bending angles: constant curvature, equilibria under load, or earlier runs."""
+    import numpy as np
+
+    from wristctl.learning.angle_errors import angle_errors
+    from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE
+    from wristctl.report.learning_figures import coverage
+    from wristctl.report.learning_tables import MEANING, UNITS, samples_table
+    from wristctl.wrist.kinematics import exact_angle
+
+    findings = session.findings
+    samples = drawn(session.study, findings.stream("samples"), session.inputs)
+    table = samples_table(samples)
+    exact = angle_errors(exact_angle(samples.tip), samples.theta)
+
+    findings.table("data/samples.csv", table, UNITS, MEANING)
+    findings.arrays("data/samples.npz", samples.arrays())
+    findings.figure("coverage", coverage, table)
+
+    count = len(samples.theta)
+    findings.metric("samples", count, meaning="number of samples")
+    for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
+        share = float(np.mean(samples.held_out == code))
+        findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
+    rows: list[tuple[str, float, float]] = []
+    known = {"theta": (180.0 / np.pi, "deg"), "pose": (180.0 / np.pi, "deg"), "hand_mass": (1.0, "kg")}
+    for name in ("theta", "arc_length", "x", "y", *samples.names):
+        scale, unit = known.get(name, (1e3, "mm"))
+        low, high = scale * float(table[name].min()), scale * float(table[name].max())
+        rows.append((f"{name} [{unit}]", low, high))
+        findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")
+        findings.metric(f"{name}_max_{unit}", high, unit=unit, n=count, meaning=f"greatest: {MEANING[name]}")
+    for name in ("rmse_deg", "max_error_deg"):
+        meaning = "error of the exact inverse 2 atan2(y, x) on these samples"
+        findings.metric(f"exact_inverse_{name}", getattr(exact, name), "deg", "lower", count, meaning=meaning)
+    rows.append(("error of the exact inverse [deg]", 0.0, exact.max_error_deg))
+    tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
+    return Generated(session.study, findings, tables, samples)
+
+
+def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs) -> Samples:
+    """The samples that the study's gen-data section asks for."""
+    import numpy as np
+
+    from wristctl.learning.dataset import draw_samples, samples_of_courses
+
+    settings, rng = study.gen_data, np.random.default_rng(entropy)
+    if settings.source == "run":
+        return samples_of_courses(_courses(inputs), settings.samples, rng)
+    if settings.source == "plant":
+        from wristctl.learning.equilibria import draw_equilibria
+
+        return draw_equilibria(settings, study.wrist, rng)
+    return draw_samples(settings, study.wrist, rng)
+
+
+def samples_of(given: Run | Generated) -> Samples:
+    """The samples of a gen-data run or result."""
+    from wristctl.learning.dataset import Samples
+
+    return Samples.from_arrays(given.array("samples")) if isinstance(given, Run) else given.samples
+
+
+def _courses(inputs: Inputs) -> list[Array]:
+    found = inputs.read("run", _courses_of)
+    if found is None:
+        fix = Call("gen-data", arguments=(Argument("run", "latest:simulate"),))
+        raise UserError("source run needs a run", "gen-data.run", fix)
+    return found
+
+
+def _courses_of(given: Given) -> list[Array]:
+    """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
+    import numpy as np
+
+    wanted = ("tip_x", "tip_y", "theta")
+    found = [
+        np.column_stack([np.asarray(columns[name], np.float64).ravel() for name in wanted])
+        for columns in _kept(given)
+        if all(name in columns for name in wanted)
+    ]
+    if not found:
+        raise UserError(
+            f"no course in that {given.kind} run: it has no data with {', '.join(wanted)}",
+            str(given.path) if isinstance(given, Run) else "run",
+            "name a simulate or compare run",
+        )
+    return found
+
+
+def _kept(given: Given) -> list[Mapping[str, Any]]:
+    """Every table and every set of arrays of a run, or what a result would have written of that."""
+    if isinstance(given, Run):
+        from wristctl.records.formats import read_arrays, read_table
+
+        folder = given.path / "data"
+        frames = [read_table(file) for file in sorted(folder.glob("*.csv"))]
+        tables = [{str(name): column.to_numpy() for name, column in frame.items()} for frame in frames]
+        return [*tables, *(read_arrays(file) for file in sorted(folder.glob("*.npz")))]
+    if isinstance(given, Simulated):
+        return [given.trajectory.columns()]
+    return [given.series()] if isinstance(given, Compared) else []
+
+
+GEN_DATA = Procedure("gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),))

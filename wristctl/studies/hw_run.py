@@ -1,0 +1,76 @@
+"""The paper's experiment on the whole chain, from marker to motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from wristctl.config.errors import under
+from wristctl.config.study import Study
+from wristctl.studies.inputs import EarlierRun, Inputs
+from wristctl.studies.loop_inputs import check_row, identified, network_for, tuned_gains
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.rig_description import describe_rig
+from wristctl.studies.session import Session
+from wristctl.studies.study_result import StudyResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.simulation.closed_loop import Simulation
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Performed(StudyResult):
+    """Trials on a rig, and the same in simulation."""
+
+    kind = "hw-run"
+
+    trials: pd.DataFrame
+    twins: dict[int, Simulation]
+    """by the trial's number"""
+
+    def frame(self) -> pd.DataFrame:
+        """One row per trial that began."""
+        return self.trials
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check controllers and gains and say what would be done; opens nothing."""
+    settings, tuned = study.hw_run, tuned_gains(inputs)
+    for number, row in enumerate(settings.rows):
+        with under(f"hw-run.rows.{number}"):
+            check_row(row, tuned)
+    pushes = settings.without_push + (settings.push.force != 0.0)
+    count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
+    each = settings.horizon + settings.back + settings.rest
+    return f"{describe_rig(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
+
+
+def hw_run(session: Session) -> Performed:
+    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
+    session.operator.tell(describe_rig(session.study.hw_run))
+    from wristctl.studies.hw_tables import trial_tables
+    from wristctl.studies.hw_trials import perform_trials
+
+    study, bench = session.study, session.study.wrist
+    known = replace(session, study=identified(study, "hw-run", session.inputs))
+    network = network_for(session.inputs, known.study.wrist, [known.study.hw_run.loop])
+    tuned = tuned_gains(session.inputs)
+    trials = perform_trials(known, bench, network, tuned)
+    tables, twins = trial_tables(known, trials, network, tuned)
+    return Performed(study, session.findings, tables, trials, twins)
+
+
+HW_RUN = Procedure(
+    "hw-run",
+    plan,
+    hw_run,
+    (
+        EarlierRun("calibration", kind="calibrate-wrist", optional=True),
+        EarlierRun("optics", kind="calibrate-camera", optional=True),
+        EarlierRun("from_identified", kind="identify", optional=True),
+        EarlierRun("tuned", kind="tune", optional=True),
+        EarlierRun("network", kind="train", optional=True),
+    ),
+)

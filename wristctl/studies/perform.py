@@ -1,0 +1,95 @@
+"""How a study is performed: inputs opened and named, a plan, then the doing, in a run directory or in memory."""
+
+from __future__ import annotations
+
+import json
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import LiveRun, Run, start_run
+from wristctl.records.journal import jsonable
+from wristctl.records.manifest import TABLES, Manifest
+from wristctl.report.tables import Table
+from wristctl.studies.findings import Findings
+from wristctl.studies.inputs import Inputs, named_for_good, opened
+from wristctl.studies.procedure import Found, Procedure
+from wristctl.studies.session import Operator, Session, ShowProgress
+
+
+@dataclass(frozen=True)
+class Prepared(Generic[Found]):
+    """A study that can be performed: its inputs are open, and named for good in it."""
+
+    procedure: Procedure[Found]
+    study: Study
+    inputs: Inputs
+
+    def plan(self) -> str:
+        """What would be done. Raises UserError for what can be known before."""
+        return self.procedure.plan(self.study, self.inputs)
+
+
+def prepare(
+    procedure: Procedure[Found], study: Study, out: Path, given: Mapping[str, Any] | None = None
+) -> Prepared[Found]:
+    """Open the inputs: those `given` by name, else those that the study names, runs in `out`. Raises UserError."""
+    section = procedure.section(study)
+    inputs = opened(procedure.kind, section, procedure.needs, given or {}, out)
+    if inputs:
+        own = {procedure.kind.replace("-", "_"): named_for_good(inputs, section, out)}
+        study = study.model_copy(update=own)
+    return Prepared(procedure, study, inputs)
+
+
+@contextmanager
+def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str]) -> Iterator[LiveRun]:
+    """A run directory in `out` for a prepared study, sealed with a report at the block's end, however it ends."""
+    read = prepared.inputs.recorded()
+    with start_run(prepared.procedure.kind, prepared.study, label, out, argv, read, _page) as run:
+        yield run
+
+
+def perform(
+    prepared: Prepared[Found],
+    run: LiveRun | None,
+    show: ShowProgress,
+    operator: Operator,
+) -> Found:
+    """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
+    work, findings = prepared.procedure.perform, Findings(prepared.study.seed, run)
+    session = Session(prepared.study, prepared.inputs, findings, show, operator)
+    if run is None:
+        return work(session)
+    try:
+        found = work(session)
+    except UserError as error:
+        run.console(f"error: {error}")
+        raise
+    except Exception as error:
+        run.console(traceback.format_exc())
+        error.add_note(f"the traceback is in {run.path / 'console.log'}")
+        raise
+    text = str(found)
+    if text:
+        run.console(text)
+        run.summary(f"```\n{text}\n```")
+    content = json.dumps(plain_tables(found.tables), indent=2, allow_nan=False)
+    run.file(TABLES).write_text(content + "\n", encoding="utf-8")
+    return found
+
+
+def plain_tables(tables: Sequence[Table]) -> Any:
+    """Tables for JSON."""
+    return jsonable([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
+
+
+def _page(path: Path, manifest: Manifest) -> str:
+    from wristctl.report.page import page
+
+    return page(Run(path), manifest)

@@ -1,0 +1,31 @@
+"""A study as it can be called for: the earlier runs that it reads, what it would do, and the doing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from wristctl.config.study import Study
+from wristctl.studies.inputs import EarlierRun, Inputs
+from wristctl.studies.session import Session
+from wristctl.studies.study_result import StudyResult
+
+Found = TypeVar("Found", bound=StudyResult)
+
+
+@dataclass(frozen=True)
+class Procedure(Generic[Found]):
+    """What a command does with its section of a study. Its docstring is that of `perform`."""
+
+    kind: str
+    """The command's name, and its runs' kind."""
+    plan: Callable[[Study, Inputs], str]
+    """Says what will be done; raises UserError for what can be known before anything is computed or written."""
+    perform: Callable[[Session], Found]
+    """Computes; writes what it finds where the session's findings have a run directory."""
+    needs: tuple[EarlierRun, ...] = ()
+
+    def section(self, study: Study) -> Any:
+        """Its own section of a study."""
+        return getattr(study, self.kind.replace("-", "_"))

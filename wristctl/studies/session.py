@@ -1,0 +1,65 @@
+"""What a study works with while it is performed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from wristctl.config.study import Study
+from wristctl.studies.findings import Findings
+from wristctl.studies.inputs import Inputs
+
+if TYPE_CHECKING:
+    from wristctl.trial.control_loop import Shown
+    from wristctl.trial.trials import Trial
+
+
+class Done(Protocol):
+    """Called with how much is done by now, and figures to show beside it."""
+
+    def __call__(self, count: int = 0, **figures: float) -> None:
+        """Say it."""
+
+
+Event = Callable[..., None]
+"""Notes an event by its name, with fields."""
+
+
+class ShowProgress(Protocol):
+    """Shows how far something has come while a block works on it, and notes that as events."""
+
+    def __call__(self, event: Event, what: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+        """Begin to show `what`; without a `total` its length is unknown."""
+
+
+class Operator(Protocol):
+    """The person at the rig, or whoever else watches."""
+
+    def tell(self, text: str) -> None:
+        """Show a text that is no part of the result."""
+
+    def confirm(self, what: str) -> None:
+        """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not."""
+
+    def wait_for(self, what: str) -> None:
+        """Say what is to be done, and come back once it is."""
+
+    def watch(self, trials: Sequence[Trial], session: Session) -> AbstractContextManager[Shown]:
+        """Show the trials while a block performs them: it yields what each tick is handed to."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """The study with its inputs named for good, the inputs, where findings go, and who is told or asked meanwhile."""
+
+    study: Study
+    inputs: Inputs
+    findings: Findings
+    show: ShowProgress
+    operator: Operator
+
+    def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
+        """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""
+        return self.show(self.findings.event, what, total, unit)

@@ -1,0 +1,130 @@
+"""One closed loop, with pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from wristctl.config.errors import under
+from wristctl.config.study import Study
+from wristctl.report.tables import Table
+from wristctl.studies.findings import Findings
+from wristctl.studies.inputs import EarlierRun, Inputs
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    check_row,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_gains,
+    warn_if_it_buckles,
+    warn_if_outside,
+)
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.session import Session
+from wristctl.studies.study_result import StudyResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.simulation.closed_loop import Repeated
+    from wristctl.simulation.trajectory import Trajectory
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Simulated(StudyResult):
+    """One closed loop, as often as the study says, and whether the wrist ever bent beyond a full turn."""
+
+    kind = "simulate"
+
+    repeated: Repeated
+    """Metrics of every repetition."""
+    failed: bool
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of the first repetition."""
+        return self.repeated.first.trajectory
+
+    def frame(self) -> pd.DataFrame:
+        """The trajectory: time, angles, tip, tensions, ...; SI units."""
+        return self.trajectory.frame()
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check the controller and its gains."""
+    settings = study.simulate
+    with under("simulate"):
+        check_row(settings, tuned_gains(inputs))
+    from wristctl.simulation.draws import is_random
+
+    times = settings.repetitions if is_random(settings.loop) else 1
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s"
+
+
+def simulate(session: Session) -> Simulated:
+    """Simulate one closed loop and draw it."""
+    from wristctl.report.loop_figures import angles, errors, tensions
+    from wristctl.report.wrist_drawing import stroboscope
+    from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.trajectory import COLUMNS
+
+    study, findings = identified(session.study, "simulate", session.inputs), session.findings
+    settings, wrist = study.simulate, study.wrist
+    warn_if_it_buckles(findings, wrist, [settings.loop])
+    network = network_for(session.inputs, wrist, [settings.loop])
+    check_inverses(inverses_of([settings.reference]), network)
+    with session.progress("compiling and simulating the loop"):
+        repeated = run_simulation(study, network, tuned_gains(session.inputs))
+    course, failed = repeated.first.trajectory, bool(repeated.failed.any())
+    warn_if_outside(course.outside)
+    own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
+    columns = COLUMNS | own
+    units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
+    findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
+    title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if failed else "")
+    table = _table(findings, title, repeated)
+    with session.progress("drawing"):
+        findings.figure("angle", angles, [course])
+        findings.figure("error", errors, [course])
+        findings.figure("tensions", tensions, course)
+        findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
+    return Simulated(session.study, findings, [table], repeated, failed)
+
+
+def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
+    """Every metric: its value, or of several repetitions the median with its 95 % interval."""
+    import pandas as pd
+
+    from wristctl.comparison.statistics import spread
+    from wristctl.simulation.metrics import METRICS
+
+    once, rows = len(repeated.failed) == 1, list[tuple[object, ...]]()
+    for name, metric in METRICS.items():
+        if once:
+            value = repeated.first.metrics[name]
+            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
+            rows.append((name, value, metric.unit, metric.formula))
+        else:
+            found = spread(repeated.metrics[name])
+            meaning = f"{metric.formula}; median"
+            findings.metric(name, found.median, metric.unit, "lower", found.n, found.interval, meaning)
+            rows.append((name, found.median, found.low, found.high, metric.unit, metric.formula))
+    if once:
+        return Table(title, ("metric", "value", "unit", "meaning"), rows)
+    every = pd.DataFrame({"repetition": range(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics})
+    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in METRICS.items()})
+    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
+    return Table(f"{title}, {len(every)} repetitions", heads, rows)
+
+
+SIMULATE = Procedure(
+    "simulate",
+    plan,
+    simulate,
+    (
+        EarlierRun("network", kind="train", optional=True),
+        EarlierRun("tuned", kind="tune", optional=True),
+        EarlierRun("from_identified", kind="identify", optional=True),
+    ),
+)

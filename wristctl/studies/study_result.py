@@ -1,0 +1,62 @@
+"""What a study found, as it is handed out."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+from wristctl.config.study import Study
+from wristctl.records import Run
+from wristctl.report.tables import Table
+from wristctl.studies.findings import Figures, Findings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class StudyResult(ABC):
+    """A study's metrics, tables and figures; each kind of study adds what else it found.
+
+    The same with and without a run directory.
+    """
+
+    kind: ClassVar[str]
+    """The command that makes such a result."""
+
+    study: Study
+    """As it was performed: inputs that have a run directory are named in it."""
+    findings: Findings
+    tables: Sequence[Table]
+    """What the command prints."""
+
+    @abstractmethod
+    def frame(self) -> pd.DataFrame:
+        """The main table."""
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Numbers by name, in the units that the run's metrics.json gives; nan where there is none."""
+        known = {name: each["value"] for name, each in self.findings.metrics.items()}
+        return {name: math.nan if value is None else value for name, value in known.items()}
+
+    @property
+    def figures(self) -> Figures:
+        """matplotlib figures by name, each drawn when it is first asked for."""
+        return self.findings.figures
+
+    @cached_property
+    def run(self) -> Run | None:
+        """The sealed run directory; None where the result is in memory only."""
+        return Run(self.findings.run.path) if self.findings.run else None
+
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables)
+
+    def __repr__(self) -> str:
+        where = str(self.findings.run.path) if self.findings.run else "in memory"
+        return f"<{type(self).__name__}: {where}; {len(self.metrics)} metrics; {self.figures!r}>"
