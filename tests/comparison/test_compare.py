@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from wristctl.comparison.comparison import compare, refuse_tuned_scenarios
+from wristctl.comparison.combinations import compare, refuse_tuned_scenarios
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
