@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import shutil
@@ -102,19 +101,3 @@ def test_the_command_shown_leaves_a_run(copy: Path) -> None:
     theta = tips["theta"].to_numpy()
     np.testing.assert_allclose(np.arctan2(tips["y"], tips["x"]), theta / 2.0, atol=1e-12)  # a chord's direction
     assert len(tips) == 101 and "width [mm]" in said and reached.problems() == []
-
-
-def test_imports_point_down_as_contributing_says() -> None:
-    (said,) = re.findall(r"Imports point down: ([^.]*)\.", PAGE)
-    order = said.replace("\n", " ").split(" > ")
-    rooms = [each.strip() for each in order]
-    assert {path.parent.name for path in ROOT.glob("wristctl/*/__init__.py")} <= set(rooms)
-    for file in (ROOT / "wristctl").rglob("*.py"):
-        own = file.relative_to(ROOT / "wristctl").parts[0].removesuffix(".py")
-        if own not in rooms:
-            continue
-        for node in ast.walk(ast.parse(file.read_text())):
-            module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
-            other = module.split(".")[1] if module.startswith("wristctl.") else own
-            below = other not in rooms or rooms.index(other) >= rooms.index(own)
-            assert below, f"{file.relative_to(ROOT)} imports {module}"
