@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.config import tables
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant
 from wristctl.config.wrist import WristParameters
@@ -26,13 +27,15 @@ WRIST = WristParameters()
 
 @pytest.fixture(autouse=True, params=[*PLANTS, "elsewhere"])
 def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
-    """Each plant, known under its name for one test."""
+    """Each plant, known under its name for one test; what its package puts into tables goes again."""
     monkeypatch.syspath_prepend(str(HERE))
+    for table in (each for each in vars(tables).values() if isinstance(each, tables.Table)):
+        monkeypatch.setattr(table, "_entries", dict(table._entries))
     if request.param != "elsewhere":
         return PLANTS[request.param]
     from elsewhere.hinge import HINGE
 
-    monkeypatch.setitem(PLANTS, "hinge", HINGE)
+    PLANTS["hinge"] = HINGE
     return HINGE
 
 
