@@ -12,14 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.config.loop import Loop, Reference
+from tests.bench.conftest import TAUT, HostOn, host_on
+from wristctl.config.bench import BenchSettings, WeakenedPlant
+from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.wrist.plant import PLANTS, PlantModel, poses
 
+__all__ = ["host_on"]  # a fixture of the bench' tests
 HERE = Path(__file__).parent
 WRIST = WristParameters()
 
@@ -128,3 +132,35 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
 
 def test_every_plant_is_registered_under_its_own_name(model: PlantModel) -> None:
     assert PLANTS[model.name] is model and Path(sys.modules[model.parameters.__module__].__file__ or "") == model.source
+
+
+def test_on_the_bench_it_comes_to_rest_and_the_other_side_is_its_mirror_image(
+    host_on: HostOn, model: PlantModel
+) -> None:
+    settings = BenchSettings(motors=TAUT, plant=WeakenedPlant(model=model.name))
+    ends = []
+    for steps in ((-110, -110, 130, 130), (130, 130, -110, -110)):
+        host = host_on(settings)
+        host.reel(steps)
+        host.rest(4.0)
+        truth = host.bench.truth()
+        assert truth.theta.shape[1] == model.coordinates(settings.segments) and truth.pull[-1].min() > 1.0
+        assert np.ptp(truth.theta[-100:], axis=0).max() < 1e-7
+        ends.append(truth.theta[-1])
+    assert ends[0].sum() > 0.05
+    np.testing.assert_allclose(ends[1], -ends[0], atol=1e-6)
+
+
+def test_a_rehearsal_logs_it_as_it_moves(model: PlantModel) -> None:
+    """A perfect camera sees the plant's angle; the same move to the other side is its mirror image."""
+    truth = RehearsedTruth(WRIST, Actuator(level="tendon"), 0.0, 0.0, exposure=0.0, dropped=0.0, plant=model.name)
+    moves: list[tuple[DirectionName, Reference]] = [("ulnar", Reference()), ("radial", Reference())]
+    log, frames, trials = rehearse(WRIST, truth, moves, 2.0, np.random.default_rng(1))
+    assert list(trials["direction"]) == ["ulnar", "radial"] and set(frames["verdict"]) == {"ok"}
+    there, back = (frames[frames["trial"] == k] for k in range(2))
+    assert 0.2 < there["theta"].iloc[-1] < 1.0
+    mirrored = np.interp(there["captured"], back["captured"], -back["theta"])
+    inside = there["captured"].between(back["captured"].min(), back["captured"].max())
+    np.testing.assert_allclose(there["theta"][inside], mirrored[inside], atol=2e-3)
+    reeled = [log[log["trial"] == k][["position_4", "position_1"]].to_numpy() for k in range(2)]
+    np.testing.assert_array_equal(reeled[0], reeled[1][:, ::-1])
