@@ -23,7 +23,7 @@ test: lint
 lint: .venv/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict wristctl
+	$(BIN)/mypy --strict wristctl tests
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
