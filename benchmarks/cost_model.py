@@ -37,11 +37,12 @@ def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
     from wristctl.config.loop import Loop, Reference
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import controller, gains_of
+    from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
-    from wristctl.simulation.rollout import rollout, sample_period
+    from wristctl.simulation.rollout import rollout
 
     loop, wrist, law = Loop(plant_segments=segments), WristParameters(), controller("smc")
-    course = motion(Reference(), wrist, horizon, sample_period(loop))
+    course = motion(Reference(), wrist, horizon, sample_period(loop.control_period))
 
     def run(count: int) -> None:
         gains = np.tile(gains_of(law, "initial"), (count, 1))
@@ -53,8 +54,8 @@ def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
 
 def point(lanes: int, segments: int, horizon: float, threads: int) -> dict[str, float]:
     """Median seconds of one batch, and this process's memory [MiB] before and at its peak."""
-    run, times = batch(segments, horizon, threads), []
-    before = peak()
+    run, before = batch(segments, horizon, threads), peak()
+    times: list[float] = []
     while len(times) < 3 or sum(times) < LEAST:
         start = time.perf_counter()
         run(lanes)
@@ -67,12 +68,12 @@ def streamed(threads: int) -> dict[str, float]:
     from wristctl.config.loop import Loop, Reference
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import controller
+    from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
-    from wristctl.simulation.rollout import sample_period
     from wristctl.simulation.stream import stream
 
     loop, wrist, law = Loop(plant_segments=1), WristParameters(), controller("smc")
-    course = motion(Reference(), wrist, 5.0, sample_period(loop))
+    course = motion(Reference(), wrist, 5.0, sample_period(loop.control_period))
     rng = np.random.default_rng(0)
 
     def batches() -> Iterator[np.ndarray]:

@@ -12,8 +12,9 @@ import numpy as np
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import rollout, sample_period
+from wristctl.simulation.rollout import rollout
 from wristctl.tuning.search import search
 
 HORIZON, REPEATS = 5.0, 5
@@ -22,7 +23,7 @@ HORIZON, REPEATS = 5.0, 5
 def timed(lanes: int, segments: int, threads: int) -> float:
     """Seconds of one batch."""
     loop, wrist, law = Loop(plant_segments=segments), Study().wrist, controller("smc")
-    course = motion(Reference(), wrist, HORIZON, sample_period(loop))
+    course = motion(Reference(), wrist, HORIZON, sample_period(loop.control_period))
     gains = np.tile(gains_of(law, "initial"), (lanes, 1))
     start = time.perf_counter()
     rollout(law, gains, [course], np.zeros(lanes, np.int64), loop, wrist, threads=threads)
