@@ -5,6 +5,7 @@ The plants of the table, and one from elsewhere.
 
 from __future__ import annotations
 
+import importlib
 import sys
 from pathlib import Path
 from typing import Any
@@ -27,12 +28,10 @@ WRIST = WristParameters()
 
 @pytest.fixture(autouse=True, params=["pcc", "hinge"])
 def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
-    """Each plant, known under its name for one test."""
-    monkeypatch.syspath_prepend(str(HERE))
+    """Each plant, known under its name for one test; its module alone, since the package fills every table."""
+    monkeypatch.syspath_prepend(str(HERE / "elsewhere"))
     if request.param == "hinge":
-        from elsewhere.hinge import HINGE
-
-        monkeypatch.setitem(PLANTS, "hinge", HINGE)
+        monkeypatch.setitem(PLANTS, "hinge", importlib.import_module("hinge").HINGE)
     found: PlantModel = PLANTS[request.param]
     return found
 
