@@ -6,8 +6,8 @@ import subprocess
 import sys
 import time
 
-from wristctl.board.board import Board
 from wristctl.board.check import RoundTrips, round_trips
+from wristctl.board.driver import Board
 from wristctl.board.emulator import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.virtual import VirtualTransport

@@ -6,7 +6,7 @@ import math
 import time
 
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.config.bench import BenchSettings
 from wristctl.config.wrist import WristParameters
 

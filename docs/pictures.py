@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.comparison.comparison import ComparedRow, compare
+from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.paper import T2
 from wristctl.config.load import load_study
 from wristctl.config.vision import Gates, Markers, SceneSettings

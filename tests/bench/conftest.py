@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.board.messages import Flag, Target
 from wristctl.config.bench import BenchSettings, Motors
 from wristctl.config.wrist import WristParameters

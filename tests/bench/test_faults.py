@@ -8,6 +8,7 @@ import pytest
 
 from tests.bench.conftest import TAUT, HostOn
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, PortLost, Restarted
+from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import Fault as Latched
 from wristctl.config.bench import FAULTS, BenchSettings, FaultKind, InjectedFault
 
@@ -84,3 +85,12 @@ def test_every_kind_of_fault_is_explained_in_the_schema() -> None:
     for kind in get_args(FaultKind):
         assert f"{kind}: {FAULTS[kind]}" in said
         assert InjectedFault(kind=kind).kind == kind
+
+
+def test_a_reset_that_falls_due_between_two_cycles_of_the_clock_happens(host_on: HostOn) -> None:
+    """The nearest cycle may lie before the moment that was asked for."""
+    host = host_on(settings(InjectedFault(kind="board-reset", at=0.2)))
+    starts = (host.start + k * 1e-3 for k in range(100))
+    host.bench.begin(next(each for each in starts if round((each + 0.2) * FREQUENCY) < (each + 0.2) * FREQUENCY))
+    with pytest.raises((Restarted, NoAnswer)):
+        host.turn(RATES, 0.5)

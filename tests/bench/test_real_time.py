@@ -26,8 +26,8 @@ from wristctl.bench.line import FaultyLine
 from wristctl.bench.real_time_bench import RealTimeBench
 from wristctl.bench.rig import Rig
 from wristctl.bench.server import BenchServer
-from wristctl.board.board import Board
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
+from wristctl.board.driver import Board
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import Flag, Target
 from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera

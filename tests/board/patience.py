@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from wristctl.board.board import Board
 from wristctl.board.board_errors import NoAnswer
+from wristctl.board.driver import Board
 from wristctl.board.messages import Configure
 from wristctl.board.transport import Transport
 

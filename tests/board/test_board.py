@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from wristctl.board import board as driver
-from wristctl.board.board import ATTEMPTS, Board, within_reach
+from wristctl.board import driver
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
+from wristctl.board.driver import ATTEMPTS, Board, within_reach
 from wristctl.board.emulator.virtual import VirtualTransport
 from wristctl.board.messages import (
     DICTIONARY_HASH,

@@ -13,7 +13,7 @@ import pandas as pd
 from wristctl.cli import app as application
 from wristctl.cli.command import study_command
 from wristctl.config.errors import UserError
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.inputs import EarlierRun
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from wristctl.comparison.comparison import ComparedRow, compare, refuse_tuned_scenarios
+from wristctl.comparison.combinations import ComparedRow, compare, refuse_tuned_scenarios
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time

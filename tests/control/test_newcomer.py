@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.comparison.comparison import compare
+from wristctl.comparison.combinations import compare
 from wristctl.config.study import Study
 from wristctl.control.law import Controller, Gain
 from wristctl.control.table import CONTROLLERS

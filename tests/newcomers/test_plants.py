@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import motion

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.loop_figures import angles, errors, tensions
 from wristctl.report.track_figures import angle
-from wristctl.report.trial_figures import DIRECTIONS, desired_and_obtained, lateness
-from wristctl.report.trial_figures import Course as Trial
+from wristctl.report.trial_figures import DIRECTIONS, LoggedTrial, desired_and_obtained, lateness
 from wristctl.report.trial_figures import errors as trial_errors
 from wristctl.report.trial_figures import tensions as trial_tensions
 from wristctl.report.tuning_figures import convergence, gain_history
@@ -81,13 +80,13 @@ def search(name: str = "smc", count: int = 3) -> Search:
     return Search(name, gains, float(values.min()), values.size, values, 10.0**exponent)
 
 
-def trials() -> list[Trial]:
+def trials() -> list[LoggedTrial]:
     """Two repetitions in three directions, with a simulation, one of them pushed."""
     one = course("smc/exchanged")
     simulated = one.time, 0.9 * one.theta, 0.1 * one.theta
     common = one.time, one.theta, one.theta_ref, one.theta_desired, one.tension, simulated
     pushes = {"flexion": (2.0, 2.5)}
-    return [Trial(each, one.label, k, *common, pushes.get(each)) for each in DIRECTIONS[:3] for k in range(2)]
+    return [LoggedTrial(each, one.label, k, *common, pushes.get(each)) for each in DIRECTIONS[:3] for k in range(2)]
 
 
 def sightings() -> list[Sighting]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.simulation.closed_loop import Repeated

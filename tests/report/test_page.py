@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study

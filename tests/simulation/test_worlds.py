@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.comparison.comparison import ComparedRow, compare
+from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor

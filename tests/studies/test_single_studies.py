@@ -12,7 +12,7 @@ import pytest
 import wristctl
 from tests.identification.benches import UPRIGHT, write_run
 from wristctl import studies
-from wristctl.comparison.comparison import count_rollouts
+from wristctl.comparison.combinations import count_rollouts
 
 
 def test_identified_parameters_reach_a_loop_from_memory(tmp_path: Path) -> None:

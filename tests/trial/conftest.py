@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.calibration import WristCalibration

@@ -9,7 +9,7 @@ import pytest
 
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.prepare import prepare
 from wristctl.trial.safety import SafetyStop

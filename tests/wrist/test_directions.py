@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.comparison.comparison import compare
+from wristctl.comparison.combinations import compare
 from wristctl.config.load import load_study
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of

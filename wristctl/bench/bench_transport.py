@@ -48,9 +48,9 @@ class BenchTransport(VirtualTransport):
     def _run(self, end: int) -> None:
         """Run towards `end`, at most to the next reset that is due, and do that."""
         due = self._faults.next("board-reset", self._reset)
-        stop = end if math.isinf(due) else min(end, round(due * FREQUENCY))
-        self.chip.run(max(0, stop - self.chip.cycles))
-        if self.now() >= due:
+        cycle = math.inf if math.isinf(due) else round(due * FREQUENCY)
+        self.chip.run(max(0, int(min(end, cycle)) - self.chip.cycles))
+        if self.chip.cycles >= cycle:
             self.chip.reset()
             self._reset = due
 

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.bench.motors import CYCLES, PERIOD, Hanging, follow, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
+from wristctl.config.choices import PLANTS
 from wristctl.config.plant import Disturbances
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import drive_of
@@ -20,8 +21,6 @@ from wristctl.simulation.disturbances import acting
 from wristctl.simulation.worlds import drawn, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.plant import kernel_of
-
-Array = NDArray[np.float64]
 
 _KEPT = 60_000
 """Periods that are remembered at least."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.seeds import Entropy
 from wristctl.vision.camera import Frame, Image
-
-Array = NDArray[np.float64]
 
 
 class Painter(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.board.messages import Command, Status
 
 WIRING_STEPS = 160

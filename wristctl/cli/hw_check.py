@@ -12,7 +12,7 @@ from wristctl.cli.hw_options import BAUD, Baud, Port, facts_of
 from wristctl.cli.options import Debug, Json, Quiet
 from wristctl.cli.progress import listening, progress
 from wristctl.config.errors import UserError
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.counting import no_event
 
 
@@ -28,8 +28,8 @@ def check(
     debug: Debug = False,
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring."""
-    from wristctl.board.board import Board
     from wristctl.board.check import move_a_little, round_trips
+    from wristctl.board.driver import Board
     from wristctl.board.messages import Command
     from wristctl.board.transport import EMULATED, open_transport
 

@@ -17,7 +17,7 @@ def flash(
     port: Port = None, image: Image = None, as_json: Json = False, quiet: Quiet = False, debug: Debug = False
 ) -> None:
     """Write the firmware into the board, read it back, and see that it answers."""
-    from wristctl.board.board import Board
+    from wristctl.board.driver import Board
     from wristctl.board.flashing import IMAGE
     from wristctl.board.flashing import flash as write
     from wristctl.board.transport import BOOT_TIME, SerialTransport, only_board

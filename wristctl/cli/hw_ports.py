@@ -9,7 +9,7 @@ import typer
 
 from wristctl.cli.options import Debug, Json
 from wristctl.config.errors import UserError
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 
 def ports(

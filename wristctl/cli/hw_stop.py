@@ -8,7 +8,7 @@ from wristctl.cli.options import Debug
 
 def stop(port: Port = None, baud: Baud = BAUD, debug: Debug = False) -> None:
     """Emergency stop: no further step, drives released. Works beside a running program."""
-    from wristctl.board.board import Board
+    from wristctl.board.driver import Board
     from wristctl.board.transport import open_transport
 
     transport = open_transport(port, baud, exclusive=False)

@@ -12,7 +12,7 @@ from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
 from wristctl.records import Run
 from wristctl.records.journal import jsonable
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.perform import plain_tables
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.comparison.comparison import ComparedRow
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2, verdict
 from wristctl.comparison.statistics import spread
 

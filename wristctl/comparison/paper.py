@@ -30,7 +30,7 @@ EXPERIMENT: dict[str, Printed] = {
 """The experiment: the mean of the directions, and two with a person's push (whose units are printed as m and s)."""
 
 
-class Trained(NamedTuple):
+class TrainingColumn(NamedTuple):
     """One column of T1; the paper says of neither loss nor gradient on what scale it is."""
 
     gradient_norm: float
@@ -40,11 +40,11 @@ class Trained(NamedTuple):
     validation_loss: float
 
 
-T1: dict[str, Trained] = {
-    "sigmoid": Trained(0.0012, 99.7, 0.05, 0.01),
-    "relu": Trained(0.097, 95.5, 0.55, 0.25),
-    "leaky-relu": Trained(0.041, 97.1, 0.31, 0.10),
-    "tanh": Trained(0.011, 98.8, 0.22, 0.09),
+T1: dict[str, TrainingColumn] = {
+    "sigmoid": TrainingColumn(0.0012, 99.7, 0.05, 0.01),
+    "relu": TrainingColumn(0.097, 95.5, 0.55, 0.25),
+    "leaky-relu": TrainingColumn(0.041, 97.1, 0.31, 0.10),
+    "tanh": TrainingColumn(0.011, 98.8, 0.22, 0.09),
 }
 
 FACTOR = 1.5

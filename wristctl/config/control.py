@@ -7,9 +7,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.choices import CONTROLLERS, METRICS, OPTIMISERS
 from wristctl.config.loop import LOOPS, DirectionName, Loop, Loops, Reference, Scenario
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
-from wristctl.config.tables import CONTROLLERS, METRICS, OPTIMISERS
 
 GainsChoice = str | dict[str, float]
 ControllerName = Annotated[str, OneOf(CONTROLLERS)]

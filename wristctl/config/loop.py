@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, model_validator
 
+from wristctl.config.choices import REFERENCES
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
-from wristctl.config.tables import REFERENCES
 
 InverseName = Literal["none", "exact", "network"]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]

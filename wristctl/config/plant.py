@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
+from wristctl.config.choices import DISTURBANCES, PLANTS
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
-from wristctl.config.tables import DISTURBANCES, PLANTS
 
 PlantName = Annotated[str, OneOf(PLANTS)]
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, model_v
 from pydantic.config import JsonDict
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from wristctl.config.tables import Table
+from wristctl.config.choices import Choices
 
 
 class Section(BaseModel):
@@ -34,7 +34,7 @@ def choice(default: Any, meaning: str, source: str = "", **constraints: Any) -> 
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""
 
-    table: Table[Any]
+    table: Choices[Any]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """The string's schema, and then that the table has it; the error is that of a Literal."""

@@ -1,15 +1,15 @@
-"""The table of controllers: a newcomer is one file, and one line in `wristctl.config.tables`."""
+"""The table of controllers: a newcomer is one file, and one line in `wristctl.config.choices`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from wristctl.config.choices import CONTROLLERS as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError, meant
-from wristctl.config.tables import CONTROLLERS as _TABLE
-from wristctl.config.tables import Table
 from wristctl.control.law import Controller
 
-CONTROLLERS: Table[Controller] = _TABLE
+CONTROLLERS: Choices[Controller] = _TABLE
 
 TunedGains = Mapping[str, Mapping[str, float]]
 """Gains by controller and name, as a tune run finds them."""

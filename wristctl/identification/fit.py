@@ -9,16 +9,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
 from wristctl.lanes.cores import cores
-
-Array = NDArray[np.float64]
 
 _NUDGE, _NUDGE_M = 1e-4, 1e-6
 """Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""

@@ -9,16 +9,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import TENDON, Drive, Motor, pulls
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle
-
-Array = NDArray[np.float64]
 
 SETTLE = 0.5
 """Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast."""

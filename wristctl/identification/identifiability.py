@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.wording import Setting
@@ -20,8 +20,6 @@ from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import UNKNOWNS
-
-Array = NDArray[np.float64]
 
 
 def widest(name: str, settings: IdentifySettings) -> float:

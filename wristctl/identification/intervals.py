@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
 from wristctl.identification.unknowns import UNKNOWNS
-
-Array = NDArray[np.float64]
 
 NORMAL_95 = 1.959964
 ALIKE = 0.2

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.directions import DIRECTIONS, in_plane, tendons_of
@@ -15,7 +15,6 @@ from wristctl.wrist.directions import DIRECTIONS, in_plane, tendons_of
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 _FEWEST = 20
 """Frames that a trial must have to be of use."""

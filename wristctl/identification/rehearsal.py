@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import SupposedWrist, angles
@@ -30,7 +30,6 @@ from wristctl.wrist.segments import load_segments, segments
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 _PERIOD, _LOGGED = 1e-3, 5
 """Tick of the simulation [s], and how many of them lie between two rows of the log."""

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.lanes.types import LANES
-
-Array = NDArray[np.float64]
 
 
 def width(count: int) -> int:

@@ -8,8 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.learning.domain import Domain
-from wristctl.wrist.kinematics import Array, arc_tip
+from wristctl.wrist.kinematics import arc_tip
 
 CLOSE_DEG = 0.5
 """An error up to this counts as close."""

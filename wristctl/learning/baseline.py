@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.learning.network import Scaler
-from wristctl.wrist.kinematics import Array
 
 DEGREE = 5
 """Of the whole term: 21 terms in x and y, 126 with pose and mass."""

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.domain import OTHERS, Domain
-from wristctl.wrist.kinematics import Array, arc_tip, chain_tip, exact_angle, exact_arc
+from wristctl.wrist.kinematics import arc_tip, chain_tip, exact_angle, exact_arc
 
 LEAST_SHARE = 2
 """Samples that validation and test need at least: one sample has no spread to explain."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.wrist.kinematics import Array, exact_arc
+from wristctl.arrays import Array
+from wristctl.wrist.kinematics import exact_arc
 
 EDGE = 1e-9
 """Relative slack at the region's edge, so that rounding does not put an edge point outside."""

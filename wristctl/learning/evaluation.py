@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from wristctl.arrays import Array
 from wristctl.learning.angle_errors import MEASURES as OF_ANGLES
 from wristctl.learning.angle_errors import angle_errors, error_map
 from wristctl.learning.baseline import Polynomial
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
 from wristctl.learning.inference import compiled_network
 from wristctl.learning.training_result import TrainingResult
-from wristctl.wrist.kinematics import Array, exact_angle
+from wristctl.wrist.kinematics import exact_angle
 
 HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
 """Names of the places where samples were held out, by why."""

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.learning.baseline import Polynomial
 from wristctl.learning.network import LEAK, Network
-from wristctl.wrist.kinematics import Array
 
 _ACTIVATIONS = ("sigmoid", "tanh", "silu", "relu", "leaky-relu")
 

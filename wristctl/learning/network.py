@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.config.learning import Activation
 from wristctl.learning.domain import Domain
-from wristctl.wrist.kinematics import AnglePath, Array, TipPath
+from wristctl.wrist.kinematics import AnglePath, TipPath
 
 BLOCK = 12
 """Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine

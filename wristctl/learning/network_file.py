@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
@@ -18,7 +19,6 @@ from wristctl.config.wording import Call
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing
-from wristctl.wrist.kinematics import Array
 
 ENTRY = "wristctl"
 """The one entry of the file's metadata: of several, safetensors writes the order at random."""

@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.config.learning import NetworkSettings
-from wristctl.wrist.kinematics import Array
 
 LEVEL = 0.05
 """Significance level, after Holm's correction over all pairs of a group."""

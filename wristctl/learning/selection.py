@@ -8,11 +8,11 @@ from itertools import product
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.learning.dataset import Split
 from wristctl.learning.training_result import Job, TrainingResult
-from wristctl.wrist.kinematics import Array
 
 
 @dataclass(frozen=True)

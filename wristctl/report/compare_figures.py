@@ -12,14 +12,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
-from wristctl.comparison.comparison import ComparedRow
+from wristctl.arrays import Array
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.report.loop_figures import draw_desired, within_half_a_move
 from wristctl.report.style import GREY, WIDTH, PowersOfTen, colour, figure, line, logarithmic, title, undress
 
-Array = NDArray[np.float64]
 Across = Literal["reference", "loop"]
 """What the columns of a figure are."""
 

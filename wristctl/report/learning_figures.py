@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
+from wristctl.arrays import Array
 from wristctl.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend, logarithmic, title
-from wristctl.wrist.kinematics import Array
 
 ANGLES, ERRORS = "PuOr", "cividis"
 """Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright."""

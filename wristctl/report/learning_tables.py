@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from wristctl.arrays import Array
 from wristctl.learning.dataset import Samples
-from wristctl.wrist.kinematics import Array
 
 if TYPE_CHECKING:
     from wristctl.learning.selection import CrossValidated

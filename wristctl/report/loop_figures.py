@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.report.style import (
     BLACK,
     GREY,
@@ -24,8 +24,6 @@ from wristctl.report.style import (
     title,
 )
 from wristctl.simulation.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _SMALLEST = 1e-8
 """Errors below this [rad] are not shown on a logarithmic axis."""

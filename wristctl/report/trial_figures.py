@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.report.style import (
     BLACK,
     BLUE,
@@ -25,8 +25,6 @@ from wristctl.report.style import (
     title,
 )
 
-Array = NDArray[np.float64]
-
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 """In the paper's order."""
 
@@ -35,7 +33,7 @@ _SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
 
 
 @dataclass(frozen=True)
-class Course:
+class LoggedTrial:
     """One trial over time, T samples, as logged; SI units."""
 
     direction: str
@@ -54,7 +52,7 @@ class Course:
     """When the push began and ended [s]."""
 
 
-def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure:
+def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
     made, panels = _panels(courses)
     for course in courses:
@@ -65,7 +63,7 @@ def desired_and_obtained(courses: Sequence[Course], heading: str = "") -> Figure
     return _finished(made, panels, courses, heading, "bending angle [deg]")
 
 
-def errors(courses: Sequence[Course], heading: str = "") -> Figure:
+def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Error e = theta - theta_ref [deg] over time [s], one panel for each direction."""
     made, panels = _panels(courses, sharey=True)
     for course in courses:
@@ -76,7 +74,7 @@ def errors(courses: Sequence[Course], heading: str = "") -> Figure:
     return _finished(made, panels, courses, heading, "error [deg]")
 
 
-def tensions(courses: Sequence[Course], heading: str = "") -> Figure:
+def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Commanded tension [N] of each tendon of both sides over time [s], one panel for each direction."""
     made, panels = _panels(courses, sharey=True)
     for course in courses:
@@ -94,14 +92,14 @@ def lateness(late: Array, period: float) -> Figure:
     return made
 
 
-def _draw_simulated(panel: Axes, course: Course, which: Literal[1, 2]) -> None:
+def _draw_simulated(panel: Axes, course: LoggedTrial, which: Literal[1, 2]) -> None:
     """Angle (1) or error (2) in simulation, beside the first repetition alone."""
     if course.simulated is not None and course.repetition == 0:
         own: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
         panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | _SIMULATED)
 
 
-def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
+def _panels(courses: Sequence[LoggedTrial], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
     names = [name for name in DIRECTIONS if any(course.direction == name for course in courses)]
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
@@ -111,7 +109,9 @@ def _panels(courses: Sequence[Course], **shared: Any) -> tuple[Figure, dict[str,
     return made, dict(zip(names, axes.ravel().tolist(), strict=False))
 
 
-def _finished(made: Figure, panels: dict[str, Axes], courses: Sequence[Course], heading: str, ylabel: str) -> Figure:
+def _finished(
+    made: Figure, panels: dict[str, Axes], courses: Sequence[LoggedTrial], heading: str, ylabel: str
+) -> Figure:
     for name, panel in panels.items():
         title(panel, name)
         pushes = {course.push for course in courses if course.direction == name and course.push is not None}

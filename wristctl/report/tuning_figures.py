@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.control.law import Gain
 from wristctl.report.style import BLACK, colour, figure, legend_below, logarithmic, title
 from wristctl.tuning.search import Search
-
-Array = NDArray[np.float64]
 
 
 def convergence(searches: Sequence[Search]) -> Figure:

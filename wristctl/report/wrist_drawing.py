@@ -16,17 +16,15 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
-from numpy.typing import NDArray
 
-from wristctl.config.tables import PLANTS
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.report.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.vision.drawn_parts import coil, hand
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
 from wristctl.wrist.shape import Planar, discs, offset_points
-
-Array = NDArray[np.float64]
 
 RIM = 1.25
 """Radius of the drawn discs over that of the circle of tendons."""

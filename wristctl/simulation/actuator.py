@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
@@ -21,8 +21,6 @@ from wristctl.lanes.lane import floor, rounded, sqrt, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.wrist.plant import PlantModel, stretch
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
-
-Array = NDArray[np.float64]
 
 LAGGED, TENDON = 1, 2
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import lanes_of, spread
@@ -15,8 +16,7 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import Drive, at_rest, level_of, motor_of
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import readings, schedule
-from wristctl.simulation.kernel import RECORDED, Course, Scratch, Setup, State
-from wristctl.simulation.kernel import World as Values
+from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
@@ -24,7 +24,6 @@ from wristctl.simulation.worlds import World, plant_of
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Start = Callable[[WristParameters], Array]
 """The coordinates (q,) at which a plant begins, at rest."""
@@ -34,9 +33,9 @@ class Batch(NamedTuple):
     """What `run_blocks` is given, and how many blocks and samples there are."""
 
     setup: Setup
-    course: Course
-    world: Values
-    state: State
+    course: LoopCourse
+    world: LoopValues
+    state: LoopState
     blocks: int
     samples: int
     wide: tuple[int, ...]
@@ -92,7 +91,7 @@ def batch(
         return at_rest(drive, actual[each], model, rest[each])
 
     goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
-    values = Values(
+    values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
         model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
         limits=of_worlds(limits),
@@ -104,7 +103,7 @@ def batch(
     cases = [acting(each, motions[0].time) for each in kinds]
     case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[lanes.world]
     watch, frames = _watch(worlds, lanes, motions[0].horizon, model, rest)
-    state = State(
+    state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
         memory=spread(np.zeros(max(1, controller.memory)), count),
@@ -115,7 +114,7 @@ def batch(
         watch=watch,
     )
     references = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
-    course = Course(references, _stacked(cases, samples), frames)
+    course = LoopCourse(references, _stacked(cases, samples), frames)
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.substeps, ticks)
     return Batch(setup, course, values, state, blocks, samples, wide)
 

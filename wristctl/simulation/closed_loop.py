@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
@@ -23,8 +24,6 @@ from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import loops_of, plant_of
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
-
-Array = NDArray[np.float64]
 
 _TOGETHER = 64
 """Rollouts that are recorded at once."""

@@ -1,6 +1,6 @@
 """Disturbances, evaluated on the sample grid before the loop runs: forces on the last disc and stiffness in time.
 
-The entries of `wristctl.config.tables.DISTURBANCES`: their forces add, their scales of the stiffness multiply.
+The entries of `wristctl.config.choices.DISTURBANCES`: their forces add, their scales of the stiffness multiply.
 """
 
 from __future__ import annotations
@@ -9,14 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import DISTURBANCES as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.config.plant import Disturbances
 from wristctl.config.section import Parameter
-from wristctl.config.tables import DISTURBANCES as _TABLE
-from wristctl.config.tables import Table
-
-Array = NDArray[np.float64]
 
 Of = Callable[[Disturbances, Array], Array]
 """From the settings and times (T,) [s] to what is so then, (T,)."""
@@ -38,7 +36,7 @@ class Disturbance:
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
 
 
-DISTURBANCES: Table[Disturbance] = _TABLE
+DISTURBANCES: Choices[Disturbance] = _TABLE
 
 
 def acting(settings: Disturbances, time: Array) -> Array | None:

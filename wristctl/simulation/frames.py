@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Sensor
 from wristctl.seeds import Entropy
 from wristctl.simulation.observer import Schedule
-
-Array = NDArray[np.float64]
 
 
 def schedule(sensor: Sensor, period: float, horizon: float) -> Schedule:

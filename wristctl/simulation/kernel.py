@@ -45,7 +45,7 @@ class Setup(NamedTuple):
     ticks: int
 
 
-class Course(NamedTuple):
+class LoopCourse(NamedTuple):
     """What happens over time, on the sample grid, and the ticks of frames.
 
     `references` [motion, sample, (angle, rate, acceleration)], continued between samples by its own derivatives;
@@ -57,7 +57,7 @@ class Course(NamedTuple):
     schedule: Any
 
 
-class World(NamedTuple):
+class LoopValues(NamedTuple):
     """Values that stay, [block, row, lane]; with one block only they are every block's."""
 
     plant: Any
@@ -68,7 +68,7 @@ class World(NamedTuple):
     goals: Any
 
 
-class State(NamedTuple):
+class LoopState(NamedTuple):
     """What goes on, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates.

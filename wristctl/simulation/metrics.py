@@ -1,4 +1,4 @@
-"""Metrics of one closed loop, each with formula, unit and heading: the entries of `wristctl.config.tables.METRICS`.
+"""Metrics of one closed loop, each with formula, unit and heading: the entries of `wristctl.config.choices.METRICS`.
 
 e = theta - theta_ref (E12), sampled at the control ticks; T is the horizon. The move is the time until the reference
 rests; a reference that does not rest before the horizon has neither settling time nor overshoot. Tensions are those
@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wristctl.config.tables import METRICS as _TABLE
-from wristctl.config.tables import Table
+from wristctl.arrays import Array
+from wristctl.config.choices import METRICS as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.simulation.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _LEAST_MOVE = 1e-9
 """Move [rad] below which there is nothing to settle on."""
@@ -49,7 +47,7 @@ class Metric:
     """What `never` (nan) counts in tuning, by the horizon [s]; None: such gains have failed."""
 
 
-METRICS: Table[Metric] = _TABLE
+METRICS: Choices[Metric] = _TABLE
 
 
 def summary(totals: Totals) -> dict[str, Array]:

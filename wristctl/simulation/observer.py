@@ -11,8 +11,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
@@ -22,8 +22,6 @@ from wristctl.simulation.actuator import at_rest, drive_of, pulls, tendon_stiffn
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
-
-Array = NDArray[np.float64]
 
 _ONE = (0,)
 

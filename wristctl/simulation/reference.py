@@ -7,18 +7,16 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import REFERENCES as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
-from wristctl.config.tables import REFERENCES as _TABLE
-from wristctl.config.tables import Table
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse, arc_path, exact_arc, exact_inverse
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class ReferenceKind:
     """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
 
 
-REFERENCES: Table[ReferenceKind] = _TABLE
+REFERENCES: Choices[ReferenceKind] = _TABLE
 
 
 def reference_name(reference: Reference) -> str:

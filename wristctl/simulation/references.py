@@ -1,14 +1,12 @@
-"""The kinds of references: the entries of `wristctl.config.tables.REFERENCES`."""
+"""The kinds of references: the entries of `wristctl.config.choices.REFERENCES`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.simulation.reference import ReferenceKind, minimum_jerk
-
-Array = NDArray[np.float64]
 
 
 def _step(reference: Reference, time: Array) -> Array:

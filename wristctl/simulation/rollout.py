@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_rows
@@ -25,8 +26,6 @@ from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import GOALS, SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
-
-Array = NDArray[np.float64]
 
 _SLICE_TICKS = 200_000
 """Control ticks of a block between two looks at whether the user has asked to stop."""

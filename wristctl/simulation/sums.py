@@ -9,15 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import rows_named, rows_of
-
-Array = NDArray[np.float64]
-
 
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",

@@ -12,7 +12,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call
 from wristctl.records import LiveRun, Run, start_run
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.compare import Compared, compare
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Given, Inputs

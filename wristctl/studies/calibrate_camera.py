@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.study import Study
 from wristctl.config.vision import CalibrateCameraSettings
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.camera_views import look
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.procedure import Procedure

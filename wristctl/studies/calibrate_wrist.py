@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.config.study import Study
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rig_description import describe_rig

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.control import CompareSettings
 from wristctl.config.errors import under
 from wristctl.config.study import Study
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-    from wristctl.comparison.comparison import ComparedRow
+    from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.step_cost import StepTime
     from wristctl.tuning.gains_file import Gains
     from wristctl.tuning.search import Search
@@ -70,7 +70,7 @@ class Compared(StudyResult):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.comparison.comparison import count_rollouts, refuse_tuned_scenarios
+    from wristctl.comparison.combinations import count_rollouts, refuse_tuned_scenarios
 
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -89,7 +89,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers."""
-    from wristctl.comparison.comparison import compare as run_comparison
+    from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
     from wristctl.comparison.statistics import spread
 

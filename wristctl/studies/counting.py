@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from wristctl.report.tables import number
+from wristctl.report.printed_table import number
 from wristctl.studies.session import Done, Event, ShowProgress
 
 log = logging.getLogger(__name__)

@@ -10,7 +10,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call, Setting
 from wristctl.records import Run
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.compare import Compared
 from wristctl.studies.inputs import EarlierRun, Given, Inputs
 from wristctl.studies.procedure import Procedure
@@ -21,8 +21,8 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.arrays import Array
     from wristctl.learning.dataset import Samples
-    from wristctl.wrist.kinematics import Array
 
 
 @dataclass(frozen=True, repr=False, eq=False)

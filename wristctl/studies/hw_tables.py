@@ -10,7 +10,7 @@ import pandas as pd
 
 from wristctl.comparison.paper import EXPERIMENT
 from wristctl.report import trial_figures
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.simulation.closed_loop import Simulation
 from wristctl.studies.findings import Findings
 from wristctl.studies.session import Session
@@ -98,7 +98,7 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
     for each in trials.to_dict("records"):
         course, simulated = log[log["trial"] == each["trial"]], twins[each["trial"]].trajectory
         courses.append(
-            trial_figures.Course(
+            trial_figures.LoggedTrial(
                 direction=each["direction"],
                 label=each["label"],
                 repetition=each["repetition"],

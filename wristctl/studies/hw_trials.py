@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.tables import PLANTS
 from wristctl.config.wrist import WristParameters
 from wristctl.records import LiveRun
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.simulation.metrics import METRICS
 from wristctl.studies.session import Session
 from wristctl.trial.calibration import WristCalibration

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.config.study import Study
 from wristctl.records import Run
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.procedure import Procedure

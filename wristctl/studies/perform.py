@@ -15,7 +15,7 @@ from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import TABLES, Manifest
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import Inputs, named_for_good, opened
 from wristctl.studies.procedure import Found, Procedure

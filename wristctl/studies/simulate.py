@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.errors import under
 from wristctl.config.study import Study
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (

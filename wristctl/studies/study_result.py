@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from wristctl.config.study import Study
 from wristctl.records import Run
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Figures, Findings
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from wristctl.config.learning import TrainSettings
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.control import TuneSettings
 from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import check_inverses, identified, inverses_of, network_for, warn_if_it_buckles

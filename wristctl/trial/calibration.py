@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import Any, Self
 
-from wristctl.board.board import Board
 from wristctl.board.board_errors import BoardError
+from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.interrupt import undisturbed

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wristctl.board.board import Board
+from wristctl.arrays import Array
+from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
@@ -27,7 +27,6 @@ from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, Estimate, Steering
 from wristctl.trial.tracking import Tracking
 
-Array = NDArray[np.float64]
 Shown = Callable[[dict[str, Any]], None]
 """Takes each tick's row of the log, to show it."""
 

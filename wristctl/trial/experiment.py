@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances

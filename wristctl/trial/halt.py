@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wristctl.board.board import Board
 from wristctl.board.board_errors import BoardError
+from wristctl.board.driver import Board
 from wristctl.board.messages import Command, Flag, Status
 
 _PATIENCE = 0.5

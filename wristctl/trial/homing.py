@@ -15,17 +15,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Flag, Target
 from wristctl.config.hw_run import Homing
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Spools, on_plus_side
 from wristctl.trial.tracking import Tracking
 from wristctl.wrist.directions import ACTIVE
-
-Array = NDArray[np.float64]
 
 log = logging.getLogger(__name__)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wristctl.board.board import Board
+from wristctl.board.driver import Board
 from wristctl.board.messages import Configure, Limits, State
 from wristctl.config.hw_run import RigSettings
 from wristctl.trial.spools import spools_of

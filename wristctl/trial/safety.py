@@ -6,16 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.board.board_errors import SAFETY_STOP
 from wristctl.board.messages import State
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import Safety
 from wristctl.trial.spools import Spools
 from wristctl.trial.steering import Answer, Estimate
-
-Array = NDArray[np.float64]
 
 
 class SafetyStop(UserError):

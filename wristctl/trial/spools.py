@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
@@ -28,8 +29,6 @@ from wristctl.simulation.actuator import reeling, spool_target
 from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
-
-Array = NDArray[np.float64]
 
 
 def on_plus_side(plane: str) -> NDArray[np.bool_]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
@@ -20,8 +19,6 @@ from wristctl.simulation.observer import fuse, observer_of, predict
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
-
-Array = NDArray[np.float64]
 
 REMEMBERED = 256
 """Ticks that a frame may be late."""

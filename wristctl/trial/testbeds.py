@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.bench.real_time_bench import RealTimeBench, connect
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.transport import Transport, open_transport
@@ -21,8 +21,6 @@ from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Trac
 from wristctl.vision.camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 _PULSE = 0.02
 

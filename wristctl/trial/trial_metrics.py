@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Push
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.reference import Motion
@@ -18,7 +18,6 @@ from wristctl.wrist.directions import ACTIVE
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 JUDGED = ("rmse", "settling", "steady_state")
 """The metrics of the paper's tables; also told of the true angle, where it is known."""

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.reference import Motion, minimum_jerk, motion
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
-
-Array = NDArray[np.float64]
 
 
 def motion_of(

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.wrist.directions import DIRECTIONS
-
-Array = NDArray[np.float64]
 
 _BEFORE = 0.5
 """Seconds before the push over which the load is taken as quiet."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.control import Objective, TuneSettings
 from wristctl.config.errors import UserError, meant
 from wristctl.config.loop import Loop
@@ -27,8 +28,6 @@ from wristctl.wrist.kinematics import Inverse
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.control.law import Gain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

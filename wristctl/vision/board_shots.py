@@ -9,13 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.vision import CharucoBoard, SceneSettings
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.charuco import board_of
 from wristctl.vision.pinhole import Pinhole
 from wristctl.vision.scene import Film
-
-Array = NDArray[np.float64]
 
 _SQUARE, _FINE, _WALL = 96, 2, 122
 """Pixels of a square of the print, samples along a pixel's side, grey of what is behind."""

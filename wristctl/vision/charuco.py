@@ -10,12 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 DICTIONARY = cv2.aruco.DICT_5X5_50
 LEAST_VIEWS = 8

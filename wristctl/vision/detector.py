@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.vision.camera import Image
 from wristctl.vision.outline import outlined
 
-Array = NDArray[np.float64]
 Found = dict[int, list[Array]]
 """Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print."""
 

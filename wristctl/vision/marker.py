@@ -7,14 +7,12 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.vision import Gates, Markers
 from wristctl.vision.camera import Frame
 from wristctl.vision.detector import Detector, edges, square_angle
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wristctl.arrays import Array
 
 _ROUNDS = 2
 """Each looks along the lines of the one before; a rough corner may be off by 2 px."""

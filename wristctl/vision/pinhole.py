@@ -7,12 +7,10 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.vision import SceneSettings
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 
 class Pinhole:

@@ -6,13 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.vision.detector import askew
 from wristctl.vision.marker import Sighting
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 
 def angle_noise(angles: Array) -> float:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from wristctl.config.tables import PLANTS
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
 from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Image
@@ -18,8 +19,6 @@ from wristctl.vision.detector import print_of
 from wristctl.vision.pinhole import Pinhole
 from wristctl.vision.scene_parts import BASE_AT, Stroke, clamp, fingers, last_disc, moving
 from wristctl.vision.view import View
-
-Array = NDArray[np.float64]
 
 _CELL, _FINE, _BITS = 16, 6, 4
 """Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners."""

@@ -6,13 +6,11 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.drawn_parts import capsule, coil, hand
 from wristctl.wrist.shape import Backbone, Planar, discs, offset_points
-
-Array = NDArray[np.float64]
 
 RIM, THICK = 1.25, 0.0035
 """Radius of the discs over that of the circle of tendons; their thickness [m]."""

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.records import Run
 
-Array = NDArray[np.float64]
 
 SCHEMA, FILE = "wristctl.camera/1", "data/camera.json"
 _ARRAYS = "camera_matrix", "distortion", "plane"

@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wristctl.arrays import Array
 from wristctl.wrist.segments import Segments
-
-Array = NDArray[np.float64]
 
 _TURNS = (True, False, False, True)
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wristctl.arrays import Array
 from wristctl.lanes.blocks import spread, to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import dot, planar
@@ -20,8 +21,6 @@ from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import Segments, load_segments
-
-Array = NDArray[np.float64]
 
 
 class Terms(NamedTuple):

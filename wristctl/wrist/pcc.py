@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import turn
@@ -21,8 +19,6 @@ from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.shape import arcs_backbone
 from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendons import lengths, moment_arms
-
-Array = NDArray[np.float64]
 
 _load = replacing("stiffness", "force_y")
 

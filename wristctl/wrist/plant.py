@@ -3,7 +3,7 @@
 A plant is one file: the NamedTuple of its parameters, and functions of lanes on them and on its coordinates q with
 their rates. Compiled code is handed a PlantModel, reads its parameters by `parameters_of`, and calls the functions
 below; which plant's they are follows from the parameters' type, so that each kernel is compiled for its plant alone.
-`wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.tables.PLANTS`.
+`wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.choices.PLANTS`.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
-from wristctl.config.tables import PLANTS as _TABLE
-from wristctl.config.tables import Table
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
 from wristctl.lanes.compiled import compiled, kernel
@@ -30,8 +30,6 @@ from wristctl.lanes.lane import dot, planar, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.wrist.shape import Backbone
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ class PlantModel:
         return self.equilibrium(wrist, n, tensions)
 
 
-PLANTS: Table[PlantModel] = _TABLE
+PLANTS: Choices[PlantModel] = _TABLE
 _MODELS: dict[Any, PlantModel] = {}
 
 

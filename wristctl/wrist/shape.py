@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.kinematics import arc_tip
 
-Array = NDArray[np.float64]
 Planar = NDArray[np.complex128]
 Backbone = Callable[[WristParameters, Array, Array], tuple[Planar, Planar]]
 """A plant's points and unit tangents, (m,) each, at its coordinates (q,) and the arc lengths (m,) [m]."""

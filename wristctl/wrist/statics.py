@@ -7,13 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
-
-Array = NDArray[np.float64]
 
 
 class Equilibria(NamedTuple):

@@ -14,7 +14,7 @@ from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import open_run
 from wristctl.records.difference import Difference, difference
 from wristctl.records.journal import jsonable
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 _HEADS = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
 

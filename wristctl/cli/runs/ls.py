@@ -13,7 +13,7 @@ from wristctl.cli.runs.run_options import RESULTS
 from wristctl.records.index import IndexEntry
 from wristctl.records.journal import jsonable
 from wristctl.records.query import entries, in_order, select
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 
 def ls(

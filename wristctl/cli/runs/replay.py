@@ -19,7 +19,7 @@ from wristctl.records import Run, list_runs, open_run
 from wristctl.records.lineage import input_run
 from wristctl.records.manifest import CONFIG, command_of
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 _SAME = ("identical", "within tolerance", "volatile")
 

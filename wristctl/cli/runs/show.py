@@ -10,7 +10,7 @@ from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.records import Run, open_run
 from wristctl.records.journal import jsonable
 from wristctl.records.tags import read_tags
-from wristctl.report.tables import Table
+from wristctl.report.printed_table import Table
 
 
 def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:

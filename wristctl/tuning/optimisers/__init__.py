@@ -1,11 +1,11 @@
-"""Optimisers behind one ask/tell face; a newcomer is one file, and one line in `wristctl.config.tables`."""
+"""Optimisers behind one ask/tell face; a newcomer is one file, and one line in `wristctl.config.choices`."""
 
 from __future__ import annotations
 
-from wristctl.config.tables import OPTIMISERS as _TABLE
-from wristctl.config.tables import Table
+from wristctl.config.choices import OPTIMISERS as _TABLE
+from wristctl.config.choices import Choices
 from wristctl.tuning.optimisers.base import Best, Optimiser
 
-OPTIMISERS: Table[type[Optimiser]] = _TABLE
+OPTIMISERS: Choices[type[Optimiser]] = _TABLE
 
 __all__ = ["OPTIMISERS", "Best", "Optimiser"]

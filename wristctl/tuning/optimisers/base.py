@@ -10,11 +10,9 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
-
-Array = NDArray[np.float64]
 
 
 class Best(NamedTuple):

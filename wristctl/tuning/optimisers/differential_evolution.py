@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.tuning.optimisers.base import Array, Optimiser
+from wristctl.arrays import Array
+from wristctl.tuning.optimisers.base import Optimiser
 
 _WEIGHT = (0.5, 1.0)
 """Range of the weight of differences, drawn anew for every generation."""

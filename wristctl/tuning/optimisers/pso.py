@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from wristctl.tuning.optimisers.base import Array, Optimiser
+from wristctl.arrays import Array
+from wristctl.tuning.optimisers.base import Optimiser
 
 _PULL = 2.05
 """Acceleration towards either best; the two together must exceed 4."""

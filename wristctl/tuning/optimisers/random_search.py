@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from wristctl.tuning.optimisers.base import Array, Optimiser
+from wristctl.arrays import Array
+from wristctl.tuning.optimisers.base import Optimiser
 
 
 class RandomSearch(Optimiser):

@@ -65,11 +65,11 @@ class Condition:
     name: str
     loop: Loop
     wrist: WristParameters
-    courses: Sequence[Course]
+    courses: Sequence[ReferenceCourse]
 
 
 @dataclass(frozen=True)
-class Course:
+class ReferenceCourse:
     """A reference in a direction through one inverse: its name, its scenario's, and the motion."""
 
     reference: str
@@ -138,14 +138,14 @@ def compare(
 
 def _courses(
     study: Study, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
-) -> list[Course]:
+) -> list[ReferenceCourse]:
     chosen = study.compare
-    found: list[Course] = []
+    found: list[ReferenceCourse] = []
     for reference in chosen.references:
         for inverse in chosen.inverses:
             own = toward(reference, direction).model_copy(update={"inverse": inverse})
             name, scenario = _course_name(reference, direction, chosen), scenario_of(reference, direction)
-            found.append(Course(name, inverse, scenario, motion(own, wrist, chosen.horizon, period, network)))
+            found.append(ReferenceCourse(name, inverse, scenario, motion(own, wrist, chosen.horizon, period, network)))
     return found
 
 

@@ -5,19 +5,17 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.framing import Decoder, encode
+from wristctl.board.exchange import Exchange, Traffic
 from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
     COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
-    FEEDS_WATCHDOG,
     LAYOUTS,
     MAX_RATE,
     TOTAL_RATE,
@@ -42,19 +40,7 @@ ATTEMPTS = 3
 """Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
 
 _START_PATIENCE, _START_TIME = 0.1, 3.0
-_ANSWER = 0x80
 _FIRST_OF_HELLO = struct.Struct("<BI3B")  # protocol, dictionary, firmware: in this place in every version
-
-
-@dataclass
-class Traffic:
-    """What the driver has seen on the wire since it was made."""
-
-    sent: int = 0
-    resent: int = 0
-    answers: int = 0
-    stale: int = 0  # answers that came after the command had been sent again, or to nobody
-    bytes_read: int = 0
 
 
 class Board:
@@ -66,14 +52,9 @@ class Board:
 
     def __init__(self, transport: Transport) -> None:
         self.transport = transport
-        self.traffic = Traffic()
         self.hello: Hello | None = None
-        self.round_trip = 0.0
-        """Seconds from the last command to its answer."""
-        self._decoder = Decoder()
-        self._sequence = 0
+        self._exchange = Exchange(transport)
         self._watchdog = Configure().watchdog
-        self._last_fed = self._silence = 0.0
 
     def __enter__(self) -> Self:
         try:
@@ -89,9 +70,19 @@ class Board:
         self.close(emergency=error is not None)
 
     @property
+    def traffic(self) -> Traffic:
+        """What was seen on the wire."""
+        return self._exchange.traffic
+
+    @property
     def bad_frames(self) -> int:
         """Pieces that came from the board and were no frame, or had a wrong CRC."""
-        return self._decoder.bad_frames + self._decoder.bad_crc
+        return self._exchange.bad_frames
+
+    @property
+    def round_trip(self) -> float:
+        """Seconds from the last command to its answer."""
+        return self._exchange.round_trip
 
     def connect(self) -> Hello:
         """Wait for the board, which may be starting, and see that it speaks by our message table."""
@@ -152,7 +143,7 @@ class Board:
     def stop_whatever_runs(self) -> Result:
         """Emergency stop without a session, at once and until answered, of a board of any message table."""
         try:
-            answer = self._exchange(Command.ESTOP, b"", _START_PATIENCE, ATTEMPTS)
+            answer = self._exchange.ask(Command.ESTOP, b"", _START_PATIENCE, ATTEMPTS)
         except NoAnswer:
             self.transport.wait(self.transport.boot_time)
             answer = self._when_up(Command.ESTOP)
@@ -173,7 +164,7 @@ class Board:
             if self.transport.now() > deadline:
                 raise BoardError("firmware", f"still {flag.name} after {timeout:g} s", self.transport.name)
             if status.state == State.FAULT:
-                raise Faulted(self.transport.name, status.faults, self._silence, self._watchdog)
+                raise Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
             self.ping()
             self.transport.wait(self._watchdog / 4)
         return status
@@ -196,13 +187,13 @@ class Board:
             self.transport.close()
 
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
-        answer = self._exchange(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
+        answer = self._exchange.ask(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
         result = Result(answer[0])
         kind = ANSWER_TO.get(command)
         content: tuple[Any, ...] = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
         if result == Result.FAULTED:
             status = Status(*content) if kind is Status else self.read()
-            raise Faulted(self.transport.name, status.faults, self._silence, self._watchdog)
+            raise Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
         if result != Result.OK:
             self._see_restart()
             raise Refused(self.transport.name, command, result)
@@ -213,7 +204,7 @@ class Board:
         deadline = self.transport.now() + _START_TIME
         while True:
             try:
-                return self._exchange(command, b"", _START_PATIENCE, attempts=1)
+                return self._exchange.ask(command, b"", _START_PATIENCE, attempts=1)
             except NoAnswer:
                 if self.transport.now() > deadline:
                     sent, seen = self.traffic.sent, self.traffic.bytes_read
@@ -222,47 +213,9 @@ class Board:
     def _see_restart(self) -> None:
         if self.hello is None:
             return
-        answer = self._exchange(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
+        answer = self._exchange.ask(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
         if LAYOUTS[Hello].unpack(Hello, answer[1:]).boot_nonce != self.hello.boot_nonce:
             raise Restarted(self.transport.name)
-
-    def _exchange(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:
-        """Result and payload of the answer. Raises NoAnswer."""
-        self._sequence = (self._sequence + 1) & 0xFF
-        frame, seen, began = (
-            encode(command, self._sequence, payload),
-            self.traffic.bytes_read,
-            self.transport.now(),
-        )
-        if command in FEEDS_WATCHDOG:
-            self._silence = began - self._last_fed if self._last_fed else 0.0
-        for attempt in range(attempts):
-            self.transport.write(frame)
-            self.traffic.sent += 1
-            self.traffic.resent += attempt > 0
-            if (answer := self._answer(command, self.transport.now() + patience)) is not None:
-                self.round_trip = self.transport.now() - began
-                if command in FEEDS_WATCHDOG:
-                    self._last_fed = began
-                return answer
-        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen)
-
-    def _answer(self, command: Command, deadline: float) -> bytes | None:
-        found = None
-        while found is None and (left := deadline - self.transport.now()) > 0:
-            data = self.transport.read(left)
-            self.traffic.bytes_read += len(data)
-            for frame in self._decoder.feed(data):
-                if (
-                    found is None
-                    and (frame.code, frame.sequence) == (command | _ANSWER, self._sequence)
-                    and frame.payload
-                ):
-                    found = frame.payload
-                    self.traffic.answers += 1
-                else:
-                    self.traffic.stale += 1
-        return found
 
 
 def within_reach(rates: Sequence[float]) -> Axes:

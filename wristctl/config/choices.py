@@ -17,7 +17,7 @@ from wristctl.config.errors import UserError, meant
 T = TypeVar("T")
 
 
-class Table(MutableMapping[str, T], Generic[T]):
+class Choices(MutableMapping[str, T], Generic[T]):
     """Entries by name; those given as "module:attribute" are imported when asked for. Names are cheap to list."""
 
     def __init__(self, what: str, entries: Mapping[str, str]) -> None:
@@ -55,7 +55,7 @@ class Table(MutableMapping[str, T], Generic[T]):
         return self[name]
 
 
-CONTROLLERS: Table[Any] = Table(
+CONTROLLERS: Choices[Any] = Choices(
     "controller",
     {
         "smc": "wristctl.control.smc:SMC",
@@ -71,7 +71,7 @@ CONTROLLERS: Table[Any] = Table(
 )
 """Of `wristctl.control.law.Controller`."""
 
-REFERENCES: Table[Any] = Table(
+REFERENCES: Choices[Any] = Choices(
     "reference",
     {
         "step": "wristctl.simulation.references:STEP",
@@ -83,7 +83,7 @@ REFERENCES: Table[Any] = Table(
 )
 """Of `wristctl.simulation.reference.ReferenceKind`."""
 
-DISTURBANCES: Table[Any] = Table(
+DISTURBANCES: Choices[Any] = Choices(
     "disturbance",
     {
         "push": "wristctl.simulation.disturbances:PUSH",
@@ -93,7 +93,7 @@ DISTURBANCES: Table[Any] = Table(
 )
 """Of `wristctl.simulation.disturbances.Disturbance`."""
 
-METRICS: Table[Any] = Table(
+METRICS: Choices[Any] = Choices(
     "metric",
     {
         "rmse": "wristctl.simulation.metrics:RMSE",
@@ -117,7 +117,7 @@ METRICS: Table[Any] = Table(
 )
 """Of `wristctl.simulation.metrics.Metric`."""
 
-OPTIMISERS: Table[Any] = Table(
+OPTIMISERS: Choices[Any] = Choices(
     "optimiser",
     {
         "pso": "wristctl.tuning.optimisers.pso:ParticleSwarm",
@@ -127,5 +127,5 @@ OPTIMISERS: Table[Any] = Table(
 )
 """Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
 
-PLANTS: Table[Any] = Table("plant", {"pcc": "wristctl.wrist.pcc:PCC"})
+PLANTS: Choices[Any] = Choices("plant", {"pcc": "wristctl.wrist.pcc:PCC"})
 """Of `wristctl.wrist.plant.PlantModel`."""
