@@ -5,9 +5,9 @@ The plants of the table, and one from elsewhere.
 
 from __future__ import annotations
 
-import importlib
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,14 @@ WRIST = WristParameters()
 
 @pytest.fixture(autouse=True, params=["pcc", "hinge"])
 def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
-    """Each plant, known under its name for one test; its module alone, since the package fills every table."""
-    monkeypatch.syspath_prepend(str(HERE / "elsewhere"))
+    """Each plant, known under its name for one test."""
+    package = ModuleType("elsewhere")  # without its __init__, which fills every table for good
+    package.__path__ = [str(HERE / "elsewhere")]
+    monkeypatch.setitem(sys.modules, "elsewhere", package)
     if request.param == "hinge":
-        monkeypatch.setitem(PLANTS, "hinge", importlib.import_module("hinge").HINGE)
+        from elsewhere.hinge import HINGE
+
+        monkeypatch.setitem(PLANTS, "hinge", HINGE)
     found: PlantModel = PLANTS[request.param]
     return found
 
