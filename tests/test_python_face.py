@@ -124,6 +124,13 @@ def test_imports_between_packages_point_down_only() -> None:
                 assert LAYERS.index(other) >= LAYERS.index(own), f"{file}: {own} imports {other}"
 
 
+def test_contributing_states_the_order_in_which_packages_may_import() -> None:
+    text = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (said,) = re.findall(r"Imports point down: ([^.]*)\.", text)
+    rooms = [name for name in LAYERS if name == "api" or (PACKAGE / name).is_dir()]
+    assert re.split(r"\s*>\s*", said) == rooms
+
+
 def test_every_public_name_has_a_docstring() -> None:
     missing = []
     for file in PACKAGE.rglob("*.py"):

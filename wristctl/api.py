@@ -189,8 +189,8 @@ def audit(
 @_in_python()
 def runs(
     where: str | Sequence[str] = (), *, kind: str | None = None, label: str | None = None, state: str | None = None,
-    tag: str | None = None, newer: str | None = None, older: str | None = None, sort: str = "id", reverse: bool = False,
-    out: Folder = RESULTS,
+    tag: str | None = None, newer: str | None = None, older: str | None = None, sort: str = "started",
+    reverse: bool = False, out: Folder = RESULTS,
 ) -> pd.DataFrame:  # fmt: skip
     """The run directories of the folder `out` as a table, oldest first: one row each, its metrics among the columns.
 

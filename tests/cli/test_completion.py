@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.cli.completion import controllers
 from wristctl.config.study import Study
-from wristctl.control.table import CONTROLLERS
 from wristctl.records import start_run
 
 ROOT = Path(__file__).parents[2]
@@ -64,7 +62,3 @@ def test_study_files_controllers_and_commands_are_completed(folder: Path) -> Non
     assert _completed(folder, "compare experiments/q") == ["experiments/quick.yaml"]
     assert _completed(folder, "simulate --controller sm") == ["smc", "smc-tracking"]
     assert _completed(folder, "runs rep") == ["replay", "report"]
-
-
-def test_every_controller_of_the_table_is_completed() -> None:
-    assert set(controllers("")) == set(CONTROLLERS)

@@ -17,6 +17,7 @@ import pytest
 
 from tests.cli.conftest import Call
 from wristctl.records import list_runs, open_run
+from wristctl.seeds import stream
 
 LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.5")
 MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
@@ -225,3 +226,17 @@ def test_an_interrupted_tuning_keeps_what_it_found(tmp_path: Path) -> None:
     assert child.returncode == 130 and run.state == "interrupted" and b"Traceback" not in said
     assert set(json.loads(run.file("data/gains.json").read_text())["smc"]) == {"P1", "P2", "P3"}
     assert len(run.data("history-smc")) >= 8 and (run.path / "SHA256SUMS").exists()
+
+
+def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
+    seen = "{plant_segments: 1, sensor: {level: camera}}"
+    call("simulate", "--seed", "3", "--set", "horizon=0.1", "--set", f"loop={seen}", "--set", "reference.kind=step")
+    name = "judged camera: step 30 deg, ulnar"
+    assert open_run("latest:simulate").manifest.streams == {name: stream(3, name)}
+    call("compare", "--horizon", "0.1", "--set", "loops={a: {plant_segments: 1, plant: {stiffness_spread: 0.1}}}",
+         "--set", "rows=[{controller: smc, gains: exchanged}]", "--set", "inverses=[none]")  # fmt: skip
+    assert set(open_run("latest:compare").manifest.streams) == {"judged plant"}
+    call("tune", "--set", "controllers=[smc]", "--set", "horizon=0.1", "--set", "candidates=2", "--set", "iterations=1",
+         "--set", f"loops={{default: {seen}}}")  # fmt: skip
+    drawn = open_run("latest:tune").manifest.streams
+    assert "search smc" in drawn and any(each.startswith("tuning camera: ") for each in drawn)

@@ -67,6 +67,12 @@ def _with_every_kind(study: Study) -> Study:
 
 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
+def test_experiments_are_read_without_a_warning(file: Path, caplog: pytest.LogCaptureFixture) -> None:
+    load_study([file])
+    assert not caplog.messages
+
+
+@pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
 def test_every_leaf_changes_the_fingerprint_of_the_command_that_reads_it(file: Path) -> None:
     study = _with_every_kind(load_study([file]))

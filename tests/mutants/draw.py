@@ -9,7 +9,9 @@ import random
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
+import yaml
 from operators import Change, changes
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +46,17 @@ def drawn(seed: int, count: int = COUNT) -> list[Change]:
     return list(chosen.values())
 
 
+def entry(change: Change, name: str) -> dict[str, Any]:
+    """The change as known.yaml has it: whole lines, and from which line on they are meant if they stand there twice."""
+    source = (PACKAGE / change.file).read_text(encoding="utf-8")
+    begin, end = source.rfind("\n", 0, change.start) + 1, source.find("\n", change.end)
+    old, changed = source[begin:end], change.apply(source)
+    new = changed[begin : end + len(changed) - len(source)]
+    near: dict[str, str | int] = {"near": change.line} if source.count(old) > 1 else {}
+    return {"name": f"{name} {change.kind}", "file": change.file, "old": old, "new": new, **near}
+
+
 if __name__ == "__main__":
-    for each in drawn(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else COUNT):
-        print(each.told)
+    seed, count = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else COUNT
+    listed = [entry(each, f"{seed}-{number:02}") for number, each in enumerate(drawn(seed, count), start=1)]
+    print(yaml.safe_dump(listed, sort_keys=False, allow_unicode=True, width=200), end="")

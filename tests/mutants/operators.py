@@ -50,8 +50,9 @@ _LOOKS = {
     "width", "height", "height_ratios", "width_ratios", "pad", "labelpad", "rotation", "ha", "va", "loc", "ncols",
     "dpi", "indent", "refresh_per_second", "padding", "aspect", "markevery", "thickness", "stacklevel", "timeout",
     "maxsize", "max_workers", "min_length", "bbox_to_anchor", "rasterized", "clip_on", "capsize", "s", "marker",
+    "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate",
 }  # fmt: skip
-"""Keywords that say how something looks, or how long somebody is waited for."""
+"""Keywords that say how something looks, how long somebody is waited for, or what to check that is never so."""
 
 _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",
@@ -90,6 +91,13 @@ _TWINS = {
     "degrees": "radians", "argmin": "argmax", "argmax": "argmin", "mean": "sum", "median": "mean", "first": "last",
     "sorted": "list", "arctan2": "hypot", "diff": "cumsum", "plus": "minus", "low": "high", "high": "low",
 }  # fmt: skip
+
+
+def _counts(node: ast.expr) -> bool:
+    """Whether a side of a comparison is a whole number: among real ones < and <= differ nowhere to be noticed."""
+    if isinstance(node, ast.Call):
+        return getattr(node.func, "id", "") in ("len", "round", "int")
+    return isinstance(node, ast.Constant) and isinstance(node.value, int)
 
 
 def changes(package: Path, file: Path) -> list[Change]:
@@ -202,7 +210,8 @@ class _Finder:
 
     def _comparison(self, node: ast.Compare) -> Iterator[Change]:
         old, new = _OPERATORS[type(node.ops[0])]
-        yield from self._between("window", node.left, node.comparators[0], old, new)
+        if old not in _TURNED or _counts(node.left) or _counts(node.comparators[0]):
+            yield from self._between("window", node.left, node.comparators[0], old, new)
         if old in _TURNED:
             yield from self._between("window", node.left, node.comparators[0], old, _TURNED[old])
 

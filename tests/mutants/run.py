@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
-from draw import COUNT, drawn
+from draw import COUNT, drawn, entry
 
 ROOT = Path(__file__).parents[2]
 KNOWN = Path(__file__).with_name("known.yaml")
@@ -93,16 +93,8 @@ def known() -> list[Mutant]:
 
 def from_seed(seed: int, count: int) -> list[Mutant]:
     """Drawn ones."""
-    found = []
-    for number, change in enumerate(drawn(seed, count), start=1):
-        line = (ROOT / "wristctl" / change.file).read_text(encoding="utf-8")
-        begin = line.rfind("\n", 0, change.start) + 1
-        end = line.find("\n", change.end)
-        old = line[begin:end]
-        new = old[: change.start - begin] + change.new + old[change.end - begin :]
-        name = f"{seed}-{number:02} {change.kind}"
-        found.append(Mutant(name, change.file, old, new, change.line))
-    return found
+    listed = (entry(each, f"{seed}-{number:02}") for number, each in enumerate(drawn(seed, count), start=1))
+    return [Mutant(**each) for each in listed]
 
 
 def stages(mutant: Mutant) -> list[list[str]]:

@@ -13,31 +13,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
-from wristctl.wrist.plant import PlantModel, poses
+from wristctl.wrist.plant import PLANTS, PlantModel, poses
 
 HERE = Path(__file__).parent
 WRIST = WristParameters()
 
 
-@pytest.fixture(autouse=True, params=["pcc", "hinge"])
+@pytest.fixture(autouse=True, params=[*PLANTS, "elsewhere"])
 def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
     """Each plant, known under its name for one test."""
+    if request.param != "elsewhere":
+        return PLANTS[request.param]
     package = ModuleType("elsewhere")  # without its __init__, which fills every table for good
     package.__path__ = [str(HERE / "elsewhere")]
     monkeypatch.setitem(sys.modules, "elsewhere", package)
-    if request.param == "hinge":
-        from elsewhere.hinge import HINGE
+    from elsewhere.hinge import HINGE
 
-        monkeypatch.setitem(PLANTS, "hinge", HINGE)
-    found: PlantModel = PLANTS[request.param]
-    return found
+    monkeypatch.setitem(PLANTS, "hinge", HINGE)
+    return HINGE
 
 
 def run(model: PlantModel, loop: dict[str, Any] | None = None, angle: float = 20.0, horizon: float = 4.0) -> Outcome:

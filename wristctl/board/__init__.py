@@ -1,1 +1,1 @@
-"""The motor board and the camera, real or emulated."""
+"""The motor board: protocol, firmware, flashing, and the emulator that runs the very same image."""

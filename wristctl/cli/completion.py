@@ -6,9 +6,7 @@ from pathlib import Path
 
 import typer
 
-import wristctl
-
-_NO_CONTROLLERS = ("__init__", "law", "model", "response", "table")
+from wristctl.config.choices import CONTROLLERS
 
 
 def run_ids(context: typer.Context, incomplete: str) -> list[str]:
@@ -35,10 +33,8 @@ def study_files(incomplete: str) -> list[str]:
 
 
 def controllers(incomplete: str) -> list[str]:
-    """Names of controllers: one file each in wristctl/control."""
-    files = (Path(wristctl.__file__).parent / "control").glob("*.py")
-    names = sorted(file.stem.replace("_", "-") for file in files if file.stem not in _NO_CONTROLLERS)
-    return [name for name in names if name.startswith(incomplete)]
+    """Names of the table of controllers."""
+    return sorted(name for name in CONTROLLERS if name.startswith(incomplete))
 
 
 def _commands() -> list[str]:

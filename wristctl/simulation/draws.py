@@ -22,23 +22,35 @@ class Draws:
 
     def camera(self, scenario: str, repetition: int) -> Entropy:
         """Noise and dropped frames of a scenario, by the name of its reference and direction."""
-        return *stream(self.seed, f"{self.purpose} camera: {scenario}"), repetition
+        return *stream(self.seed, self._camera(scenario)), repetition
 
     def plant(self, repetition: int) -> Entropy:
         """The drawn plant."""
-        return *stream(self.seed, f"{self.purpose} plant"), repetition
+        return *stream(self.seed, self._plant()), repetition
 
-    def streams(self, scenarios: Iterable[str]) -> dict[str, Entropy]:
-        """Each stream by its name, its first repetition's: what a run notes of them."""
-        cameras = {f"{self.purpose} camera: {each}": self.camera(each, 0) for each in scenarios}
-        return {**cameras, f"{self.purpose} plant": self.plant(0)}
+    def names(self, loops: Iterable[Loop], scenarios: Iterable[str]) -> list[str]:
+        """The named streams that such loops draw from: what a run notes of them."""
+        chosen = list(loops)
+        cameras = [self._camera(each) for each in scenarios] if any(map(sees_noise, chosen)) else []
+        return [*dict.fromkeys(cameras), *([self._plant()] if any(map(has_drawn_plant, chosen)) else [])]
+
+    def _camera(self, scenario: str) -> str:
+        return f"{self.purpose} camera: {scenario}"
+
+    def _plant(self) -> str:
+        return f"{self.purpose} plant"
+
+
+def sees_noise(loop: Loop) -> bool:
+    """Whether a camera draws noise and lost frames."""
+    return loop.sensor.level == "camera"
+
+
+def has_drawn_plant(loop: Loop) -> bool:
+    """Whether each repetition has a plant of its own."""
+    return any((loop.plant.stiffness_spread, loop.plant.damping_spread, loop.plant.payload_spread))
 
 
 def is_random(loop: Loop) -> bool:
-    """Whether repetitions of this loop differ: by a camera's noise or a drawn plant."""
-    plant = loop.plant
-    return loop.sensor.level == "camera" or (plant.stiffness_spread, plant.damping_spread, plant.payload_spread) != (
-        0.0,
-        0.0,
-        0.0,
-    )
+    """Whether repetitions of this loop differ."""
+    return sees_noise(loop) or has_drawn_plant(loop)

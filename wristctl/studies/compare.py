@@ -92,6 +92,8 @@ def compare(session: Session) -> Compared:
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
     from wristctl.comparison.statistics import spread
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.draws import Draws
 
     study, findings, searches = session.study, session.findings, dict[str, "Search"]()
     settings = study.compare
@@ -104,6 +106,8 @@ def compare(session: Session) -> Compared:
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
+    scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
+    findings.note_streams(Draws(study.seed).names(loops, scenarios))
     findings.table("data/comparison.csv", frame(results), units=_units())
     findings.arrays("data/trajectories.npz", series(results))
     if any(len(result.repeated.failed) > 1 for result in results):

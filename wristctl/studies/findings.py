@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -60,6 +60,11 @@ class Findings:
     def stream(self, name: str) -> tuple[int, int]:
         """Entropy of the random stream `name` for `numpy.random.default_rng`: the same with and without a run."""
         return self.run.stream(name) if self.run else stream(self._seed, name)
+
+    def note_streams(self, names: Iterable[str]) -> None:
+        """Note in the run which streams were drawn from."""
+        for name in names:
+            self.stream(name)
 
     def metric(
         self,

@@ -66,7 +66,9 @@ def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.wrist_drawing import stroboscope
+    from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.draws import Draws
     from wristctl.simulation.trajectory import COLUMNS
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
@@ -76,6 +78,8 @@ def simulate(session: Session) -> Simulated:
     check_inverses(inverses_of([settings.reference]), network)
     with session.progress("compiling and simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
+    scenario = scenario_of(settings.reference, settings.direction)
+    findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
     course, failed = repeated.first.trajectory, bool(repeated.failed.any())
     warn_if_outside(course.outside)
     own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}

@@ -94,10 +94,16 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
     import numpy as np
 
     from wristctl.control.table import controller
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.draws import Draws
     from wristctl.tuning.search import search
 
     settings = study.tune
     check_inverses(inverses_of(scenario.reference for scenario in settings.scenarios), network)
+    draws = Draws(study.seed, "tuning")
+    for scenario in settings.scenarios:
+        name = scenario_of(scenario.reference, "ulnar")
+        session.findings.note_streams(draws.names([settings.loops[scenario.loop]], [name]))
     found: dict[str, Search] = {}
     try:
         for name in settings.controllers:

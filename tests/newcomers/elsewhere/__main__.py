@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-import elsewhere  # noqa: F401 puts its newcomers into the tables
+import elsewhere.tables  # noqa: F401 puts its newcomers where wristctl looks
 from wristctl.cli.app import main
 
 sys.argv[0] = "wristctl"

@@ -27,7 +27,9 @@ def ls(
     ] = None,
     newer: Annotated[str | None, typer.Option("--newer", help="Only runs started within: 30m, 12h, 2d.")] = None,
     older: Annotated[str | None, typer.Option("--older", help="Only runs started before: 30m, 12h, 2d.")] = None,
-    sort: Annotated[str, typer.Option("--sort", help="Sort by a metric, id, kind, label, state or wall_s.")] = "id",
+    sort: Annotated[
+        str, typer.Option("--sort", help="By started, id, kind, label, state, wall_s or a metric.")
+    ] = "started",
     reverse: Annotated[bool, typer.Option("--reverse", help="Largest or newest first.")] = False,
     as_json: Json = False,
     debug: Debug = False,

@@ -1,0 +1,103 @@
+"""What CONTRIBUTING shows of newcomers is true: its diffs, put into a copy of the package, are run."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wristctl.records import Run
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "CONTRIBUTING.md").read_text()
+KINDS = ("controller", "reference", "metric", "optimiser", "disturbance", "plant", "command")
+STUDY = """\
+compare:
+  horizon: 0.5
+  rows: [{controller: pd, gains: tuned}, {controller: pd}]
+  references: [{kind: approach, angle_deg: 10, time_constant: 0.1}]
+  inverses: [none]
+  loops: {still: {plant: {model: hinge}}, shaken: {plant: {model: hinge}, disturbances: {tremor: 5.0}}}
+  tuning:
+    controllers: [pd]
+    optimiser: hill-climbing
+    candidates: 4
+    iterations: 2
+    horizon: 0.5
+    objective: {rmse: 1.0, jerk: 1.0e-6}
+    loops: {still: {plant: {model: hinge}}}
+    scenarios: [{loop: still, reference: {kind: approach, angle_deg: 8}}]
+"""
+
+
+def shown(kind: str) -> str:
+    """The diff in CONTRIBUTING's section about newcomers of a kind."""
+    (diff,) = re.findall(rf"^### An? {kind}\n.*?```diff\n(.*?)```", PAGE, re.MULTILINE | re.DOTALL)
+    return str(diff)
+
+
+def apply(diff: str, folder: Path) -> list[Path]:
+    """Put a diff into a copy; a new file is all `+`, other lines stand beside, or in place of, ones that are there."""
+    touched = []
+    for part in re.split(r"^\+\+\+ ", diff, flags=re.MULTILINE)[1:]:
+        name, _, body = part.partition("\n")
+        file, lines = folder / name, body.splitlines()
+        content, at = (file.read_text(), 0) if file.exists() else ("", 0)
+        assert bool(content) != all(line.startswith("+") for line in lines), name
+        for mark, line in ((line[:1], line[1:] + "\n") for line in lines):
+            if mark != "+":
+                assert content.count(line) == 1, f"{name} has no {line!r}"
+                at = content.index(line) + (len(line) if mark == " " else 0)
+                content = content.replace(line, "") if mark == "-" else content
+            else:
+                content, at = content[:at] + line + content[at:], at + len(line)
+        file.write_text(content)
+        touched.append(file)
+    return touched
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a copy of the package and all newcomers in it."""
+    folder = tmp_path_factory.mktemp("copy")
+    shutil.copytree(ROOT / "wristctl", folder / "wristctl", ignore=shutil.ignore_patterns("__pycache__"))
+    touched = [file for kind in KINDS for file in apply(shown(kind), folder)]
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    for check in (["check"], ["format", "--check"]):
+        ruff = [sys.executable, "-m", "ruff", *check, *map(str, touched)]
+        done = subprocess.run(ruff, cwd=folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout
+    return folder
+
+
+def run(copy: Path, *arguments: str) -> tuple[Run, str]:
+    """The run that `wristctl ...` of the copy leaves, and what it printed."""
+    (copy / "study.yaml").write_text(STUDY)
+    own = os.environ | {"PYTHONPATH": str(copy), "COLUMNS": "200"}
+    command = [sys.executable, "-m", "wristctl", *arguments]
+    done = subprocess.run(command, cwd=copy, env=own, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return Run(copy / done.stdout.splitlines()[-1]), done.stdout
+
+
+def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
+    compared, said = run(copy, "compare", "study.yaml")
+    table = compared.data("comparison").set_index(["loop", "gains"])
+    assert set(table["controller"]) == {"pd"} and set(table["reference"]) == {"approach 0.1 s 10 deg"}
+    tuned, default = (table.xs(gains, level="gains") for gains in ("tuned", "default"))
+    assert (tuned["rmse"] < 0.5 * default["rmse"]).all() and "jerk [rad/s^3]" in said
+    assert default["jerk"]["shaken"] > 1.5 * default["jerk"]["still"] > 0.0
+
+
+def test_the_command_shown_leaves_a_run(copy: Path) -> None:
+    reached, said = run(copy, "reach", "--step-deg", "1")
+    tips = reached.data("tips")
+    theta = tips["theta"].to_numpy()
+    np.testing.assert_allclose(np.arctan2(tips["y"], tips["x"]), theta / 2.0, atol=1e-12)  # a chord's direction
+    assert len(tips) == 101 and "width [mm]" in said and reached.problems() == []
