@@ -23,7 +23,8 @@ test: lint
 lint: .venv/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict wristctl
+	$(BIN)/mypy --strict wristctl tests docs/*.py
+	$(BIN)/mypy --strict benchmarks
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py

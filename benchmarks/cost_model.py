@@ -54,8 +54,8 @@ def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
 
 def point(lanes: int, segments: int, horizon: float, threads: int) -> dict[str, float]:
     """Median seconds of one batch, and this process's memory [MiB] before and at its peak."""
-    run, times = batch(segments, horizon, threads), []
-    before = peak()
+    run, before = batch(segments, horizon, threads), peak()
+    times: list[float] = []
     while len(times) < 3 or sum(times) < LEAST:
         start = time.perf_counter()
         run(lanes)

@@ -74,7 +74,7 @@ class Worker:
 
 def interval(ratios: list[float]) -> tuple[float, float, float]:
     """Median and its 95 % interval."""
-    found = quantile_test(ratios, q=0, p=0.5).confidence_interval(0.95)
+    found: Any = quantile_test(ratios, q=0, p=0.5).confidence_interval(0.95)
     return float(np.median(ratios)), float(found.low), float(found.high)
 
 

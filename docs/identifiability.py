@@ -38,7 +38,7 @@ NOISE = np.deg2rad(RehearsedTruth.noise_deg)
 
 def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, float]) -> list[str]:
     """Half the 95 % interval of each parameter and the condition number, at the wrist's true parameters."""
-    actuator, settings, trials = Actuator(level="tendon"), IdentifySettings(**known), []
+    actuator, settings, trials = Actuator(level="tendon"), IdentifySettings.model_validate(known), []
     for number, pose in enumerate(poses):
         wrist = pose.model_copy(update={"stiffness": 0.7 * pose.stiffness})
         truth, rng = RehearsedTruth(wrist, actuator), np.random.default_rng(number)

@@ -85,9 +85,9 @@ def roofline(result: Result) -> str:
     cost = peak["multiply_add"] / peak["divide"]
     notes = []
     for n in result.axis("segments"):
-        counts, fastest = raw["operations"][str(n)], result.own_rate(n, 1, 1024)
-        if fastest:
-            dividing = counts["/"] / peak["divide"] * fastest / raw["task"]["period"]
+        counts, rate = raw["operations"][str(n)], result.own_rate(n, 1, 1024)
+        if rate:
+            dividing = counts["/"] / peak["divide"] * rate / raw["task"]["period"]
             notes.append(f"{100.0 * dividing:.0f} % of the time at n = {n}")
     sizes = ", ".join(f"{size / 1024:.0f} KiB (n = {n})" for n, size in raw["scratch"].items())
     lines.append(

@@ -92,7 +92,7 @@ def one_segment(s: Segment, theta: Any, rate: Any) -> Any:
     return inertia, curving * rate * rate - falling + s.damping * rate + s.stiffness * theta
 
 
-def pulls(xp: Any, model: Segment, gains: Any, low: float, high: float, theta: Any, rate: Any, theta_ref: Any) -> Any:
+def pulls(xp: Any, model: Segment, gains: Any, low: Any, high: Any, theta: Any, rate: Any, theta_ref: Any) -> Any:
     """The sliding mode law and its tension pair: pulls of the + and the - side [N]."""
     inertia, load = one_segment(model, theta, rate)
     sigma = gains[0] * (theta - theta_ref) + gains[1] * rate

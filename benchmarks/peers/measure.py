@@ -33,7 +33,13 @@ def speeds(
                 if lanes > side.most_lanes or (lanes == 1 and threads > 1):
                     continue
                 say(f"{side.name}, n = {segments}, {steps} steps, {threads} threads, {lanes} lanes")
-                row = {"side": side.name, "segments": segments, "threads": threads, "lanes": lanes, "steps": steps}
+                row: dict[str, Any] = {
+                    "side": side.name,
+                    "segments": segments,
+                    "threads": threads,
+                    "lanes": lanes,
+                    "steps": steps,
+                }
                 rows.append(row)
                 try:
                     prepare, ticks, repeats = _plan(running, lanes, budget)

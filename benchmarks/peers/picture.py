@@ -9,6 +9,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.patches import Rectangle
 from rates import Result, Variant
 from report import number
 from table import OURS
@@ -36,7 +37,7 @@ def figure(result: Result, path: Path) -> None:
         column[1].axvline(1.0, color="k", lw=0.8, zorder=0)
         column[1].set(xlabel="times that wristctl is faster")
     names = {MINE: "wristctl", EQUAL: "error at most wristctl's", LARGER: "larger error", LIMIT: "the same loop in C"}
-    patches = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in names]
+    patches = [Rectangle((0, 0), 1, 1, color=colour) for colour in names]
     fig.legend(patches, list(names.values()), loc="lower center", ncols=len(names), fontsize=8, frameon=False)
     fig.tight_layout(rect=(0, 0.04, 1, 1))
     with matplotlib.rc_context({"svg.hashsalt": "wristctl"}):

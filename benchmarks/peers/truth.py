@@ -60,7 +60,7 @@ def _solve(task: Task) -> np.ndarray:
 
         def jacobian(_: float, x: np.ndarray, pull: np.ndarray = pull) -> np.ndarray:
             acceleration = _acceleration(task, x, pull)
-            _, by_theta, by_rate = linearised(task.plant, x[:n], x[n:], acceleration, pull)
+            by_theta, by_rate = linearised(task.plant, x[:n], x[n:], acceleration, pull)[1:]
             mass = terms(task.plant, x[:n], x[n:]).mass
             lower = -np.linalg.solve(mass, np.hstack([by_theta, by_rate]))
             return np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), lower])

@@ -11,7 +11,9 @@ import importlib
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +27,7 @@ def main() -> None:
 
     module, path, steps, threads = sys.argv[1:5]
     side, task = importlib.import_module(module), tasks.load(path)
-    prepared: dict[int, object] = {}
+    prepared: dict[int, Callable[[int], Any]] = {}
     for line in sys.stdin:
         request = json.loads(line)
         lanes, ticks = request["lanes"], request["ticks"]
@@ -35,8 +37,8 @@ def main() -> None:
         run = prepared[lanes]
         begun = time.perf_counter()
         for _ in range(request["repeats"]):
-            theta = np.asarray(run(ticks))  # type: ignore[operator]
-        answer = {"prepare": begun - start, "seconds": time.perf_counter() - begun}
+            theta = np.asarray(run(ticks))
+        answer: dict[str, Any] = {"prepare": begun - start, "seconds": time.perf_counter() - begun}
         if request.get("theta"):
             answer["theta"] = [float(x) for x in theta]
         print(json.dumps(answer), file=answers, flush=True)

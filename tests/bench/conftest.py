@@ -41,9 +41,9 @@ class Host:
             self.board.ping()
             self.bench.transport.wait(10 * TICK)
 
-    def reel(self, steps: Sequence[int], rate: int = 2000) -> None:
+    def reel(self, steps: tuple[int, int, int, int], rate: int = 2000) -> None:
         """Reel the axes in to these positions (steps), and wait until they stand."""
-        self.board.send(Target(tuple(steps), (rate,) * 4))
+        self.board.send(Target(steps, (rate,) * 4))
         self.board.wait_while(Flag.MOVING, timeout=10.0)
 
 

@@ -21,7 +21,7 @@ WRIST = WristParameters()
 TICK = 0.005
 
 
-class Sketch:
+class Sketch(Scene):
     """Draws nothing but its own noise, and remembers what it was to draw."""
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ def signed(x: Numbers) -> Numbers:
     return np.where(x & 0x80, x - 256, x)
 
 
-def flags(result: Numbers, overflow: Numbers | bool) -> Numbers:
+def flags(result: Numbers, overflow: NDArray[np.bool_] | bool) -> Numbers:
     negative, overflowed = result >= 0x80, np.broadcast_to(overflow, result.shape)
     return Z * (result == 0) + N * negative + V * overflowed + S * (negative != overflowed)
 

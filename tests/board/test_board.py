@@ -110,7 +110,11 @@ def test_a_dead_cable_is_said_to_be_the_cable(board: Board, wire: BadWire) -> No
 def test_garbled_answers_point_at_baud_rate_and_firmware(
     board: Board, wire: BadWire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wire, "read", lambda timeout: (wire.wait(timeout), b"\x55\xaa\x55")[1])
+    def read(timeout: float) -> bytes:
+        wire.wait(timeout)
+        return b"\x55\xaa\x55"
+
+    monkeypatch.setattr(wire, "read", read)
     with pytest.raises(NoAnswer) as error:
         board.read()
     assert error.value.origin == "firmware"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.board.bench import Bench
+from tests.board.bench import Bench, Chip
 from tests.firmware.simavr_board import LIBRARY, SimavrBoard
 from wristctl.board.emulator import Atmega2560
 from wristctl.board.messages import Rate, Target
@@ -32,7 +32,8 @@ def test_arithmetic_program_has_the_same_result_in_the_same_cycles() -> None:
         results[1] += theirs.read()
     print(f"{theirs.cycles} cycles on simavr, {ended} on ours: {abs(ended - theirs.cycles) / ended:.1e} apart")
     assert abs(ended - theirs.cycles) <= 1e-6 * ended
-    for k, chip in enumerate((ours, theirs)):
+    chips: tuple[Chip, ...] = (ours, theirs)
+    for k, chip in enumerate(chips):
         chip.run(10 * BYTE)
         results[k] += chip.read()
     assert results[0] == results[1] and len(results[0]) == 4

@@ -50,17 +50,18 @@ def emulate(tmp_path: Path) -> Iterator[Served]:
     started = []
 
     def start(*arguments: str) -> str:
-        said = (tmp_path / "stderr").open("w")
         command = [*WRISTCTL, "emulate", *arguments]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, env=ENVIRONMENT)
+        with (tmp_path / "stderr").open("w") as said:
+            child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, env=ENVIRONMENT)
         started.append(child)
         assert child.stdout is not None
         return child.stdout.readline().strip()
 
     yield start
     for child in started:
-        child.terminate()
-        assert child.wait(60) == 130
+        with child:
+            child.terminate()
+            assert child.wait(60) == 130
 
 
 @pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"]], ids=["pty", "tcp", "wrist"])

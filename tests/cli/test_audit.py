@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.cli.conftest import Call
 from wristctl.config.load import load_study
 from wristctl.records import open_run
 
@@ -27,7 +28,7 @@ def test_ledger_holds_every_table_and_every_gap_of_the_paper() -> None:
     assert sum(name.startswith("X-") for name in ids) == 9
 
 
-def test_audit_judges_every_claim_and_cites_a_run_on_each_loop(call, tmp_path: Path) -> None:
+def test_audit_judges_every_claim_and_cites_a_run_on_each_loop(call: Call, tmp_path: Path) -> None:
     """On the ledger without the rivals, whose rollouts on the exact loop take long."""
     data = yaml.safe_load(LEDGER.read_text())
     claims = [claim for claim in data["audit"]["claims"] if claim.get("controller", "smc") == "smc"]
@@ -36,16 +37,18 @@ def test_audit_judges_every_claim_and_cites_a_run_on_each_loop(call, tmp_path: P
     run = open_run("latest:audit")
     table = run.data("claims").set_index("claim")
     assert code == 0 and len(table) == len(claims) and table["verdict"].notna().all()
-    assert table.loc["C15-trade-off", "verdict"] == "open" and "--selection" in table.loc["C15-trade-off", "reason"]
-    assert table.loc["C5-printed", "verdict"] == "not reproduced"
-    assert table.loc["C5-exchanged", "reason"].startswith("holds on exact only")
-    assert table.loc["C5-exchanged", "ours_low"] < 2.7e-4 < table.loc["C5-exchanged", "ours_high"]
+    judged = table.to_dict("index")
+    trade_off, exchanged = judged["C15-trade-off"], judged["C5-exchanged"]
+    assert trade_off["verdict"] == "open" and "--selection" in trade_off["reason"]
+    assert judged["C5-printed"]["verdict"] == "not reproduced"
+    assert exchanged["reason"].startswith("holds on exact only")
+    assert exchanged["ours_low"] < 2.7e-4 < exchanged["ours_high"]
     shown = json.loads((run.path / "evidence.json").read_text())
     assert set(shown) == {"exact", "sampled", "default"}
     assert all(open_run(each).kind == "compare" and each in out for each in shown.values())
 
 
-def test_trainings_decide_the_claims_on_networks_and_are_cited(call, tmp_path: Path) -> None:
+def test_trainings_decide_the_claims_on_networks_and_are_cited(call: Call, tmp_path: Path) -> None:
     """On trainings far too short, whose numbers the verdicts must follow."""
     data = yaml.safe_load(LEDGER.read_text())
     claims = [claim for claim in data["audit"]["claims"] if claim["evidence"] in ("table1", "selection")]
@@ -98,7 +101,7 @@ def test_trainings_decide_the_claims_on_networks_and_are_cited(call, tmp_path: P
         ("[]", "no claims to audit.*experiments/claims.yaml"),
     ],
 )
-def test_a_broken_ledger_is_refused_and_leaves_no_run(call, tmp_path: Path, text: str, said: str) -> None:
+def test_a_broken_ledger_is_refused_and_leaves_no_run(call: Call, tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "claims.yaml").write_text(f"audit:\n  claims: {text}\n")
     code, _, err = call("audit", "claims.yaml")
     assert code == 2 and re.search(said, err) and not (tmp_path / "results").exists()

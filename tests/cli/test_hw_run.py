@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.cli.conftest import Call
 from tests.report.browser import CHROMIUM, DRIVER, Browser
 from wristctl.records import list_runs, open_run
 
@@ -28,7 +29,7 @@ QUICK = (
 )  # fmt: skip
 
 
-def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call) -> None:
+def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call: Call) -> None:
     code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
     assert code == 0 and err.splitlines()[0].startswith("all emulated, in virtual time")
@@ -80,7 +81,7 @@ def _look(page: Path) -> None:
         browser.close()
 
 
-def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_second(call) -> None:
+def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_second(call: Call) -> None:
     code, _, err = call(*QUICK, "--set", "bench.faults=[{kind: marker-covered, at: 0.1}]")
     (run,) = list_runs(Path("results"))
     assert code == 5 and run.state == "failed" and run.problems() == [] and run.manifest.exit_code == 5
@@ -92,7 +93,7 @@ def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_seco
     assert Path("seen.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_a_run_of_trials_there_is_nothing_to_watch(call) -> None:
+def test_without_a_run_of_trials_there_is_nothing_to_watch(call: Call) -> None:
     assert call("gen-data", "--samples", "10", "--label", "hw-run")[0] == 0  # by its label only
     code, _, err = call("hw", "watch")
     assert code == 2 and "there is no run of hw-run - results - fix: start one" in err
@@ -108,7 +109,7 @@ def silent_port() -> Iterator[str]:
     os.close(client)
 
 
-def test_a_dry_run_opens_neither_port_nor_camera(call, tmp_path: Path, silent_port: str) -> None:
+def test_a_dry_run_opens_neither_port_nor_camera(call: Call, tmp_path: Path, silent_port: str) -> None:
     opened: list[str] = []
     sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
     code, out, _ = call("hw-run", "--dry-run", "--port", silent_port, "--camera", "/dev/null")
@@ -119,14 +120,14 @@ def test_a_dry_run_opens_neither_port_nor_camera(call, tmp_path: Path, silent_po
     assert opened[-1] == silent_port  # one that had been opened would have been seen
 
 
-def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call) -> None:
+def test_a_port_that_is_none_is_exit_4_and_says_what_to_check(call: Call) -> None:
     code, _, err = call("hw-run", "--port", "/nowhere/ttyACM0", "--yes")
     assert code == 4 and "there is no such port" in err and "wristctl hw ports" in err
     assert "ticks" not in err and "nan" not in err
 
 
 def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
-    call, monkeypatch: pytest.MonkeyPatch, silent_port: str
+    call: Call, monkeypatch: pytest.MonkeyPatch, silent_port: str
 ) -> None:
     from wristctl.trial import testbeds
 
@@ -160,12 +161,14 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
         (("--set", "bench.faults=[{kind: port-los}]"), "port-lost"),
     ],
 )
-def test_what_the_user_got_wrong_is_one_line_before_anything_moves(call, arguments: tuple[str, ...], said: str) -> None:
+def test_what_the_user_got_wrong_is_one_line_before_anything_moves(
+    call: Call, arguments: tuple[str, ...], said: str
+) -> None:
     code, _, err = call("hw-run", *arguments)
     assert code == 2 and said in err and "Traceback" not in err
 
 
-def test_a_controller_that_is_none_is_told_by_its_row_before_there_is_a_run(call) -> None:
+def test_a_controller_that_is_none_is_told_by_its_row_before_there_is_a_run(call: Call) -> None:
     rows = "rows=[{controller: smc-tracking, gains: stepper}, {controller: smcc}]"
     code, _, err = call("hw-run", "--set", rows)
     assert code == 2 and f"--set {rows}: hw-run.rows.1.controller" in err and not Path("results").exists()
@@ -177,7 +180,7 @@ def _columns(run: Path, name: str) -> list[dict[str, str]]:
     return columns
 
 
-def test_a_replay_is_identical(call) -> None:
+def test_a_replay_is_identical(call: Call) -> None:
     if not os.environ.get("WRISTCTL_THOROUGH"):
         pytest.skip("WRISTCTL_THOROUGH=1")
     assert call(*QUICK)[0] == 0
@@ -185,7 +188,7 @@ def test_a_replay_is_identical(call) -> None:
     assert code == 0 and out.splitlines()[-1].endswith("identical")
 
 
-def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call) -> None:
+def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call: Call) -> None:
     if not os.environ.get("WRISTCTL_THOROUGH"):
         pytest.skip("WRISTCTL_THOROUGH=1")
     motors = "bench.motors.reversed=[false, true, false, false]"

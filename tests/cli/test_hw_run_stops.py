@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from tests.cli.conftest import Call
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.bench import FAULTS
@@ -92,7 +93,7 @@ def at_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def hw_run(call, monkeypatch: pytest.MonkeyPatch, at_zero: Path) -> HwRun:
+def hw_run(call: Call, monkeypatch: pytest.MonkeyPatch, at_zero: Path) -> HwRun:
     """Performs a short hw-run, at zero from the start."""
     benches: list[VirtualBench] = []
 

@@ -9,14 +9,14 @@ import pytest
 from tests.cli.conftest import Call
 from tests.identification.benches import KNOWN, LEVEL, SLOW, UPRIGHT, write_run
 from wristctl.config.load import load_study
-from wristctl.config.loop import Loop
+from wristctl.config.loop import DirectionName, Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.identification.identified import identified_yaml, with_identified
 from wristctl.records import open_run
 from wristctl.simulation.closed_loop import simulate
 
-SIDES = ("ulnar", "extension")
+SIDES: tuple[DirectionName, ...] = ("ulnar", "extension")
 
 
 def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Path) -> None:

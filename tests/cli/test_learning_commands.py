@@ -8,14 +8,18 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.cli.conftest import Call
 from wristctl.learning import processes, training
+from wristctl.learning.dataset import Samples
 from wristctl.learning.network_file import load_network, training_record
-from wristctl.learning.training_result import Epoch
+from wristctl.learning.training_result import Epoch, Job, TrainingResult
 from wristctl.records import list_runs, open_run
 
 LEAVES = ("hidden=[16,8]", "activation=tanh", "learning_rate=0.01", "workers=1", "epochs=12")
@@ -23,7 +27,7 @@ QUICK = tuple(word for leaf in LEAVES for word in ("--set", leaf))
 TRAIN = ("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
 
 
-def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
+def test_gen_data_leaves_samples_that_read_back_exactly(call: Call) -> None:
     code, out, _ = call("gen-data", "--samples", "200")
     run = open_run("latest:gen-data")
     table, arrays = run.data("samples"), run.array("samples")
@@ -35,19 +39,19 @@ def test_gen_data_leaves_samples_that_read_back_exactly(call) -> None:
 
 
 @pytest.fixture(scope="module")
-def sampled(made) -> Path:
+def sampled(made: Callable[..., Path]) -> Path:
     """A folder with a gen-data run."""
     return made("gen-data", "--samples", "400")
 
 
 @pytest.fixture(scope="module")
-def trained(made, sampled: Path) -> Path:
+def trained(made: Callable[..., Path], sampled: Path) -> Path:
     """The same with a train run."""
     return made(*TRAIN, after=sampled)
 
 
 @pytest.fixture
-def data(call, sampled: Path, tmp_path: Path) -> str:
+def data(call: Call, sampled: Path, tmp_path: Path) -> str:
     """The id of the gen-data run, in the folder of this test."""
     shutil.copytree(sampled / "results", tmp_path / "results")
     return open_run("latest:gen-data").id
@@ -68,11 +72,11 @@ def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(tra
     assert metrics["gradient_norm"]["value"] > 0.0
     assert len(run.data("curves")) == 2 * 12
     assert run.manifest.inputs[0].run == open_run("latest:gen-data", trained / "results").id
-    record = training_record(run.file("models/network.safetensors"))
+    record: dict[str, Any] = training_record(run.file("models/network.safetensors"))
     assert record["seed"] == 0 and record["settings"]["epochs"] == 12
 
 
-def test_the_same_seed_gives_the_same_results(call, data: str, trained: Path) -> None:
+def test_the_same_seed_gives_the_same_results(call: Call, data: str, trained: Path) -> None:
     def hashes(seed: str) -> tuple[str, ...]:
         sampled = call("gen-data", "--samples", "400", "--seed", seed, "--json")
         trained = call(*TRAIN, "--data", data, "--seed", seed, "--json")
@@ -85,20 +89,23 @@ def test_the_same_seed_gives_the_same_results(call, data: str, trained: Path) ->
 
 def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the first training be interrupted in this epoch."""
-    train_one = processes.train_one
 
-    def interrupted(samples, job, device, checkpoints, report):
+    def interrupted(
+        samples: Samples, job: Job, device: str, checkpoints: Path | None, report: Callable[[Epoch], None]
+    ) -> TrainingResult:
         def stop(done: Epoch) -> None:
             if done.epoch == epoch:
                 raise KeyboardInterrupt
             report(done)
 
-        return train_one(samples, job, device, checkpoints, stop)
+        return training.train_one(samples, job, device, checkpoints, stop)
 
     monkeypatch.setattr(processes, "train_one", interrupted)
 
 
-def test_interrupted_training_keeps_the_network_found_so_far(call, data: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_training_keeps_the_network_found_so_far(
+    call: Call, data: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     interrupt_at(3, monkeypatch)
     code, _, _ = call("train", "--data", "latest:gen-data", *QUICK)
     (run,) = (run for run in list_runs(Path("results")) if run.kind == "train")
@@ -108,7 +115,7 @@ def test_interrupted_training_keeps_the_network_found_so_far(call, data: str, mo
 
 
 def test_a_training_that_was_stopped_resumes_to_the_same_result(
-    call, data: str, trained: Path, monkeypatch: pytest.MonkeyPatch
+    call: Call, data: str, trained: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(training, "SAVE_EVERY", 0.0)
     with monkeypatch.context() as stopping:
@@ -124,7 +131,7 @@ def test_a_training_that_was_stopped_resumes_to_the_same_result(
     assert code == 2 and "other settings, data or seed" in err
 
 
-def test_without_a_data_run_train_draws_what_gen_data_would(call) -> None:
+def test_without_a_data_run_train_draws_what_gen_data_would(call: Call) -> None:
     call("gen-data", "--samples", "100", "--seed", "3")
     call("train", *QUICK, "--seed", "3", "--set", "gen-data.samples=100")
     drawn, own = open_run("latest:gen-data"), open_run("latest:train")
@@ -132,7 +139,7 @@ def test_without_a_data_run_train_draws_what_gen_data_would(call) -> None:
     assert "samples: 100" in own.file("config.yaml").read_text()
 
 
-def test_a_search_killed_outright_resumes_to_the_same_bytes(call, tmp_path: Path) -> None:
+def test_a_search_killed_outright_resumes_to_the_same_bytes(call: Call, tmp_path: Path) -> None:
     grid = "grid={depths: [1, 2], activations: [tanh, relu], widths: [8], folds: 5}"
     search = ("train", "--search", *QUICK, "--epochs", "40", "--set", grid, "--set", "gen-data.samples=80")
     command = [sys.executable, "-P", "-m", "wristctl", *search]
@@ -153,7 +160,7 @@ def test_a_search_killed_outright_resumes_to_the_same_bytes(call, tmp_path: Path
     assert code == 0 and resumed.id != whole.id and resumed.result_hash == whole.result_hash
 
 
-def test_rows_are_ranked_with_intervals_beside_the_paper(call, tmp_path: Path) -> None:
+def test_rows_are_ranked_with_intervals_beside_the_paper(call: Call, tmp_path: Path) -> None:
     study = tmp_path / "rows.yaml"
     rows = "".join(
         f"    - {{name: {name}-{form}, preset: t1-{name}, hidden: [8], epochs: 3{more}}}\n"
@@ -172,18 +179,18 @@ def test_rows_are_ranked_with_intervals_beside_the_paper(call, tmp_path: Path) -
     assert [row[-1] for row in seeds["rows"] if row[:2] == ["sigmoid-printed", "gradient_norm"]] == [0.0012]
 
 
-def test_a_search_chooses_by_cross_validation_and_says_why(call) -> None:
+def test_a_search_chooses_by_cross_validation_and_says_why(call: Call) -> None:
     grid = "grid={depths: [1, 3], activations: [tanh], widths: [8], folds: 2}"
     call("train", "--search", *QUICK, "--epochs", "3", "--set", grid, "--set", "gen-data.samples=80")
     run = open_run("latest:train")
-    record = training_record(run.file("models/network.safetensors"))
+    record: dict[str, Any] = training_record(run.file("models/network.safetensors"))
     depth = run.metrics["c15_chosen_depth"]["value"]
     assert depth in (1, 3) and "cheapest network" in str(record["reason"])
     assert len(load_network(run.file("models/network.safetensors")).sizes) == depth + 2
     assert len(run.data("grid")) == 2 and run.file("figures/accuracy-against-cost.svg").is_file()
 
 
-def test_a_network_of_the_plant_is_judged_on_what_was_held_out_and_knows_its_wrist(call) -> None:
+def test_a_network_of_the_plant_is_judged_on_what_was_held_out_and_knows_its_wrist(call: Call) -> None:
     plant = ("--source", "plant", "--set", "segments=2", "--set", "held_out_poses=[45]", "--samples", "120")
     call("gen-data", *plant)
     call("train", "--data", "latest:gen-data", *QUICK, "--epochs", "2")
@@ -194,7 +201,7 @@ def test_a_network_of_the_plant_is_judged_on_what_was_held_out_and_knows_its_wri
     assert code == 2 and "2 segments, the loop has 4" in err
 
 
-def test_samples_of_an_earlier_run_are_its_course(call) -> None:
+def test_samples_of_an_earlier_run_are_its_course(call: Call) -> None:
     call("simulate", "--set", "horizon=0.5")
     code, _, _ = call("gen-data", "--source", "run", "--run", "latest:simulate", "--samples", "50")
     table, course = open_run("latest:gen-data").data("samples"), open_run("latest:simulate").data("trajectory")
@@ -203,7 +210,7 @@ def test_samples_of_an_earlier_run_are_its_course(call) -> None:
     assert set(zip(table["x"], table["y"], table["theta"], strict=True)) <= known
 
 
-def test_dry_runs_write_nothing(call, data: str, tmp_path: Path) -> None:
+def test_dry_runs_write_nothing(call: Call, data: str, tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
     code, out, _ = call("train", "--data", "latest:gen-data", "--dry-run")
     assert code == 0 and "300 samples to train on" in out
@@ -228,7 +235,7 @@ def test_dry_runs_write_nothing(call, data: str, tmp_path: Path) -> None:
     ],
 )
 def test_what_the_user_got_wrong_is_said_in_one_line_and_leaves_no_run(
-    call, data: str, tmp_path: Path, arguments, message
+    call: Call, data: str, tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     code, _, err = call(*arguments)
     assert code == 2 and len(err.splitlines()) == 1 and message in err

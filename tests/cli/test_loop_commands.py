@@ -10,10 +10,12 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from tests.cli.conftest import Call
 from wristctl.records import list_runs, open_run
 from wristctl.seeds import stream
 
@@ -29,7 +31,7 @@ COMPARE = (
 )  # fmt: skip
 
 
-def test_simulate_leaves_a_trajectory_metrics_and_pictures(call) -> None:
+def test_simulate_leaves_a_trajectory_metrics_and_pictures(call: Call) -> None:
     code, out, _ = call("simulate", "--controller", "computed-torque", "--gains", "default")
     run = open_run("latest:simulate")
     course = run.data("trajectory")
@@ -43,29 +45,29 @@ def test_simulate_leaves_a_trajectory_metrics_and_pictures(call) -> None:
 
 
 @pytest.fixture(scope="module")
-def tuning(made) -> Path:
+def tuning(made: Callable[..., Path]) -> Path:
     """A folder with a tune run."""
     return made(*TUNE)
 
 
 @pytest.fixture(scope="module")
-def comparison(made) -> Path:
+def comparison(made: Callable[..., Path]) -> Path:
     """A folder with a compare run."""
     return made(*COMPARE)
 
 
 @pytest.fixture
-def tuned_before(call, tuning: Path, tmp_path: Path) -> None:
+def tuned_before(call: Call, tuning: Path, tmp_path: Path) -> None:
     """The tune run in the folder of this test."""
     shutil.copytree(tuning / "results", tmp_path / "results")
 
 
 @pytest.mark.usefixtures("tuned_before")
-def test_tuned_gains_reach_compare_and_simulate(call) -> None:
+def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     tuned = open_run("latest:tune")
     gains = json.loads(tuned.file("data/gains.json").read_text())
     history = tuned.data("history-smc")
-    best = history.loc[history["objective"].idxmin()]
+    best = history.iloc[history["objective"].argmin()]
     assert {name: best[name] for name in gains["smc"]} == gains["smc"] and len(history) == 12
     code, out, _ = call(*COMPARE, "--set", "rows=[{controller: pid, gains: tuned}]", "--tuned", "latest:tune")
     assert code == 0 and "pid/tuned" in out
@@ -84,14 +86,14 @@ def test_compare_has_a_row_for_every_combination_and_the_papers_numbers_beside(c
     assert (table["inverse"].tolist() == ["none", "exact"] * 4) and not table["failed"].any()
 
 
-def test_the_same_command_and_seed_give_the_same_result(call, tuning: Path, comparison: Path) -> None:
+def test_the_same_command_and_seed_give_the_same_result(call: Call, tuning: Path, comparison: Path) -> None:
     for before, command in ((tuning, TUNE), (comparison, COMPARE)):
         (run,) = list_runs(before / "results")
         assert json.loads(call(*command, "--json")[1])["result_sha256"] == run.result_hash
 
 
 @pytest.mark.usefixtures("tuned_before")
-def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call) -> None:
+def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> None:
     code, _, said = call(*COMPARE, "--set", f"references=[{MOVE % 20}]", "--tuned", "latest:tune")
     assert code == 2 and "tuned on a scenario" in said
     assert {run.kind for run in list_runs(Path("results"))} == {"tune"}
@@ -113,7 +115,7 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call) -> None:
     ],
 )
 def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
-    call, arguments: tuple[str, ...], said: str
+    call: Call, arguments: tuple[str, ...], said: str
 ) -> None:
     code, _, err = call(*arguments)
     lines = [line for line in err.splitlines() if line.startswith("error:")]
@@ -122,25 +124,25 @@ def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
 
 
 @pytest.mark.parametrize("command", ["simulate", "compare", "hw-run"])
-def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call, tmp_path: Path, command: str) -> None:
+def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call: Call, tmp_path: Path, command: str) -> None:
     rows = ("--gains", "tuned") if command == "simulate" else ("--set", "rows=[{controller: smc, gains: tuned}]")
     code, _, err = call(command, *rows)
     assert code == 2 and "no tuned gains of smc" in err and "--tuned RUN" in err and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("command", ["simulate", "tune", "compare"])
-def test_a_dry_run_writes_nothing(call, tmp_path: Path, command: str) -> None:
+def test_a_dry_run_writes_nothing(call: Call, tmp_path: Path, command: str) -> None:
     code, out, _ = call(command, "--dry-run")
     assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())
 
 
-def test_a_dry_run_of_compare_counts_the_directions_too(call) -> None:
+def test_a_dry_run_of_compare_counts_the_directions_too(call: Call) -> None:
     code, out, _ = call("compare", "--dry-run", "--set", "directions=[ulnar, radial, flexion, extension]",
                         "--set", "inverses=[none]", "--set", "rows=[{controller: feedforward}]")  # fmt: skip
     assert code == 0 and "# 36 rollouts of 5 s\n" in out
 
 
-def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call) -> None:
+def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call: Call) -> None:
     search = "tuning={controllers: [smc, pid], candidates: 3, iterations: 5, horizon: 0.2}"
     code, out, _ = call("compare", "--dry-run", "--set", search, "--set", "rows=[{controller: smc, gains: tuned}]")
     assert code == 0 and "# a search first: 30 rollouts of 0.2 s for each of smc, pid\n" in out
@@ -149,7 +151,7 @@ def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call) -> None:
 CAMERA = ("--set", "repetitions=8", "--set")
 
 
-def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call) -> None:
+def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call: Call) -> None:
     loop = "loop={plant_segments: 1, sensor: {level: camera}}"
     code, out, _ = call("simulate", "--set", "horizon=0.3", *CAMERA, loop, "--set", "reference.duration=0.2")
     run = open_run("latest:simulate")
@@ -172,7 +174,7 @@ def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call
     assert (known["value"], known["interval"]) == (row["rmse"], [row["rmse_low"], row["rmse_high"]])
 
 
-def test_a_dry_run_counts_repetitions_where_they_can_differ(call) -> None:
+def test_a_dry_run_counts_repetitions_where_they_can_differ(call: Call) -> None:
     one = "{plant_segments: 1}"
     seen = "{plant_segments: 1, sensor: {level: camera}}"
     for command, more, said in (
@@ -185,7 +187,7 @@ def test_a_dry_run_counts_repetitions_where_they_can_differ(call) -> None:
         assert code == 0 and f"{said}\n" in out
 
 
-def test_a_buckling_wrist_is_a_warning_and_a_mark_in_the_manifest(call) -> None:
+def test_a_buckling_wrist_is_a_warning_and_a_mark_in_the_manifest(call: Call) -> None:
     code, _, err = call("simulate", "--set", "wrist.hand_mass=0.8", "--set", "horizon=0.1")
     assert code == 0 and "warning: the straight wrist buckles" in err
     assert open_run("latest:simulate").manifest.model_dump()["numerics"]["buckles"] is True
@@ -226,7 +228,7 @@ def test_an_interrupted_tuning_keeps_what_it_found(tmp_path: Path) -> None:
     assert len(run.data("history-smc")) >= 8 and (run.path / "SHA256SUMS").exists()
 
 
-def test_a_run_names_the_streams_that_it_drew_from(call) -> None:
+def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
     seen = "{plant_segments: 1, sensor: {level: camera}}"
     call("simulate", "--seed", "3", "--set", "horizon=0.1", "--set", f"loop={seen}", "--set", "reference.kind=step")
     name = "judged camera: step 30 deg, ulnar"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.conftest import Call
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
 
@@ -22,7 +23,7 @@ def made(tmp_path: Path) -> tuple[Run, Run]:
     return Run(data.path), Run(network.path)
 
 
-def test_ls_shows_what_was_asked_for(call, made: tuple[Run, Run]) -> None:
+def test_ls_shows_what_was_asked_for(call: Call, made: tuple[Run, Run]) -> None:
     data, network = made
     code, out, _ = call("runs", "ls", "--where", "rmse<1.5")
     assert code == 0 and network.id in out and data.id not in out and "rmse" in out.splitlines()[0]
@@ -39,7 +40,7 @@ def test_ls_shows_what_was_asked_for(call, made: tuple[Run, Run]) -> None:
     assert code == 2 and "did you mean 'rmse'?" in err
 
 
-def test_diff_names_each_part_that_differs(call, made: tuple[Run, Run]) -> None:
+def test_diff_names_each_part_that_differs(call: Call, made: tuple[Run, Run]) -> None:
     data, network = made
     found = json.loads(call("runs", "diff", data.id, network.id, "--json")[1])
     assert found["config"]["seed"] == {"before": 0, "after": 3}
@@ -55,7 +56,7 @@ def test_diff_names_each_part_that_differs(call, made: tuple[Run, Run]) -> None:
     assert "nothing differs" in call("runs", "diff", data.id, data.id)[1]
 
 
-def test_verify_names_the_file_and_fails(call, made: tuple[Run, Run]) -> None:
+def test_verify_names_the_file_and_fails(call: Call, made: tuple[Run, Run]) -> None:
     data, network = made
     assert call("runs", "verify")[0] == 0
     (network.path / "metrics.json").write_text("{}")
@@ -66,7 +67,7 @@ def test_verify_names_the_file_and_fails(call, made: tuple[Run, Run]) -> None:
 
 @pytest.mark.parametrize("damage", ["flipped", "torn", "gone"])
 def test_a_damaged_manifest_is_named_by_verify_and_refused_as_an_input(
-    call, made: tuple[Run, Run], damage: str
+    call: Call, made: tuple[Run, Run], damage: str
 ) -> None:
     data, network = made
     manifest = data.path / "run.json"
@@ -92,7 +93,9 @@ def test_a_damaged_manifest_is_named_by_verify_and_refused_as_an_input(
     assert "broken" in call("runs", "lineage", network.id)[1]
 
 
-def test_rm_asks_and_refuses_to_break_lineage(call, made: tuple[Run, Run], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rm_asks_and_refuses_to_break_lineage(
+    call: Call, made: tuple[Run, Run], monkeypatch: pytest.MonkeyPatch
+) -> None:
     data, network = made
     code, _, err = call("runs", "rm", data.id, "--yes")
     assert code == 2 and network.id in err and "--force" in err and data.path.is_dir()
@@ -103,7 +106,7 @@ def test_rm_asks_and_refuses_to_break_lineage(call, made: tuple[Run, Run], monke
     assert call("runs", "rm", data.id, "--yes")[0] == 0 and not data.path.exists()
 
 
-def test_tags_and_lineage_are_shown(call, made: tuple[Run, Run]) -> None:
+def test_tags_and_lineage_are_shown(call: Call, made: tuple[Run, Run]) -> None:
     data, network = made
     assert call("runs", "tag", data.id, "paper")[0] == 0
     assert json.loads(call("runs", "show", data.id, "--json")[1])["tags"] == ["paper"]
@@ -112,7 +115,7 @@ def test_tags_and_lineage_are_shown(call, made: tuple[Run, Run]) -> None:
     assert f"used by {network.id}" in call("runs", "lineage", data.id)[1]
 
 
-def test_report_writes_a_page_beside_the_runs(call, made: tuple[Run, Run]) -> None:
+def test_report_writes_a_page_beside_the_runs(call: Call, made: tuple[Run, Run]) -> None:
     code, out, _ = call("runs", "report", *(run.id for run in made))
     page = Path(out.splitlines()[-1])
     assert code == 0 and page.parent == made[0].path.parent and made[1].id in page.read_text()
@@ -121,7 +124,7 @@ def test_report_writes_a_page_beside_the_runs(call, made: tuple[Run, Run]) -> No
     assert all(run.problems() == [] for run in made)
 
 
-def test_a_run_that_did_not_end_well_is_not_repeated(call, tmp_path: Path) -> None:
+def test_a_run_that_did_not_end_well_is_not_repeated(call: Call, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError), start_run("train", Study(), "", tmp_path / "results") as live:
         raise RuntimeError
     code, _, err = call("runs", "replay", live.id)

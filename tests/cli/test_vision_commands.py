@@ -36,7 +36,7 @@ COVERED = range(12, 16)
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """24 pictures of a move to 20 deg, the tip's marker covered in four of them."""
-    scene, rng = Scene(SceneSettings(**POSE), WristParameters()), np.random.default_rng(0)
+    scene, rng = Scene(SceneSettings.model_validate(POSE), WristParameters()), np.random.default_rng(0)
     folder = tmp_path / "pictures"
     folder.mkdir()
     for k in range(24):
@@ -161,7 +161,7 @@ def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
     album = look(session)
     assert len(album.views) == 8 and cameras[0].closed
     assert asked == ["Lay the board in the bending plane, then press Enter"]
-    assert np.array_equal(album.last_picture, shots[-1].image)
+    assert album.last_picture is not None and np.array_equal(album.last_picture, shots[-1].image)
     names = sorted(each.name for each in (tmp_path / "data" / "views").iterdir())
     assert names == [*(f"{k:03}.png" for k in range(1, 9)), "plane.png"]
     again = [frame.image for frame in FolderCamera(tmp_path / "data" / "views")]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
-from wristctl.comparison.combinations import compare, refuse_tuned_scenarios
+from wristctl.comparison.combinations import ComparedRow, compare, refuse_tuned_scenarios
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
@@ -27,7 +28,7 @@ PID, SMC = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: 
 SOFT: dict[str, object] = {"plant": {"stiffness_scale": 0.8}}
 
 
-def results(rows: str):
+def results(rows: str) -> list[ComparedRow]:
     return compare(load_study([], [*SETTINGS, f"rows={rows}"], "compare"))
 
 
@@ -38,7 +39,7 @@ def test_rows_come_in_the_studys_order_and_do_not_depend_on_it() -> None:
         (loop, name) for loop in ("one", "four") for name in ("step 10 deg", "minimum jerk 0.3 s 30 deg")
     ]
 
-    def values(found):
+    def values(found: list[ComparedRow]) -> list[tuple[Any, ...]]:
         return sorted((r.loop, r.reference, r.inverse, r.label, tuple(r.simulation.metrics.values())) for r in found)
 
     assert repr(values(one)) == repr(values(other))
@@ -87,9 +88,10 @@ def test_gains_are_not_judged_on_the_loop_and_the_reference_that_they_were_tuned
 
     with pytest.raises(UserError, match="tuned on a scenario that they would be judged on: step 30 deg on loop other"):
         refuse_tuned_scenarios(judged({"fine": {}, "other": SOFT}, {"kind": "step"}), tuned)
-    for loops, reference in (
+    others: tuple[tuple[dict[str, dict[str, object]], dict[str, object]], ...] = (
         ({"soft": {}}, {"kind": "step"}),  # the same name for another loop
         ({"other": SOFT}, {"kind": "step", "angle_deg": 20.0}),
         ({"other": SOFT}, {"kind": "minimum-jerk"}),
-    ):
+    )
+    for loops, reference in others:
         refuse_tuned_scenarios(judged(loops, reference), tuned)

@@ -125,6 +125,7 @@ def _alone(data: Mapped, path: KeyPath, more: Mapped) -> Mapped:
     if not path:
         return {**leaves, **more}
     here, *rest = path
+    assert isinstance(here, str)
     if rest and isinstance(rest[0], int):
         return {**leaves, here: [_alone(data[here][rest[0]], tuple(rest[1:]), more)]}
     return {**leaves, here: _alone(data[here], tuple(rest), more)}

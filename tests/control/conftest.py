@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,8 +29,15 @@ class Course:
     memory: np.ndarray
 
 
+ClosedLoop = Callable[..., Course]
+Sine = Callable[..., np.ndarray]
+
+
 @compiled
-def _run(law, plant, model, limits, gains, reference, now, memory, state, out, period, segments):
+def _run(
+    law: Any, plant: Any, model: Any, limits: Any, gains: Any, reference: Any, now: Any, memory: Any, state: Any,
+    out: Any, period: float, segments: tuple[int, ...],
+) -> None:  # fmt: skip
     wrist, known, bound = load_segments(rows_of(plant)), load_segments(rows_of(model)), rows_of(limits)
     signals, kept = rows_of(now), rows_of(memory)
     n = len(segments)
@@ -59,21 +67,24 @@ def _closed_loop(
 ) -> Course:  # fmt: skip
     """Follow a reference (T, 3) of angle, rate and acceleration from rest, one row per control period."""
     law, ticks = controller(name), len(reference)
-    rows = [segments(plant, segments_), segments(model, 1), np.array([4.0, limit]), np.array([*gains, 0.0])]
+    wrist, known, values = segments(plant, segments_), segments(model, 1), np.array([*gains, 0.0])
     memory, state = np.zeros(max(1, law.memory)), np.zeros(2 * segments_)
     out = np.zeros((ticks, 3 + len(memory)))
     now, followed = np.zeros(len(NOW)), np.ascontiguousarray(reference)
-    _run(law.compiled(), *rows, followed, now, memory, state, out, period, (0,) * segments_)
+    _run(
+        law.compiled(), wrist, known, np.array([4.0, limit]), values, followed, now, memory, state, out, period,
+        (0,) * segments_,
+    )  # fmt: skip
     return Course(out[:, 0], out[:, 1], out[:, 2], out[:, 3:])
 
 
 @pytest.fixture(scope="session")
-def closed_loop() -> Callable[..., Course]:
+def closed_loop() -> ClosedLoop:
     return _closed_loop
 
 
 @pytest.fixture(scope="session")
-def sine() -> Callable[..., np.ndarray]:
+def sine() -> Sine:
     """amplitude (1 - cos(2 pi f t)) / 2 with two derivatives, (T, 3): from rest, exciting on and on."""
 
     def made(amplitude: float, frequency: float, duration: float, period: float = 1e-3) -> np.ndarray:

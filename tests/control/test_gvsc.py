@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ POSES = [(-9.81, 0.0), (9.81, 0.0), (0.0, -9.81), (-8.0, 3.0)]
 
 
 @compiled
-def _strain(wrist, theta, out):
+def _strain(wrist: Any, theta: Any, out: Any) -> None:
     angle, result = rows_of(theta), rows_of(out)
     result[0], result[1], result[2], result[3] = strain_model(wrist_of(wrist), angle[0])
     result[4], result[5] = one_segment(wrist_of(wrist), angle[0], 0.0 * angle[0])
@@ -51,7 +53,7 @@ def test_statics_match_a_finely_segmented_wrist(gravity: tuple[float, float], th
     angles, wanted = equilibrium_at(wrist, theta, FINE)
     assert torque == pytest.approx(wanted, abs=5e-4)
     u = (np.arange(FINE) + 0.5) / FINE
-    fitted = 3.0 * FINE * np.mean(angles * (2.0 * u - 1.0))
+    fitted = float(3.0 * FINE * np.mean(angles * (2.0 * u - 1.0)))
     assert beta == pytest.approx(fitted, abs=0.02 * abs(fitted) + 2e-3)
     step = 1e-4
     numeric = (strain(wrist, theta + step)[3] - strain(wrist, theta - step)[3]) / (2 * step)

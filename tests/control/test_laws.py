@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,13 +24,13 @@ WRIST = WristParameters(gravity=(-8.0, 3.0))
 
 
 @compiled
-def _call(law, now, wrist, gains, memory, torque):
+def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, torque: Any) -> None:
     result = rows_of(torque)
     result[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
 
 
 @compiled
-def _one_segment(wrist, now, out):
+def _one_segment(wrist: Any, now: Any, out: Any) -> None:
     row, result = now_of(now), rows_of(out)
     result[0], result[1] = one_segment(wrist_of(wrist), row.theta, row.rate)
 
@@ -170,7 +171,7 @@ def test_a_law_reads_its_gains_by_name_whatever_their_order_in_the_table() -> No
     turned = replace(chosen, name="turned", gains=dict(reversed(list(chosen.gains.items()))))
     at = {"theta": 0.2, "theta_ref": 0.1, "rate": 0.5}
     gains = {"Kp": 10.0, "Ki": 5.0, "Kd": 2.0}
-    both = [torque(each, each.values(gains), **at) for each in (chosen, turned)]
+    both = [torque(each, each.values(gains), None, **at) for each in (chosen, turned)]
     assert both[0] == both[1] != 0.0 and turned.values(gains) == (2.0, 5.0, 10.0)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tests.control.conftest import ClosedLoop, Sine
 from wristctl.config.wrist import WristParameters
 from wristctl.control.mrac import HIGHEST, LOWEST, MODEL_ANGLE, MODEL_RATE, PARAMETERS
 from wristctl.control.table import controller, gains_of
@@ -16,7 +17,7 @@ TRUE = np.array([0.0, 0.3, -0.2, 0.0, 0.0])
 """PLANT's parameters as deviations from MODEL's."""
 
 
-def test_lyapunov_function_does_not_grow_under_excitation(closed_loop, sine) -> None:
+def test_lyapunov_function_does_not_grow_under_excitation(closed_loop: ClosedLoop, sine: Sine) -> None:
     period, slope, gamma = 1e-4, 20.0, 20.0
     course = closed_loop(
         "mrac", (50.0, slope, 0.05, gamma, 1e-9), sine(0.8, 1.0, 2.0, period), PLANT, MODEL, period=period
@@ -30,7 +31,7 @@ def test_lyapunov_function_does_not_grow_under_excitation(closed_loop, sine) -> 
     assert lyapunov[-1] < 0.98 * lyapunov[0]
 
 
-def test_parameters_stay_in_bounds_on_a_wrist_of_another_form(closed_loop, sine) -> None:
+def test_parameters_stay_in_bounds_on_a_wrist_of_another_form(closed_loop: ClosedLoop, sine: Sine) -> None:
     plant = MODEL.model_copy(update={"hand_mass": 0.6, "stiffness": 0.4})
     wild = (80.0, 80.0, 0.5, 1e4, 1e-6)
     course = closed_loop("mrac", wild, sine(1.4, 2.0, 3.0), plant, MODEL, segments_=4, limit=120.0)
@@ -39,7 +40,7 @@ def test_parameters_stay_in_bounds_on_a_wrist_of_another_form(closed_loop, sine)
     assert ((deviations == np.array(LOWEST)) | (deviations == np.array(HIGHEST))).any()
 
 
-def test_the_reference_model_smooths_a_step_by_its_double_pole(closed_loop) -> None:
+def test_the_reference_model_smooths_a_step_by_its_double_pole(closed_loop: ClosedLoop) -> None:
     w, period = 10.0, 1e-4
     step = np.tile([0.5, 0.0, 0.0], (6000, 1))
     course = closed_loop("mrac", (w, 20.0, 0.05, 1.0, 1e-6), step, MODEL, MODEL, period=period)
@@ -49,7 +50,7 @@ def test_the_reference_model_smooths_a_step_by_its_double_pole(closed_loop) -> N
     assert np.abs(course.theta - expected).max() < 2e-3
 
 
-def test_adaptation_removes_most_of_the_error_of_a_wrong_model(closed_loop, sine) -> None:
+def test_adaptation_removes_most_of_the_error_of_a_wrong_model(closed_loop: ClosedLoop, sine: Sine) -> None:
     gains, reference = gains_of(controller("mrac"), "default"), sine(0.8, 1.0, 4.0)
     fixed, adapting = (
         closed_loop("mrac", (*gains[:3], gamma, 1e-6), reference, PLANT, MODEL, segments_=4)

@@ -26,7 +26,7 @@ def test_sources_alone_in_another_place_build_the_same_bytes(tmp_path: Path) -> 
     shutil.copytree(BOARD / "firmware", elsewhere / "firmware")
     for name in ("dictionary.py", "messages.toml"):
         shutil.copy(BOARD / name, elsewhere)
-    command = ["make", "-C", elsewhere / "firmware", "check", f"BUILD={tmp_path}/build"]
+    command: list[str | Path] = ["make", "-C", elsewhere / "firmware", "check", f"BUILD={tmp_path}/build"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "warning" not in run.stderr
@@ -37,7 +37,7 @@ def test_another_compiler_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "avr-gcc"
     other.write_text("#!/bin/sh\necho 7.3.0\n")
     other.chmod(0o755)
-    command = ["make", "-C", BOARD / "firmware", f"BUILD={tmp_path}/build"]
+    command: list[str | Path] = ["make", "-C", BOARD / "firmware", f"BUILD={tmp_path}/build"]
     run = subprocess.run(command, capture_output=True, text=True, env={"PATH": f"{tmp_path}:/usr/bin:/bin"})
     assert run.returncode != 0
     assert "avr-gcc 5.4.0 is needed" in run.stdout

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.config.identify import IdentifySettings
-from wristctl.config.loop import Reference
+from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -24,7 +24,7 @@ UPRIGHT = KNOWN
 LEVEL = KNOWN.model_copy(update={"gravity": (0.0, 6.94), "gravity_flexion": 6.94})
 STEPS = Reference(kind="multi-step", angles_deg=(25.0, -10.0, 30.0, 0.0, 20.0, -15.0, 30.0, 0.0), duration=0.6)
 SLOW = Reference()
-DIRECTIONS = ("ulnar", "radial", "flexion", "extension")
+DIRECTIONS: tuple[DirectionName, ...] = ("ulnar", "radial", "flexion", "extension")
 START = {"tendon_stiffness": 20e3, "friction": 0.1, "delay": 0.0} | {
     name: getattr(KNOWN, name) for name in ("stiffness", "damping", "tendon_radius")
 }
@@ -58,7 +58,7 @@ def logged(
     seed: int,
     moves: Reference = STEPS,
     poses: tuple[WristParameters, ...] = (UPRIGHT, LEVEL),
-    directions: tuple[str, ...] = DIRECTIONS,
+    directions: tuple[DirectionName, ...] = DIRECTIONS,
     **truth: float,
 ) -> tuple[list[MeasuredTrial], dict[str, float]]:
     """Trials of a rehearsed bench, one run a pose, and the true parameters."""
@@ -78,7 +78,7 @@ def problem(trials: list[MeasuredTrial], **settings: object) -> Problem:
 
 
 def write_run(
-    out: Path, seed: int, pose: WristParameters, moves: Reference = STEPS, sides: tuple[str, ...] = DIRECTIONS
+    out: Path, seed: int, pose: WristParameters, moves: Reference = STEPS, sides: tuple[DirectionName, ...] = DIRECTIONS
 ) -> Run:
     """A run of kind hw-run with the trials of a rehearsed bench."""
     made, _ = bench(seed)

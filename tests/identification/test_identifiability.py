@@ -7,13 +7,14 @@ import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, SLOW, START, TENDONS, UPRIGHT, logged, problem
 from wristctl.config.errors import UserError
+from wristctl.config.loop import DirectionName
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.identifiability import additions, budget, not_identified, refuse
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import measured_trials
 
 Slow = tuple[Fit, Knowledge, dict[str, float]]
-SIDES = ("ulnar", "radial")
+SIDES: tuple[DirectionName, ...] = ("ulnar", "radial")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +61,7 @@ def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay()
     assert abs(heavier["delay"]) < 1e-6
 
 
-def _tables(push: float, verdict: str) -> tuple[pd.DataFrame, ...]:
+def _tables(push: float, verdict: str) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     time = [0.005 * k for k in range(100)]
     steps = {f"position_{tendon}": [tendon * k for k in range(100)] for tendon in (1, 2, 4, 5)}
     log = pd.DataFrame({"trial": 0, "time": time, "counted": [each + 0.5e-3 for each in time]} | steps)

@@ -76,7 +76,7 @@ def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_ar
         tree = ast.parse(file.read_text())
         imports = [n for n in tree.body if isinstance(n, ast.ImportFrom) and (n.module or "").startswith(CONFIG)]
         foreign = {alias.asname or alias.name for each in imports for alias in each.names}
-        kernels = {a.id for n in ast.walk(tree) if isinstance(n, ast.Call) for a in n.args[:1] if _is_kernel(n, a)}
+        kernels = {a.id for n in ast.walk(tree) if isinstance(n, ast.Call) for a in n.args[:1] if _is_kernel(a, n)}
         for node in tree.body:
             if isinstance(node, ast.FunctionDef) and (node.name in kernels or _decorated(node)):
                 seen += 1
@@ -91,7 +91,7 @@ def _decorated(node: ast.FunctionDef) -> bool:
     return any(isinstance(each, ast.Name) and each.id in ("compiled", "kernel") for each in node.decorator_list)
 
 
-def _is_kernel(call: ast.Call, argument: ast.expr) -> TypeGuard[ast.Name]:
+def _is_kernel(argument: ast.expr, call: ast.Call) -> TypeGuard[ast.Name]:
     """Compiled for each plant: `kernel_of(function, model)`."""
     return isinstance(call.func, ast.Name) and call.func.id == "kernel_of" and isinstance(argument, ast.Name)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mpmath
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from wristctl.lanes.types import LANES
 
 
 @compiled
-def _functions(x, out):
+def _functions(x: Any, out: Any) -> None:
     row, result = rows_of(x), rows_of(out)
     result[0] = tanh(row[0])
     e0, e1, e2, e3 = bessel(row[0])

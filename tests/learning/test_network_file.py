@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def test_a_network_read_back_is_the_same_to_the_bit(network: Network, file: Path
 
 
 def test_the_header_tells_units_scalers_and_domain(network: Network, file: Path) -> None:
-    told = header(file)
+    told: dict[str, Any] = header(file)
     assert told["input"]["unit"] == "m" and told["output"]["unit"] == "rad"
     assert told["input"]["mean"] == network.input_scaler.mean.tolist()
     assert tuple(told["domain"]["theta"]) == network.domain.theta

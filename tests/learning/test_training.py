@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,7 +140,12 @@ def test_interrupted_training_keeps_its_last_whole_epoch(
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_training_taken_up_from_its_checkpoint_ends_in_the_same_bytes(
-    samples: Samples, split: Split, quick: NetworkSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change
+    samples: Samples,
+    split: Split,
+    quick: NetworkSettings,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    change: dict[str, Any],
 ) -> None:
     monkeypatch.setattr(training, "SAVE_EVERY", 0.0)
     job = Job("one", quick.model_copy(update={"epochs": 6, **change}), split, SEED)

@@ -9,6 +9,7 @@ import random
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import yaml
 from operators import Change, changes
@@ -45,7 +46,7 @@ def drawn(seed: int, count: int = COUNT) -> list[Change]:
     return list(chosen.values())
 
 
-def entry(change: Change, name: str) -> dict[str, str | int]:
+def entry(change: Change, name: str) -> dict[str, Any]:
     """The change as known.yaml has it: whole lines, and from which line on they are meant if they stand there twice."""
     source = (PACKAGE / change.file).read_text(encoding="utf-8")
     begin, end = source.rfind("\n", 0, change.start) + 1, source.find("\n", change.end)

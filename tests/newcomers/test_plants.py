@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -31,9 +32,11 @@ WRIST = WristParameters()
 @pytest.fixture(autouse=True, params=[*PLANTS, "elsewhere"])
 def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> PlantModel:
     """Each plant, known under its name for one test."""
-    monkeypatch.syspath_prepend(str(HERE))
     if request.param != "elsewhere":
         return PLANTS[request.param]
+    package = ModuleType("elsewhere")  # without its __init__, which fills every table for good
+    package.__path__ = [str(HERE / "elsewhere")]
+    monkeypatch.setitem(sys.modules, "elsewhere", package)
     from elsewhere.hinge import HINGE
 
     monkeypatch.setitem(PLANTS, "hinge", HINGE)

@@ -33,10 +33,10 @@ def _begun(child: subprocess.Popen[str], results: Path) -> Run:
 def test_a_killed_run_reads_as_crashed_and_a_living_one_as_running(process: Start, results: Path) -> None:
     child = process(_SLEEPS, results)
     run = _begun(child, results)
-    assert run.state == "running"
+    alive = run.state
     child.send_signal(signal.SIGKILL)
     child.wait()
-    assert run.state == "crashed"
+    assert (alive, run.state) == ("running", "crashed")
     assert json.loads((run.path / "run.json").read_bytes())["state"] == "running"
     assert not (run.path / "SHA256SUMS").exists()
 

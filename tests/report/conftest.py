@@ -34,7 +34,7 @@ ROWS = ("smc/printed", "smc/exchanged", "smc/tuned", "pid/tuned", "feedforward/d
 
 def course(label: str, tau: float = 0.3, diverges: bool = False, network_error: float = 0.0) -> Trajectory:
     """A first-order response to a step of 30 deg, on four segments."""
-    time, final = np.arange(200) * 0.025, np.radians(30.0)
+    time, final = np.arange(200.0) * 0.025, np.radians(30.0)
     theta = final * (1.0 - np.exp(-time / tau))
     if diverges:
         theta = np.where(time < 2.0, np.expm1(2.0 * time), np.nan)
@@ -42,10 +42,12 @@ def course(label: str, tau: float = 0.3, diverges: bool = False, network_error: 
     wanted = np.full_like(time, final)
     tension = np.stack([np.where(np.arange(200) % 2, 60.0, 2.0), np.full(200, 2.0)], axis=-1)
     torque = 0.04 * (tension[:, 0] - tension[:, 1])
-    tips = (chain_tip(np.repeat(0.25 * each[:, None], 4, axis=1), WRIST.length) for each in (theta, wanted))
+    tip, tip_desired = (chain_tip(np.repeat(0.25 * each[:, None], 4, axis=1), WRIST.length) for each in (theta, wanted))
     rate = np.gradient(theta, time)
     reference = wanted + network_error
-    return Trajectory(label, time, theta, segments, rate, reference, wanted, *tips, 2.0 * torque, torque, tension)
+    return Trajectory(
+        label, time, theta, segments, rate, reference, wanted, tip, tip_desired, 2.0 * torque, torque, tension
+    )
 
 
 def late() -> Trajectory:

@@ -69,7 +69,7 @@ def test_no_text_lies_on_another(drawn: Figure) -> None:
 
 
 def test_text_is_large_enough_to_read(drawn: Figure) -> None:
-    assert min(text.get_fontsize() for text in texts(drawn)) >= 7.0
+    assert min(float(text.get_fontsize()) for text in texts(drawn)) >= 7.0
 
 
 @pytest.mark.parametrize("make", ["errors, log", "rmse map", "directions", "stroboscope"], indirect=True)

@@ -36,17 +36,17 @@ def labels(figure: Figure) -> list[str]:
 def test_coverage_shows_every_sample_in_mm_and_deg(samples: Samples) -> None:
     figure = coverage(samples_table(samples))
     (dots,) = figure.axes[0].collections
-    np.testing.assert_allclose(dots.get_offsets(), 1e3 * samples.tip[:, ::-1])
-    np.testing.assert_allclose(dots.get_array(), np.degrees(samples.theta))
+    np.testing.assert_allclose(np.asarray(dots.get_offsets()), 1e3 * samples.tip[:, ::-1])
+    np.testing.assert_allclose(np.asarray(dots.get_array()), np.degrees(samples.theta))
     assert labels(figure) == ["y [mm]", "x [mm]", "bending angle [deg]"]
 
 
 def test_learning_curves_are_in_deg_and_the_kept_trial_stands_out() -> None:
     figure = learning_curves(CURVES, kept=1)
     lines = figure.axes[0].get_lines()
-    kept = [line for line in lines if not line.get_label().startswith("_")]
+    kept = [line for line in lines if not str(line.get_label()).startswith("_")]
     assert [line.get_label() for line in kept] == ["training", "validation"] and len(lines) == 4
-    np.testing.assert_allclose(kept[1].get_ydata(), np.degrees([0.3, 0.04]))
+    np.testing.assert_allclose(np.asarray(kept[1].get_ydata()), np.degrees([0.3, 0.04]))
     assert kept[0].get_linewidth() > lines[0].get_linewidth()
     assert labels(figure) == ["epoch", "RMSE of the angle [deg]"]
     assert figure.axes[0].get_yscale() == "log"
@@ -57,8 +57,8 @@ def test_predicted_angles_show_the_error_beside_the_angle(samples: Samples) -> N
     table = predictions_table(samples.tip, (), theta, theta + np.radians(0.3), theta, theta)
     figure = predicted_angles(table)
     left, right = figure.axes
-    np.testing.assert_allclose(left.get_lines()[1].get_ydata(), np.degrees(samples.theta) + 0.3)
-    np.testing.assert_allclose(right.get_lines()[1].get_ydata(), 0.3)
+    np.testing.assert_allclose(np.asarray(left.get_lines()[1].get_ydata()), np.degrees(samples.theta) + 0.3)
+    np.testing.assert_allclose(np.asarray(right.get_lines()[1].get_ydata()), 0.3)
     assert all("[deg]" in label for label in labels(figure))
 
 
@@ -66,7 +66,7 @@ def test_error_map_marks_its_greatest_error(samples: Samples) -> None:
     grid = error_map(lambda tip: np.zeros(tip.shape[:-1]), samples.domain, 11, 5)
     figure = error_over_workspace(grid.tip, grid.error)
     mark = figure.axes[0].get_lines()[0]
-    (y,), (x,) = mark.get_data()
+    (y,), (x,) = (np.asarray(each) for each in mark.get_data())
     assert abs(np.degrees(2 * np.arctan2(y, x))) == pytest.approx(50.0)
     assert figure.axes[0].get_title(loc="left").startswith("greatest error 50 deg")
     assert labels(figure) == ["y [mm]", "x [mm]", "absolute error [deg]"]

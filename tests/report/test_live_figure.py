@@ -34,7 +34,7 @@ def test_the_picture_shows_angle_and_reference_up_to_now() -> None:
     above, below = recent(rows(100)).axes
     (angle,) = (each for each in above.lines if each.get_label() == "angle")
     assert np.asarray(angle.get_xdata())[-1] == 0.0
-    np.testing.assert_allclose(angle.get_ydata(), np.degrees(0.1 * PERIOD * np.arange(100)))
+    np.testing.assert_allclose(np.asarray(angle.get_ydata()), np.degrees(0.1 * PERIOD * np.arange(100)))
     assert [each.get_label() for each in below.lines] == [f"tendon {number}" for number in (1, 2, 4, 5)]
 
 

@@ -29,13 +29,13 @@ def test_angles_are_drawn_in_degrees_against_the_desired_angle(course: Course) -
     one = course("smc/tuned")
     (axes,) = angles([one]).axes
     np.testing.assert_array_equal(line(axes, "smc/tuned").get_ydata(), np.degrees(one.theta))
-    np.testing.assert_allclose(line(axes, "desired").get_ydata(), 30.0)
+    np.testing.assert_allclose(np.asarray(line(axes, "desired").get_ydata()), 30.0)
 
 
 def test_reference_is_drawn_where_a_network_makes_it_differ_from_the_desired_angle(course: Course) -> None:
     assert "reference" not in labels(angles([course("smc/tuned")]).axes[0])
     (axes,) = angles([course("smc/tuned", network_error=0.01)]).axes
-    np.testing.assert_allclose(line(axes, "reference").get_ydata(), 30.0 + np.degrees(0.01))
+    np.testing.assert_allclose(np.asarray(line(axes, "reference").get_ydata()), 30.0 + np.degrees(0.01))
 
 
 def test_loop_that_diverges_is_named_so_and_hides_no_other(course: Course) -> None:
@@ -75,7 +75,7 @@ def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(co
 def test_a_long_course_of_tensions_is_drawn_by_samples_of_its_own_that_keep_every_peak(course: Course) -> None:
     short = course("smc/exchanged")
     rng = np.random.default_rng(0)
-    time, tension = np.arange(20_007) * 1e-3, rng.uniform(2.0, 60.0, (20_007, 2))
+    time, tension = np.arange(20_007.0) * 1e-3, rng.uniform(2.0, 60.0, (20_007, 2))
     torque = 0.04 * (tension[:, 0] - tension[:, 1])
     one = replace(short, time=time, tension=tension, torque=torque, torque_wanted=torque)
     drawn = tensions(one).axes[0].lines[0]
@@ -89,15 +89,16 @@ def test_a_long_course_of_tensions_is_drawn_by_samples_of_its_own_that_keep_ever
 
 def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(course: Course) -> None:
     one = course("smc/exchanged")
-    late = replace(one, seen=np.roll(one.theta, 3), acting=0.5 * one.tension)
+    seen, acting = np.roll(one.theta, 3), 0.5 * one.tension
+    late = replace(one, seen=seen, acting=acting)
     (axes,) = angles([late]).axes
-    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(late.seen))
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen))
     (axes,) = errors([late]).axes
-    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), late.seen - late.theta_ref)
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), seen - late.theta_ref)
     plus, _, minus, *_ = tensions(late).axes
     for side, drawn in enumerate((plus, minus)):
         np.testing.assert_array_equal(line(drawn, "commanded").get_ydata(), late.tension[:, side])
-        np.testing.assert_array_equal(line(drawn, "acting").get_ydata(), late.acting[:, side])
+        np.testing.assert_array_equal(line(drawn, "acting").get_ydata(), acting[:, side])
     same = replace(one, seen=one.theta, acting=one.tension)
     assert labels(angles([same]).axes[0]) == ["smc/exchanged", "desired"]
     assert "acting" not in labels(tensions(same).axes[0])

@@ -16,6 +16,7 @@ import pytest
 
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.comparison_data import frame, series
+from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
@@ -160,7 +161,7 @@ def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, c
 def test_two_runs_on_one_page_show_only_what_differs(browser: Any, tmp_path: Path) -> None:
     runs = []
     for epochs in (5, 6):
-        with start_run("train", Study(train={"epochs": epochs}), f"of-{epochs}", tmp_path) as live:
+        with start_run("train", Study(train=TrainSettings(epochs=epochs)), f"of-{epochs}", tmp_path) as live:
             live.metric("rmse", 1.0 / epochs, "rad", "lower")
         runs.append(Run(live.path))
     file = tmp_path / "two.html"

@@ -32,7 +32,7 @@ def test_axes_are_always_an_array_of_rows_and_columns() -> None:
 
 def test_legend_below_names_each_label_once() -> None:
     made, axes = figure(1, 2)
-    for each in axes.flat:
+    for each in axes.ravel().tolist():
         each.plot([0.0, 1.0], label="smc/tuned")
     legend_below(made)
     assert [text.get_text() for text in made.legends[0].get_texts()] == ["smc/tuned"]

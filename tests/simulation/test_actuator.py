@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,7 @@ PERIOD, MOVE = 1e-3, Reference()
 
 
 @compiled
-def _drive(drive, state, model, commands, out, h):
+def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float) -> None:
     known, motors = load_segments(rows_of(model)), rows_of(state)
     for tick in range(commands.shape[0]):
         command, result = rows_of(commands[tick]), rows_of(out[tick])
@@ -38,6 +40,12 @@ def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
     return out
 
 
+def driven(actuator: Actuator) -> Drive:
+    found = drive_of(actuator)
+    assert found is not None
+    return found
+
+
 def run(
     name: str, actuator: Actuator, plant: Plant | None = None, gains: tuple[float, ...] = (),
     reference: Reference = MOVE,
@@ -48,7 +56,7 @@ def run(
 
 
 def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -> None:
-    drive = drive_of(Actuator(level="lagged", lag=0.05))
+    drive = driven(Actuator(level="lagged", lag=0.05))
     pull = delivered(drive, np.tile([44.0, 4.0, 0.0], (500, 1)))
     time = (np.arange(500) + 1) * PERIOD
     quantum = drive.motor.stiffness * drive.motor.step
@@ -58,14 +66,14 @@ def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -
 
 
 def test_lagged_pull_grows_no_faster_than_the_motor_turns() -> None:
-    drive = drive_of(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
+    drive = driven(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
     pull = delivered(drive, np.tile([100.0, 4.0, 0.0], (100, 1)))[:, 0]
     slope = (pull[50] - pull[0]) / (50 * PERIOD)
     assert slope == pytest.approx(drive.motor.stiffness * drive.motor.speed, rel=0.05)
 
 
 def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_its_target() -> None:
-    drive = drive_of(Actuator(level="tendon"))
+    drive = driven(Actuator(level="tendon"))
     length = delivered(drive, np.tile([4.0, 4.0, 0.8], (500, 1)))[:, 0]
     fine = length / drive.motor.step
     np.testing.assert_allclose(fine, np.rint(fine), atol=1e-6)

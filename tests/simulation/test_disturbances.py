@@ -16,7 +16,7 @@ from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()
-TIME = np.arange(5000) * 1e-3
+TIME = np.arange(5000.0) * 1e-3
 
 
 def run(disturbances: Disturbances, plant: Plant | None = None, horizon: float = 6.0) -> Outcome:
@@ -26,15 +26,22 @@ def run(disturbances: Disturbances, plant: Plant | None = None, horizon: float =
     return rollout(law, np.zeros((1, 0)), [move], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
 
 
+def course(disturbances: Disturbances) -> np.ndarray:
+    """Force [N] and stiffness over the plant's own at TIME, (T, 2)."""
+    found = acting(disturbances, TIME)
+    assert found is not None
+    return found
+
+
 def test_push_is_half_a_sine_with_its_impulse() -> None:
-    force = acting(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)), TIME)[:, 0]
+    force = course(Disturbances(push=Push(force=-2.0, start=1.0, duration=0.5)))[:, 0]
     assert force.sum() * 1e-3 == pytest.approx(-2.0 * 0.5 * 2 / np.pi, rel=1e-4)
     assert not force[TIME <= 1.0].any() and not force[TIME >= 1.5].any()
     assert force.min() == pytest.approx(-2.0, rel=1e-4)
 
 
 def test_drift_runs_linearly_between_its_ends() -> None:
-    scale = acting(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)), TIME)[:, 1]
+    scale = course(Disturbances(drift=Drift(scale=0.6, start=1.0, duration=2.0)))[:, 1]
     assert scale[[0, 1000, 2000, 3000, 4999]] == pytest.approx([1.0, 1.0, 0.8, 0.6, 0.6])
 
 

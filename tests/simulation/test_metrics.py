@@ -11,7 +11,7 @@ from wristctl.simulation.metrics import METRICS, metrics_of, of_trajectory, summ
 from wristctl.simulation.trajectory import Trajectory
 
 PERIOD, HORIZON = 1e-4, 5.0
-TIME = np.arange(round(HORIZON / PERIOD)) * PERIOD
+TIME = np.arange(float(round(HORIZON / PERIOD))) * PERIOD
 STILL = np.full((len(TIME), 2), 3.0)
 
 
@@ -85,7 +85,7 @@ def test_every_metric_states_unit_and_formula() -> None:
 
 
 def test_nothing_settles_or_overshoots_where_the_last_angle_is_where_it_began() -> None:
-    time = np.arange(5000) * 1e-3
+    time = np.arange(5000.0) * 1e-3
     swing = 0.1 * np.sin(time)
     found = metrics_of(1e-3, swing, swing, np.full((5000, 2), 2.0), final=1e-17, rest=1.0)
     assert all(math.isnan(found[name]) for name in ("settling", "settling_5", "overshoot", "rmse_settled"))
@@ -100,7 +100,7 @@ def test_the_steady_state_is_that_of_the_last_tenth_of_the_horizon() -> None:
 
 def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_angle() -> None:
     """The tip 3 mm off, in the last tenth 5 mm; the angle 0.02 rad off what was wanted."""
-    time = np.arange(1000) * 1e-3
+    time = np.arange(1000.0) * 1e-3
     away = np.where(time < 0.9 - 1e-9, 3e-3, 5e-3)
     wanted = np.tile((0.08, 0.0), (1000, 1))
     still = {name: np.zeros(1000) for name in ("rate", "theta_ref", "torque_wanted", "torque")}

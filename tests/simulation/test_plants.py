@@ -58,11 +58,11 @@ def test_integrating_laws_keep_their_accuracy_on_an_unknown_plant(name: str, pla
 def test_a_plant_rests_where_the_wrist_of_its_own_parameters_rests(plant: Plant) -> None:
     """Under feedforward's final tensions the plant reaches the equilibrium of a wrist with those parameters."""
     outcome = run("feedforward", plant, Reference(angle_deg=10.0), horizon=8.0)
-    tensions = tuple(float(outcome.column(f"tension_{side}", 0)[-1]) for side in ("plus", "minus"))
+    plus, minus = (float(outcome.column(f"tension_{side}", 0)[-1]) for side in ("plus", "minus"))
     its_own = WristParameters(
         stiffness=WRIST.stiffness * plant.stiffness_scale, hand_mass=WRIST.hand_mass + plant.payload
     )
-    assert outcome.column("theta", 0)[-1] == pytest.approx(equilibrium(its_own, 4, tensions).sum(), abs=1e-4)
+    assert outcome.column("theta", 0)[-1] == pytest.approx(equilibrium(its_own, 4, (plus, minus)).sum(), abs=1e-4)
 
 
 WORST = Loop(plant=UNKNOWN["softer"], sensor=Sensor(level="camera"), actuator=Actuator(level="tendon"))

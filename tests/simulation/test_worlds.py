@@ -58,7 +58,7 @@ def test_each_lanes_world_is_its_own_whatever_stands_beside_it() -> None:
 
 def test_motors_and_cameras_are_one_a_lane_even_where_frames_come_at_other_ticks() -> None:
     loops = [Loop(actuator=motors, sensor=camera) for motors in MOTORS for camera in CAMERAS]
-    streams = [(1, 2)] * len(loops)
+    streams: list[tuple[int, ...]] = [(1, 2)] * len(loops)
     together = samples(loops, WRIST, len(loops), streams)
     for lane, loop in enumerate(loops):
         assert together[lane].tobytes() == samples(loop, WRIST, 1, streams[:1])[0].tobytes()

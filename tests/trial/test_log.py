@@ -26,6 +26,7 @@ def test_every_row_is_in_the_file_at_once(tmp_path: Path) -> None:
     for number in range(3):
         stream.row((0, number, 0.0, 0.0, 0.0, "ok"))
         assert pd.read_csv(tmp_path / "frames.csv")["number"].tolist() == list(range(number + 1))
+    stream.close()
 
 
 def test_a_full_disk_is_told_and_what_was_pending_is_written_into_the_reserve(tmp_path: Path) -> None:

@@ -166,7 +166,7 @@ def test_swarm_is_as_good_as_an_independent_one_on_rosenbrock() -> None:
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
-    class Valley(Problem):  # type: ignore[misc]
+    class Valley(Problem):
         def _evaluate(self, x: Array, out: dict[str, Array]) -> None:
             out["F"] = rosenbrock(x)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -76,7 +78,7 @@ def test_every_controllers_search_box_spans_six_decades() -> None:
             np.testing.assert_allclose(GainSpace.of(chosen.gains).decades, 6.0)
 
 
-def test_gains_read_back_exactly(tmp_path) -> None:
+def test_gains_read_back_exactly(tmp_path: Path) -> None:
     gains = {"pid": {"Kp": 1 / 3, "Ki": 1e-300, "Kd": 2.0**0.5}}
     write_gains(tmp_path / "gains.json", gains)
     assert read_gains(tmp_path / "gains.json") == gains

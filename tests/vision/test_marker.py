@@ -43,7 +43,7 @@ def test_angle_scatters_by_less_than_a_tenth_of_a_degree_at_40_to_80_px(distance
 
 @pytest.mark.parametrize("pose", [{"tilt_deg": 10.0}, {"pan_deg": 10.0}], ids=str)
 def test_homography_corrects_a_tilt_of_ten_degrees(pose: dict[str, float]) -> None:
-    scene = Scene(SceneSettings(**pose), WristParameters())
+    scene = Scene(SceneSettings.model_validate(pose), WristParameters())
     degrees = np.linspace(-45.0, 45.0, COUNT)
     uncorrected = errors(scene, View(), degrees)
     corrected = errors(scene, scene.view, degrees)

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from wristctl.config.errors import UserError
 from wristctl.config.vision import CharucoBoard, Markers
@@ -21,9 +22,9 @@ POINT = 25.4 / 72.0
 DPI = 200
 
 
-def scanned(page: object) -> np.ndarray:
-    canvas = FigureCanvasAgg(page)  # type: ignore[arg-type]
-    page.set_dpi(DPI)  # type: ignore[attr-defined]
+def scanned(page: Figure) -> np.ndarray:
+    canvas = FigureCanvasAgg(page)
+    page.set_dpi(DPI)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., 0].copy()
 

@@ -62,7 +62,7 @@ def test_positive_angles_bend_toward_the_side_that_the_markers_settings_say(posi
 
 @pytest.mark.parametrize("pose", [{}, {"tilt_deg": 20.0, "pan_deg": -10.0, "roll_deg": 30.0}], ids=["square", "askew"])
 def test_its_view_sets_the_bending_plane_square(pose: dict[str, float]) -> None:
-    settings = SceneSettings(**pose)
+    settings = SceneSettings.model_validate(pose)
     scene = Scene(settings, WRIST)
     rng = np.random.default_rng(0)
     x, y = rng.uniform((0.0, -0.05), (0.12, 0.05), (50, 2)).T

@@ -8,7 +8,7 @@ import pytest
 from wristctl.comparison.combinations import compare
 from wristctl.config.load import load_study
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, in_plane, tendons_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of
 
 SETTINGS = (
     "rows=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8", "loops={default: {}}",
@@ -43,7 +43,7 @@ def test_each_plane_sees_its_own_gravity() -> None:
 
 
 @pytest.mark.parametrize("each", DIRECTIONS.values(), ids=lambda d: d.name)
-def test_tendons_that_pull_lie_on_the_side_of_the_bend(each) -> None:
+def test_tendons_that_pull_lie_on_the_side_of_the_bend(each: Direction) -> None:
     axis = 0 if each.plane == "ulnar" else 1
     assert all(TENDONS[number][axis] == each.sign for number in each.tendons)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,7 +22,7 @@ WRIST = WristParameters()
 
 
 @compiled
-def _allocate(parameters, asked, out):
+def _allocate(parameters: Any, asked: Any, out: Any) -> None:
     wrist, row, result = load_segments(rows_of(parameters)), rows_of(asked), rows_of(out)
     result[0], result[1] = reach(row[0], wrist, row[2], row[3])
     plus, minus = allocate(row[0], wrist, row[1], row[2], row[3])

@@ -62,8 +62,12 @@ def perform_trials(
     plant = PLANTS[settings.bench.plant.model]
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
     trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
-    experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
-    film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
+    try:
+        experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
+        film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
+    except BaseException:
+        trial_log.close()
+        raise
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):

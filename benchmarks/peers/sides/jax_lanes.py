@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +21,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
     gains, wanted = [float(g) for g in task.gains], jnp.asarray(task.reference[:, 0])
     n = task.segments
 
-    def tick(index, carry):
+    def tick(index: Any, carry: Any) -> Any:
         theta, omega, seen = carry
         angle, rate = sum(theta), sum(omega)
         seen = seen.at[index].set(angle[0])
@@ -30,7 +31,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
         return theta, omega, seen
 
     @jax.jit
-    def loop(ticks):
+    def loop(ticks: Any) -> Any:
         still = [jnp.zeros(max(lanes, 4))] * n  # one lane alone is slower, and takes its compiler minutes
         return jax.lax.fori_loop(0, ticks, tick, (still, still, jnp.zeros(task.ticks)))[2]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,7 +17,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
     """Linear systems by jnp.linalg."""
     plant, n = Segment(*map(float, task.plant)), task.segments
 
-    def rates(state, theta, plus, minus):
+    def rates(state: Any, theta: Any, plus: Any, minus: Any) -> Any:
         angles, omega = list(state[:n]), list(state[n:])
         p = posture(plant, angles, plus, minus)
         mass = jnp.stack([jnp.stack(row) for row in mass_matrix(plant, p)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import chain
 import mujoco
@@ -24,7 +25,7 @@ def prepare(
     known, n = Segment(*map(float, task.model)), task.segments
     gains, wanted = [float(g) for g in task.gains], [float(r) for r in task.reference[:, 0]]
 
-    def control(xp, theta, rate, theta_ref):
+    def control(xp: Any, theta: Any, rate: Any, theta_ref: float) -> tuple[Any, ...]:
         plus, minus = pulls(xp, known, gains, task.low, task.high, theta, rate, theta_ref)
         return (plus, minus) if tendons else (torque(known, theta, plus, minus),) * n
 

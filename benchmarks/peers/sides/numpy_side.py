@@ -18,7 +18,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
         theta, omega = ([np.zeros(lanes) for _ in range(task.segments)] for _ in range(2))
         seen = np.empty(ticks)
         for tick in range(ticks):
-            angle, rate = sum(theta), sum(omega)
+            angle, rate = sum(theta[1:], theta[0]), sum(omega[1:], omega[0])
             seen[tick] = angle[0]
             plus, minus = pulls(np, model, task.gains, task.low, task.high, angle, rate, task.reference[tick, 0])
             for _ in range(steps):

@@ -38,7 +38,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
         """RK4 on forward dynamics."""
 
         def rates(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            return pin.aba(model, data, q, v, drive - stiffness * q - damping * v).copy()
+            return np.array(pin.aba(model, data, q, v, drive - stiffness * q - damping * v))
 
         a1 = rates(q, v)
         v2 = v + 0.5 * h * a1

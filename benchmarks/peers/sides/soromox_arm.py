@@ -8,6 +8,7 @@ task's.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 
@@ -51,7 +52,7 @@ def prepare(task: Task, lanes: int, threads: int, steps: int) -> Callable[[int],
         backend="jax",
     )
 
-    def rates(state, theta, plus, minus):
+    def rates(state: Any, theta: Any, plus: Any, minus: Any) -> Any:
         push = jnp.full(n, torque(model, theta, plus, minus))
         return arm.forward_dynamics(jnp.array(0.0), state, (jnp.zeros(arm.num_actuators), push))
 

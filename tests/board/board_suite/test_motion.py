@@ -61,7 +61,7 @@ def test_moves_retargeted_on_the_fly_end_exactly_on_the_last_target(bench: Bench
         for _ in range(20):
             target = random_target(rng)
             bench.do(target)
-            bench.run_ms(rng.integers(0, 60))
+            bench.run_ms(int(rng.integers(0, 60)))
         status = bench.wait_for_rest()
         assert status.position == target.position == positions(bench)
 

@@ -143,7 +143,7 @@ def test_no_axis_starts_again_when_a_stop_falls_into_the_working_out_of_its_rate
     for _ in range(20 + 10 * rounds):
         bench.get_ready()
         for _ in range(rng.integers(10, 20)):  # always accelerating, the main loop never idle
-            bench.send(Rate(tuple(rng.uniform(-10_000, 10_000, 4))))  # type: ignore[arg-type]
+            bench.send(Rate(tuple(rng.uniform(-10_000, 10_000, 4))))
             bench.run(int(rng.integers(10_000, 20_000)))
         opened = bench.chip.cycles
         bench.chip.drive(*ESTOP, True)
