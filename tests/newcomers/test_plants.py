@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.wrist.plant import PLANTS, PlantModel, poses
 
-__all__ = ["host_on"]  # a fixture of the bench' tests
+__all__ = ["host_on"]  # a fixture of the bench's tests
 HERE = Path(__file__).parent
 WRIST = WristParameters()
 
@@ -34,9 +33,7 @@ def model(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Pl
     """Each plant, known under its name for one test."""
     if request.param != "elsewhere":
         return PLANTS[request.param]
-    package = ModuleType("elsewhere")  # without its __init__, which fills every table for good
-    package.__path__ = [str(HERE / "elsewhere")]
-    monkeypatch.setitem(sys.modules, "elsewhere", package)
+    monkeypatch.syspath_prepend(str(HERE))
     from elsewhere.hinge import HINGE
 
     monkeypatch.setitem(PLANTS, "hinge", HINGE)
