@@ -152,7 +152,7 @@ def follow(hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first
         plus, minus = zero, zero
         for pair in range(2):
             one, other = sides[pair], sides[2 + pair]
-            pull_plus, pull_minus = pulls(tendon, plant, q, rate, 1.0, reeled[one], reeled[other])
+            pull_plus, pull_minus = pulls(tendon, plant, q, rate, reeled[one], reeled[other])
             pull[one] = pull_plus
             pull[other] = pull_minus
             plus = plus + pull_plus

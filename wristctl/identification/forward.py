@@ -59,7 +59,7 @@ def _advance(model: Any, values: Any, tendons: Any, spools: Any, state: Any, ang
         plus, minus = zero, zero
         for pair in range(2):
             ahead, behind = reeled[now, pair] + tendon[2 + pair], reeled[now, 2 + pair] + tendon[4 + pair]
-            one, other = pulls(drive, plant, q, rate, 1.0, ahead, behind)
+            one, other = pulls(drive, plant, q, rate, ahead, behind)
             plus = plus + one
             minus = minus + other
         alive = advance_or_stop(plant, q, rate, plus, minus, spools.h + zero, alive)

@@ -132,8 +132,8 @@ def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus
 
 
 @compiled
-def pulls(drive: Any, plant: Any, q: Any, rate: Any, rubbing: float, plus: Any, minus: Any) -> Any:
-    """Pulls [N] of both sides on a plant at q, rate from what they deliver, with this share of the friction."""
+def pulls(drive: Any, plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
+    """Pulls [N] of both sides on a plant at q, rate from what they deliver, less what the discs' friction takes."""
     if drive is None:
         return plus, minus
     if drive.level != TENDON:
@@ -141,12 +141,24 @@ def pulls(drive: Any, plant: Any, q: Any, rate: Any, rubbing: float, plus: Any, 
     motor = drive.motor
     zero = 0.0 * plus
     stretch_plus, stretch_minus, bend, slide_plus, slide_minus = stretch(plant, q, rate, plus, minus)
-    wrapped = 0.5 * rubbing * motor.friction * bend
+    wrapped = 0.5 * motor.friction * bend
     x_plus, x_minus = wrapped * tanh(slide_plus / _SLIDING), wrapped * tanh(slide_minus / _SLIDING)
     # (1 - x/2)/(1 + x/2) is the capstan's exp(-x) to x^3/12
     pull_plus = motor.stiffness * maximum(stretch_plus, zero) * (1.0 - x_plus) / (1.0 + x_plus)
     pull_minus = motor.stiffness * maximum(stretch_minus, zero) * (1.0 - x_minus) / (1.0 + x_minus)
     return pull_plus, pull_minus
+
+
+@compiled
+def frictionless_pulls(drive: Any, plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
+    """`pulls` of tendons that slide freely."""
+    if drive is None:
+        return plus, minus
+    if drive.level != TENDON:
+        return plus, minus
+    zero = 0.0 * plus
+    stretch_plus, stretch_minus, _, _, _ = stretch(plant, q, rate, plus, minus)
+    return drive.motor.stiffness * maximum(stretch_plus, zero), drive.motor.stiffness * maximum(stretch_minus, zero)
 
 
 @compiled

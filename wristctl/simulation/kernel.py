@@ -139,7 +139,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
-            acting_plus, acting_minus = pulls(drive, plant, q, rates, 1.0, given_plus, given_minus)
+            acting_plus, acting_minus = pulls(drive, plant, q, rates, given_plus, given_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
@@ -157,8 +157,9 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 for i in range(n):
                     row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
-            for _ in range(setup.substeps):
-                acting_plus, acting_minus = pulls(drive, plant, q, rates, 1.0, given_plus, given_minus)
+            for substep in range(setup.substeps):
+                if substep > 0:
+                    acting_plus, acting_minus = pulls(drive, plant, q, rates, given_plus, given_minus)
                 sum_[_ALIVE] = advance_or_stop(plant, q, rates, acting_plus, acting_minus, h, sum_[_ALIVE])
 
 

@@ -18,7 +18,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import at_rest, drive_of, pulls, tendon_stiffness
+from wristctl.simulation.actuator import at_rest, drive_of, frictionless_pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
@@ -61,7 +61,7 @@ def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -
     """Advance x by one control period, linearly implicit in damping and stiffness."""
     theta, rate = part(x, 0, _ONE), part(x, 1, _ONE)
     angle, speed, load = x[0], x[1], x[2]
-    pull_plus, pull_minus = pulls(drive, known, theta, rate, 0.0, plus, minus)
+    pull_plus, pull_minus = frictionless_pulls(drive, known, theta, rate, plus, minus)
     inertia, resisting = one_segment(known, angle, speed)
     stiffness = known.stiffness + 0.0 * angle
     stiffness = stiffness + tendon_stiffness(drive, known, angle)
