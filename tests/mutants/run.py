@@ -26,8 +26,8 @@ ROOT = Path(__file__).parents[2]
 KNOWN = Path(__file__).with_name("known.yaml")
 LEAST = 0.9
 """Share of drawn changes that must be noticed."""
-LIMIT = 300.0
-"""Seconds after which the tests of one stage are taken to hang: that is noticed too."""
+LIMIT = 200
+"""Seconds after which one test is taken to hang: that is noticed too."""
 
 NEIGHBOURS = {
     "arrays": ["tests/wrist"],
@@ -142,16 +142,17 @@ def try_out(mutant: Mutant) -> Result:
 
 
 def _failing(folder: Path, tests: list[str], scratch: Path) -> str | None:
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--basetemp", str(scratch), *tests]
+    hangs = ("-o", f"faulthandler_timeout={LIMIT}", "-o", "faulthandler_exit_on_timeout=true")
+    own = ("-x", "-q", "-p", "no:cacheprovider", "--basetemp", str(scratch))
+    command = [sys.executable, "-m", "pytest", *own, *hangs, *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "WRISTCTL_MUTANT": "1"}
-    try:
-        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=LIMIT)
-    except subprocess.TimeoutExpired:
-        return f"{' '.join(tests)} hang"
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     if done.returncode == 0:
         return None
     found = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
-    return found[0] if found else f"{' '.join(tests)}: exit {done.returncode}"
+    stopped = re.findall(r"File \"[^\"]*/(tests/[^\"]+)\", line \d+ in (test_\w+)", done.stderr)
+    hanging = [f"{file}::{name} hangs" for file, name in stopped[:1]]
+    return (found or hanging or [f"{' '.join(tests)}: exit {done.returncode}"])[0]
 
 
 def main() -> None:

@@ -127,12 +127,6 @@ def _overshoot(of: Totals) -> Array:
     return np.where(_rests(of), 100.0 * of.sums["overshoot"] / np.abs(of.goals["move"]), np.nan)
 
 
-def _away(trajectory: Trajectory) -> Array:
-    """Distance of the tip from where it should be [m], (T,)."""
-    distance: Array = np.linalg.norm(trajectory.tip - trajectory.tip_desired, axis=1)
-    return distance
-
-
 RMSE = Metric(
     "rad",
     "sqrt(mean e^2) over the horizon",
@@ -196,12 +190,12 @@ RMSE_DESIRED = Metric(
 TIP_RMSE = Metric(
     "mm",
     "RMSE of the tip's distance from the wanted position",
-    of_trajectory=lambda course: 1e3 * np.sqrt(np.mean(_away(course) ** 2)),
+    of_trajectory=lambda course: 1e3 * np.sqrt(np.mean(course.tip_distance**2)),
 )
 TIP_STEADY = Metric(
     "mm",
     "mean distance of the tip from the wanted position over the last 10 %",
-    of_trajectory=lambda course: 1e3 * _away(course)[-max(1, len(course.time) // 10) :].mean(),
+    of_trajectory=lambda course: 1e3 * course.tip_distance[-max(1, len(course.time) // 10) :].mean(),
 )
 OUTSIDE_DOMAIN = Metric(
     "", "share of the wanted tips outside the network's trained domain", of_trajectory=lambda course: course.outside

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -93,7 +94,21 @@ def motion(
 
     Tip targets, or angles with inverse `network` or `exact`, become a tip path (an arc whose angle and length move
     from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
+    What needs no network is worked out once; the arrays are read-only.
     """
+    if reference.inverse == "network":
+        return _evaluated(reference, wrist, horizon, period, network)
+    return _known(reference, wrist, horizon, period)
+
+
+@lru_cache(maxsize=64)
+def _known(reference: Reference, wrist: WristParameters, horizon: float, period: float) -> Motion:
+    return _evaluated(reference, wrist, horizon, period, None)
+
+
+def _evaluated(
+    reference: Reference, wrist: WristParameters, horizon: float, period: float, network: Inverse | None
+) -> Motion:
     kind = REFERENCES[reference.kind]
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
     targets = np.array(_targets(reference, kind, wrist))
@@ -105,11 +120,12 @@ def motion(
     move, begin = float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
     rest = kind.rest(reference, begin, horizon)
     theta, tip = arc[0], arc_path(arc[0], arc[1])
-    if reference.inverse == "none":
-        return Motion(time, theta[0], theta[1], theta[2], theta[0], tip.position, move, begin, rest, horizon)
-    found = _inverse(reference, network)(tip)
-    angles = found.theta, found.rate, found.acceleration
-    outside = float(np.mean(found.outside))
+    angles, outside = (theta[0], theta[1], theta[2]), 0.0
+    if reference.inverse != "none":
+        found = _inverse(reference, network)(tip)
+        angles, outside = (found.theta, found.rate, found.acceleration), float(np.mean(found.outside))
+    for each in (time, *angles, theta, tip.position):
+        each.setflags(write=False)
     return Motion(time, *angles, theta[0], tip.position, move, begin, rest, horizon, outside)
 
 

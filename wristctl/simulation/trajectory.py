@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.arrays import Array
 
@@ -68,6 +71,12 @@ class Trajectory:
     def error(self) -> Array:
         """e = theta - theta_ref (E12), (T,)."""
         return self.theta - self.theta_ref
+
+    @cached_property
+    def tip_distance(self) -> Array:
+        """Distance of the tip from where it should be [m], (T,)."""
+        distance: Array = np.linalg.norm(self.tip - self.tip_desired, axis=1)
+        return distance
 
     def columns(self) -> dict[str, Array]:
         """Everything under the names of COLUMNS, (T,) each."""
