@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
+from tests.report.conftest import result as compared_row
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.report.repetition_figures import error_sizes
 from wristctl.simulation.closed_loop import Repeated
 
 
@@ -47,6 +49,49 @@ def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results
             [dataclasses.replace(r, repeated=Repeated.once(s)) for r, s in zip(results, bad, strict=True)]
         ).axes
         assert texts(ours) == ["0" if value == 0.0 else "x"] * len(results)
+
+
+def repeated(values: list[float], failed: int = 0) -> Repeated:
+    """Repetitions with these RMSE, ten million times as much chattering, and errors as large as they are."""
+    flags = np.arange(len(values)) < failed
+    rmse = np.where(flags, np.nan, values)
+    metrics = {"rmse": rmse, "chattering": 1e7 * np.array(values)}
+    return dataclasses.replace(one_result().repeated, metrics=metrics, failed=flags)
+
+
+def one_result() -> ComparedRow:
+    return compared_row("smc/tuned", "step 30 deg", 1e-3)
+
+
+def test_of_repetitions_map_and_bars_show_the_median_with_its_interval_and_what_failed() -> None:
+    """Of twelve the interval of the median ends at the third and the tenth (Conover, table of the sign test)."""
+    values = [1e-3 * k for k in range(1, 13)]
+    row = dataclasses.replace(one_result(), repeated=repeated(values))
+    assert texts(rmse_map([row]).axes[0]) == ["0.0065\n0.003 to 0.01"]
+    (axes,) = chattering_bars([row]).axes
+    (bar,), (dot, whisker) = axes.patches, axes.lines
+    assert bar.get_width() == pytest.approx(6.5e4)  # type: ignore[attr-defined]
+    assert dot.get_xdata() == pytest.approx([6.5e4]) and whisker.get_xdata() == pytest.approx([3e4, 10e4])
+    one_failed = dataclasses.replace(row, repeated=repeated(values, failed=1))
+    assert texts(rmse_map([one_failed]).axes[0]) == ["0.0075\n0.004 to 0.011\n1 of 12 failed"]
+    assert chattering_bars([one_failed]).axes[0].patches[0].get_hatch()
+    few = dataclasses.replace(row, repeated=repeated(values[:3]))
+    assert texts(rmse_map([few]).axes[0]) == ["0.002"]
+
+
+def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_moment() -> None:
+    time = one_result().simulation.trajectory.time
+    errors = np.outer(np.arange(1.0, 13.0) * (-1.0) ** np.arange(12), np.linspace(1.0, 2.0, len(time)))
+    own = dataclasses.replace(one_result().repeated, errors=errors, failed=np.arange(12) < 2)
+    (axes,) = error_sizes([own]).axes
+    median, _zero = axes.lines
+    np.testing.assert_allclose(np.asarray(median.get_ydata(), float), 6.5 * np.linspace(1.0, 2.0, len(time)))
+    (band,) = axes.collections
+    places = np.asarray(band.get_paths()[0].vertices)
+    assert places[:, 1].min() == pytest.approx(3.0) and places[:, 1].max() == pytest.approx(20.0)
+    assert axes.get_ylabel() == "median |error| of 12 [rad]" and median.get_label() == "smc/tuned, 2 failed"
+    diverged = dataclasses.replace(own, errors=np.where(np.arange(12)[:, None] < 7, np.nan, errors))
+    assert np.isnan(np.asarray(error_sizes([diverged]).axes[0].lines[0].get_ydata())).all()
 
 
 def test_several_inverses_are_rows_of_their_own(results: list[ComparedRow]) -> None:

@@ -46,5 +46,18 @@ def spread(values: NDArray[np.float64]) -> Spread:
     return Spread(_never(median), _never(float(found.low)), _never(float(found.high)), n)
 
 
+def spread_over_time(courses: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """`spread` of courses (n, T) sample by sample: median, low and high, (T,) each; inf where they are no numbers."""
+    ordered = np.sort(np.where(np.isnan(courses), np.inf, courses), axis=0)
+    n = len(ordered)
+    ranks = spread(np.arange(n, dtype=np.float64))
+    with np.errstate(invalid="ignore"):
+        median = 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2])
+    if ranks.interval is None:
+        return median, np.full_like(median, np.nan), np.full_like(median, np.nan)
+    low, high = (ordered[int(each)] for each in ranks.interval)
+    return median, low, high
+
+
 def _never(value: float) -> float:
     return value if np.isfinite(value) else float("nan")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Literal
 
@@ -15,7 +15,9 @@ from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
 from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.comparison_data import metrics_of
 from wristctl.comparison.paper import T2
+from wristctl.comparison.statistics import spread
 from wristctl.report.loop_figures import draw_desired, within_half_a_move
 from wristctl.report.style import GREY, WIDTH, PowersOfTen, colour, figure, line, logarithmic, title, undress
 
@@ -55,22 +57,27 @@ def angle_grid(results: Sequence[ComparedRow], heading: str = "", across: Across
 def rmse_map(results: Sequence[ComparedRow], heading: str = "", across: Across = "reference") -> Figure:
     """RMSE [rad] of each controller as number and colour (log), beside the paper's T2; columns as `across` says.
 
-    What diverged is hatched and marked with an x.
+    Of repetitions it is the median, with its 95 % interval below and how many of them failed. What diverged is hatched
+    and marked with an x.
     """
     rows, columns = _names(results, across)
     values = np.full((len(rows), len(columns)), np.nan)
     printed = np.full((len(rows), 1), np.nan)
+    below: dict[tuple[int, int], str] = {}
     for result in results:
         at = rows.index(_row(results, result))
-        values[at, columns.index(getattr(result, across))] = result.simulation.metrics["rmse"]
+        place = at, columns.index(getattr(result, across))
+        values[place] = metrics_of(result)["rmse"]
+        if len(result.repeated.failed) > 1:
+            below[place] = _below(result)
         printed[at] = T2[result.controller].rmse if result.controller in T2 else np.nan
     known = np.concatenate([values, printed], axis=1)
     positive = known[known > 0.0]
     norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
     widths = (len(columns), 1)
-    size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + 0.34 * len(rows)}
+    size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
     made, ((ours, paper),) = figure(1, 2, width_ratios=widths, sharey=True, **size)
-    image = _cells(ours, values, norm)
+    image = _cells(ours, values, norm, below)
     _cells(paper, printed, norm)
     for row, column in np.argwhere(np.isnan(values)):
         ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
@@ -88,17 +95,21 @@ def rmse_map(results: Sequence[ComparedRow], heading: str = "", across: Across =
 def chattering_bars(results: Sequence[ComparedRow], heading: str = "") -> Figure:
     """Total variation of tension per second [N/s], log, of each controller: the bar is the median over the references.
 
-    Dots are the single references; what diverged is hatched.
+    Dots are the single references, of repetitions their medians with 95 % intervals; what diverged is hatched.
     """
     rows, _ = _names(results, "reference")
     made, ((axes,),) = figure(height=1.1 + 0.3 * len(rows))
     for at, name in enumerate(rows):
         own = [result for result in results if _row(results, result) == name]
-        values = np.array([result.simulation.metrics["chattering"] for result in own])
-        failed = any(result.simulation.failed for result in own)
+        spreads = [spread(result.repeated.metrics["chattering"]) for result in own]
+        values = np.array([each.median for each in spreads])
+        failed = any(result.repeated.failed.any() for result in own)
         hatch = {"hatch": _FAILED, "edgecolor": "w"} if failed else {}
         axes.barh(at, np.median(values), height=0.6, color=colour(own[0].controller), **hatch)
         axes.plot(values, np.full(len(values), at), "o", color="w", markeredgecolor="k", markersize=4.0)
+        for each in spreads:
+            if each.interval is not None:
+                axes.plot(each.interval, [at, at], color="k", linewidth=1.0)
     logarithmic(axes.xaxis)
     axes.set_yticks(range(len(rows)), rows)
     axes.invert_yaxis()
@@ -120,12 +131,20 @@ def _names(results: Sequence[ComparedRow], across: Across) -> tuple[list[str], l
     return list(rows), list(dict.fromkeys(getattr(result, across) for result in results))
 
 
-def _cells(axes: Axes, values: Array, norm: LogNorm) -> AxesImage:
-    """Values (rows, columns) as coloured cells with their numbers; nothing where they are nan."""
+def _below(result: ComparedRow) -> str:
+    """The interval of a repeated row's RMSE, and how many repetitions failed."""
+    found, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
+    ends = "" if found.interval is None else "\n{:.2g} to {:.2g}".format(*found.interval)
+    return ends + (f"\n{failed.sum()} of {found.n} failed" if failed.any() else "")
+
+
+def _cells(axes: Axes, values: Array, norm: LogNorm, below: Mapping[tuple[int, int], str] | None = None) -> AxesImage:
+    """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan."""
     undress(axes)
     image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
     for row, column in np.argwhere(np.isfinite(values)):
         value = values[row, column]
+        text = (below or {}).get((int(row), int(column)), "")
         ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
-        axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize=9.0, color=ink)
+        axes.text(column, row, f"{value:.2g}{text}", ha="center", va="center", fontsize=7.5 if text else 9.0, color=ink)
     return image

@@ -144,6 +144,7 @@ def _draw(findings: Findings, settings: CompareSettings, results: list[ComparedR
     from wristctl.comparison.paper import T2
     from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
     from wristctl.report.loop_figures import errors
+    from wristctl.report.repetition_figures import error_sizes
 
     loops = list(settings.loops)
     if len(loops) > 1:
@@ -167,6 +168,9 @@ def _draw(findings: Findings, settings: CompareSettings, results: list[ComparedR
                 heading = f"{name}, loop {loop}, {shown[0].reference}"
                 findings.figure(f"error-{name}-{loop}", errors, courses, heading)
                 findings.figure(f"error-log-{name}-{loop}", errors, courses, heading, log=True)
+        repeated = [r.repeated for r in shown if len(r.repeated.failed) > 1]
+        if repeated:
+            findings.figure(f"error-repetitions-{loop}", error_sizes, repeated, f"loop {loop}, {shown[0].reference}")
 
 
 def _units() -> dict[str, str]:

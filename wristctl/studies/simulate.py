@@ -65,6 +65,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
     from wristctl.report.loop_figures import angles, errors, tensions
+    from wristctl.report.repetition_figures import error_sizes
     from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
@@ -91,6 +92,8 @@ def simulate(session: Session) -> Simulated:
     with session.progress("drawing"):
         findings.figure("angle", angles, [course])
         findings.figure("error", errors, [course])
+        if len(repeated.failed) > 1:
+            findings.figure("error-repetitions", error_sizes, [repeated])
         findings.figure("tensions", tensions, course)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     return Simulated(session.study, findings, [table], repeated, failed)
