@@ -1,4 +1,8 @@
-"""What model-based laws know: the wrist as one segment (E6 with n = 1)."""
+"""What model-based laws know: the wrist as one segment (E6 with n = 1).
+
+It is the model of `wrist.arcs` and `wrist.dynamics` written a second time, short enough for a law; tests hold one
+against the other.
+"""
 
 from __future__ import annotations
 
