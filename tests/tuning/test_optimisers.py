@@ -107,6 +107,9 @@ def test_tell_without_ask_or_with_a_wrong_count_is_refused(name: str) -> None:
     optimiser.ask()
     with pytest.raises(ValueError, match="20 values"):
         optimiser.tell(np.zeros(3))
+    optimiser.tell(np.zeros(20))
+    with pytest.raises(RuntimeError, match="ask"):
+        optimiser.tell(np.zeros(20))
 
 
 @every
