@@ -158,6 +158,12 @@ def test_differential_evolution_says_how_many_candidates_it_needs() -> None:
         start("differential-evolution", candidates=2)
 
 
+@every
+def test_without_candidates_nothing_is_searched(name: str) -> None:
+    with pytest.raises(UserError, match="candidates, not 0"):
+        start(name, candidates=0)
+
+
 def test_swarm_with_one_dimension_and_one_candidate_runs() -> None:
     asked, _ = course(ParticleSwarm(1, 1, np.array([0.5]), np.random.default_rng(0)), sphere, 5)
     assert asked.shape == (5, 1, 1)
