@@ -22,8 +22,10 @@ def course(segments: int) -> Trajectory:
     def column(*shape: int) -> Array:
         return np.array(np.random.default_rng(next(count)).random((SAMPLES, *shape)), np.float64)
 
-    return Trajectory("", 1e-3 * np.arange(SAMPLES, dtype=np.float64), column(), column(segments), column(), column(), column(),
-                      column(2), column(2), column(), column(), column(2))  # fmt: skip
+    time, angles = 1e-3 * np.arange(SAMPLES, dtype=np.float64), column(segments)
+    return Trajectory(
+        "", time, column(), angles, column(), column(), column(), column(2), column(2), column(), column(), column(2)
+    )
 
 
 def row(name: str, metrics: dict[str, list[float]], failed: list[bool], segments: int = 1) -> ComparedRow:

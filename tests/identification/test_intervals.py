@@ -61,6 +61,8 @@ def test_independent_residuals_leave_fishers_covariance_with_what_was_known_befo
     np.testing.assert_allclose(known.half_widths, 1.959964 * known.deviation, rtol=1e-6)
     sd = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(known.correlation, covariance / np.outer(sd, sd), atol=1e-9)
+    columns = np.vstack([slopes / NOISE, np.diag(before)[3:]])
+    assert known.condition == pytest.approx(np.linalg.cond(columns / np.linalg.norm(columns, axis=0)))
     assert known.autocorrelation == pytest.approx(0.0, abs=0.01) and known.effective == len(residual)
 
 
