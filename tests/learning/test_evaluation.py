@@ -37,8 +37,8 @@ def network(inputs: int, bias: float = 0.0) -> Network:
     """Linear in the inputs: 3 x + 2 y + pose/10 + mass/5 + bias."""
     factors = np.array([[3.0, 2.0, 0.1, 0.2][:inputs]])
     domain = Domain((-0.8, 0.8), (0.07, 0.09))
-    weights = (np.vstack([factors, np.zeros((1, inputs))]), np.array([[1.0, 1.0]]))
-    biases = (np.full(2, 100.0), np.array([bias - 200.0]))
+    weights = (np.vstack([factors, np.zeros((2, inputs))]), np.array([[1.0, 1.0, 1.0]]))
+    biases = (np.full(3, 100.0), np.array([bias - 300.0]))
     return Network(weights, biases, "relu", Scaler.none(inputs), Scaler.none(1), domain)
 
 
@@ -77,6 +77,7 @@ def test_every_measure_stands_under_its_own_name(inputs: int) -> None:
     own = network(inputs, bias=-0.2)
     found = measures(trial(own), places(samples, CUT))
     assert set(found) == set(MEASURES)
+    assert [MEASURES[name][0] for name in ("r2", "rmse_deg", "close_share", "train_loss")] == ["", "deg", "1", "rad^2"]
     for name, rows in (("", TEST), ("held_out_payloads_", TEST[:5]), ("held_out_poses_", TEST[5:])):
         wanted = angle_errors(samples.inputs[rows, :inputs] @ [3.0, 2.0, 0.1, 0.2][:inputs] - 0.2, samples.theta[rows])
         assert found[f"{name}rmse_deg"] == pytest.approx(wanted.rmse_deg, rel=1e-9)
@@ -111,7 +112,7 @@ def test_a_network_stands_beside_a_polynomial_of_all_inputs_and_the_exact_invers
     inputs = samples.inputs
     angle, parameters, multiply_adds = found["network"]
     np.testing.assert_allclose(angle(inputs), inputs[:, :2] @ [3.0, 2.0], atol=1e-9)
-    assert (parameters, multiply_adds) == (2 * 2 + 2 + 2 + 1, 2 * 2 + 2)
+    assert (parameters, multiply_adds) == (2 * 3 + 3 + 3 + 1, 2 * 3 + 3)
     angle, parameters, multiply_adds = found["polynomial"]
     assert (parameters, multiply_adds) == (126, 126 * 4 + 126), "degree 5 in four inputs"
     np.testing.assert_allclose(angle(inputs), samples.theta, atol=1e-6)
