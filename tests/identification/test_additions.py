@@ -90,6 +90,7 @@ def test_a_value_at_the_edge_of_the_search_is_not_found_but_no_friction_is_frict
 def test_half_widths_are_told_in_per_cent_or_their_own_unit() -> None:
     assert width_text("stiffness", np.log(1.123)) == "12 %" and width_text("damping", np.log(1.0456)) == "4.6 %"
     assert width_text("stiffness", np.log(3.456)) == "246 %" and width_text("stiffness", np.log(10.9)) == "990 %"
+    assert width_text("stiffness", np.log(2.5)) == "150 %" and width_text("stiffness", np.log(1.05)) == "5 %"
     assert width_text("stiffness", np.log(11.1)) == "over 1000 %" == width_text("stiffness", 1e9)
     assert width_text("delay", 0.0123) == "12 ms" and width_text("friction", 0.123) == "0.12"
 

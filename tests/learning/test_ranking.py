@@ -30,6 +30,11 @@ def test_rows_are_ranked_by_mean_and_every_pair_is_tested_once_better_first() ->
     assert found.friedman_p == pytest.approx(friedmanchisquare(*errors.values()).pvalue)
 
 
+def test_a_row_is_as_good_as_its_mean_however_many_values_it_has_and_pairs_are_of_whole_rows() -> None:
+    found = rank({"a": [1.0, 5.0, 1.0, 5.0], "b": [2.0, 2.5, 2.0, 2.5]})
+    assert found.order == ("b", "a") and found.pairs[0].difference == pytest.approx(0.75)
+
+
 def test_two_rows_have_no_test_of_the_whole_and_equal_ones_no_difference() -> None:
     same = np.arange(1.0, 7.0)
     found = rank({"a": same, "b": same})
