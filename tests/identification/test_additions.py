@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 from tests.identification.benches import KNOWN, LEVEL, START, UPRIGHT
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.fit import Fit, Problem, fit
+from wristctl.identification import identifiability
+from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linearise
+from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.identifiability import (
     ADDITIONS,
     Addition,
@@ -187,3 +189,37 @@ def test_added_trials_are_reckoned_at_the_start_of_what_is_not_known() -> None:
     noisier = additions(replace(here, noise=2e-3), {"stiffness": 1.0, "delay": 1.0})
     for a, b in zip(one, noisier, strict=True):
         assert a.half_widths["delay"] < b.half_widths["delay"] <= 2.001 * a.half_widths["delay"]
+
+
+def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One side's spools reel in what holds the load, the other's move as they did."""
+    reckoned: list[Sequence[MeasuredTrial]] = []
+
+    def spy(problem: Problem, x: np.ndarray) -> Linearisation:
+        reckoned.append(problem.trials)
+        return linearise(problem, x)
+
+    settings = IdentifySettings.model_validate(QUICK)
+    own = simulated(UPRIGHT, {"stiffness": START["stiffness"], "delay": 0.0})
+    problem = Problem([own], START, settings)
+    found = replace(fit(problem), noise=1e-3)
+    monkeypatch.setattr(identifiability, "linearise", spy)
+    assert [each.what for each in additions(found, {})] == list(ADDITIONS)
+
+    def course(trial: MeasuredTrial) -> np.ndarray:
+        wrist = trial.wrist.model_copy(update={"stiffness": found.values["stiffness"]})
+        supposed = SupposedWrist(wrist, START["tendon_stiffness"], START["friction"])
+        bent: np.ndarray = problem.simulate(trial, [supposed])[0]
+        return bent
+
+    for (what, (move, load)), (first, added) in zip(ADDITIONS.items(), reckoned, strict=True):
+        assert first is own and added.run == "a again"
+        moved = move(own)
+        more = added.reeled - moved.reeled
+        assert more.min() >= 0.0 and (np.minimum(more[:, 0], more[:, 2]) == 0.0).all()
+        np.testing.assert_array_equal(more[:, ::2], more[:, 1::2])
+        assert added.wrist == load(moved).wrist
+        if "another pose" in what:
+            wanted, sagged = course(moved), course(replace(added, reeled=moved.reeled))
+            sag = np.abs(sagged - wanted)
+            assert sag.max() > 0.01 and np.abs(course(added) - wanted).mean() < 0.1 * sag.mean()
