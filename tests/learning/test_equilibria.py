@@ -91,3 +91,13 @@ def test_what_the_tendons_cannot_hold_is_left_out() -> None:
     assert len(drawn(WRIST.model_copy(update={"tension_limit": float(half.mean())})).theta) == 120, "half is enough"
     with pytest.raises(UserError, match="121 of 240"):
         drawn(WRIST.model_copy(update={"tension_limit": float(half[0]) - 1e-6}))
+
+
+def test_the_tips_alone_are_the_same_samples_without_the_other_inputs(hanging: Samples) -> None:
+    alone = hanging.tips_alone()
+    np.testing.assert_array_equal(alone.inputs, hanging.tip)
+    np.testing.assert_array_equal(hanging.inputs, np.hstack([hanging.tip, hanging.others]))
+    np.testing.assert_array_equal(alone.theta, hanging.theta)
+    assert (alone.names, alone.others.shape, alone.segments) == ((), (240, 0), 4)
+    assert alone.domain.others == () and alone.domain.theta == hanging.domain.theta
+    assert alone.domain.contains(hanging.tip[hanging.held_out != HELD_POSE]).all()
