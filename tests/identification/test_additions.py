@@ -223,3 +223,15 @@ def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.M
             wanted, sagged = course(moved), course(replace(added, reeled=moved.reeled))
             sag = np.abs(sagged - wanted)
             assert sag.max() > 0.01 and np.abs(course(added) - wanted).mean() < 0.1 * sag.mean()
+
+
+def test_an_addition_is_enough_where_it_identifies_every_parameter() -> None:
+    settings = IdentifySettings.model_validate(QUICK)
+    fitted = fit(Problem([simulated(LEVEL, {"stiffness": START["stiffness"], "delay": 0.0})], START, settings))
+    mixed = 0
+    for noise in np.geomspace(1e-4, 1.0, 13):
+        for each in additions(replace(fitted, noise=float(noise)), {}):
+            told = [half <= widest(name, settings) for name, half in each.half_widths.items()]
+            assert each.enough == all(told)
+            mixed += any(told) and not all(told)
+    assert mixed > 0
