@@ -8,7 +8,7 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.learning.dataset import Samples, draw_samples, split_samples
+from wristctl.learning.dataset import Samples, draw_samples, samples_of_courses, split_samples, unit_cube
 from wristctl.wrist.kinematics import arc_tip, exact_angle
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol")
@@ -80,3 +80,83 @@ def test_split_is_the_papers_and_uses_every_sample_once() -> None:
 def test_split_without_samples_to_validate_on_is_the_users_error() -> None:
     with pytest.raises(UserError, match="train_share"):
         split_samples(10, 0.9, np.random.default_rng(0))
+
+
+def test_a_chain_of_segments_shares_the_angle_and_its_samples_fill_the_wrists_range() -> None:
+    """Four segments bend within a quarter of the range each, so that the sum lies within it, less often at its ends."""
+    samples = draw(segments=4, samples=2000, sampling="uniform", stretch=(0.8, 1.3))
+    bend = math.radians(WRIST.range_deg)
+    assert np.abs(samples.theta).max() <= bend and samples.theta.std() == pytest.approx(
+        bend / math.sqrt(12.0), rel=0.05
+    )
+    assert samples.theta.mean() == pytest.approx(0.0, abs=0.03)
+    np.testing.assert_allclose(np.linalg.norm(samples.tip, axis=1) / WRIST.length, 1.05, atol=0.3)
+    assert not samples.curvature_is_constant and samples.segments == 4
+    assert draw(segments=1).curvature_is_constant and draw(segments=1).segments == 1
+    assert samples.domain.contains(samples.tip).all()
+
+
+def test_stretch_is_a_share_of_the_wrists_length() -> None:
+    samples = draw(stretch=(0.5, 1.5), samples=500)
+    low, high = samples.domain.arc_length
+    assert (low, high) == pytest.approx((0.5 * WRIST.length, 1.5 * WRIST.length))
+    assert samples.domain.theta == pytest.approx((-math.radians(50.0), math.radians(50.0)))
+    assert samples.arc_length.mean() == pytest.approx(WRIST.length, rel=0.03)
+    np.testing.assert_allclose(samples.tip, arc_tip(samples.theta, samples.arc_length))
+
+
+@pytest.mark.parametrize("sampling", SAMPLINGS)
+def test_as_many_samples_as_asked_for_in_every_dimension(sampling: str) -> None:
+    for count in (10, 64, 65, 100):
+        points = unit_cube(sampling, count, 3, np.random.default_rng(0))
+        assert points.shape == (count, 3) and points.min() >= 0.0 and points.max() < 1.0
+        assert len(np.unique(points, axis=0)) == count
+
+
+def test_a_latin_hypercube_has_one_sample_in_every_row_and_column() -> None:
+    points = unit_cube("latin-hypercube", 40, 3, np.random.default_rng(0))
+    np.testing.assert_array_equal(np.sort((40 * points).astype(int), axis=0), np.arange(40)[:, None].repeat(3, axis=1))
+
+
+def course(rows: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    theta = rng.uniform(-0.7, 0.7, rows)
+    return np.column_stack([arc_tip(theta, 0.08), theta])
+
+
+def test_samples_of_runs_are_finite_rows_of_them_in_their_order() -> None:
+    one, other = course(30), course(40, 1)
+    one[3, 2], other[5, 0] = np.nan, np.inf
+    whole = np.concatenate([one, other])
+    finite = whole[np.isfinite(whole).all(axis=1)]
+    everything = samples_of_courses([one, other], 1000, np.random.default_rng(0))
+    np.testing.assert_array_equal(np.column_stack([everything.tip, everything.theta]), finite)
+    some = samples_of_courses([one, other], 25, np.random.default_rng(0))
+    places = [finite.tolist().index(row) for row in np.column_stack([some.tip, some.theta]).tolist()]
+    assert len(places) == 25 and places == sorted(set(places))
+    np.testing.assert_allclose(some.arc_length, 0.08)
+    assert some.domain.contains(some.tip).all() and some.segments == 1
+
+
+def test_ten_finite_samples_of_a_run_are_enough() -> None:
+    assert len(samples_of_courses([course(10)], 100, np.random.default_rng(0)).theta) == 10
+    with pytest.raises(UserError, match="9 finite samples"):
+        samples_of_courses([course(9)], 100, np.random.default_rng(0))
+
+
+def test_what_is_held_out_is_the_test_and_the_rest_is_for_validation() -> None:
+    held = np.zeros(100, np.int64)
+    held[40:60] = 1
+    split = split_samples(100, 0.75, np.random.default_rng(0), held)
+    assert (len(split.train), len(split.validation)) == (60, 20) and sorted(split.test) == list(range(40, 60))
+    assert sorted([*split.train, *split.validation]) == [*range(40), *range(60, 100)]
+    nothing = split_samples(100, 0.75, np.random.default_rng(0), np.zeros(100, np.int64))
+    assert (len(nothing.train), len(nothing.validation), len(nothing.test)) == (75, 12, 13)
+
+
+def test_two_samples_to_validate_on_are_the_fewest() -> None:
+    split = split_samples(16, 0.75, np.random.default_rng(0))
+    assert (len(split.train), len(split.validation), len(split.test)) == (12, 2, 2)
+    with pytest.raises(UserError, match="leave 1 for validation"):
+        split_samples(12, 0.75, np.random.default_rng(0))
+    assert len(split_samples(8, 0.01, np.random.default_rng(0)).train) == 1

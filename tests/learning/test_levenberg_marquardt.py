@@ -79,3 +79,40 @@ def test_recommended_is_within_a_twentieth_of_a_degree_over_the_whole_domain() -
 def test_a_network_too_large_for_second_order_is_refused(more: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"all weights at once, at most 4000: 200.* choose fewer neurons, or adamw"):
         TrainSettings.model_validate({"preset": "recommended", **more})
+
+
+def test_damping_falls_to_a_third_after_a_good_step() -> None:
+    model, x, y = linear(5)
+    optimiser = LevenbergMarquardt(model)
+    optimiser.step(x, y)
+    assert optimiser.damping == pytest.approx(1e-2 / 3.0)
+    solved = LevenbergMarquardt(model)
+    solved.damping = 1e-15
+    solved.step(x, y)
+    assert solved.damping == pytest.approx(1e-15 / 3.0)
+
+
+def test_the_least_damping_is_never_undercut_and_state_carries_it() -> None:
+    model, x, y = linear(6)
+    optimiser = LevenbergMarquardt(model)
+    optimiser.damping = 1.5e-16
+    optimiser.step(x, y)
+    assert optimiser.damping == 1e-16
+    other = LevenbergMarquardt(model)
+    assert other.damping == 1e-2
+    other.load_state_dict(optimiser.state_dict())
+    assert other.damping == 1e-16
+
+
+def test_twenty_rejected_steps_leave_the_weights_as_they_are() -> None:
+    """At an exact minimum no step lowers the objective: the damping has grown by 4 for each try."""
+    torch.manual_seed(7)
+    model = torch.nn.Linear(2, 1).double()
+    x = torch.randn(20, 2, dtype=torch.float64)
+    y = model(x).detach()
+    before = [each.detach().clone() for each in model.parameters()]
+    optimiser = LevenbergMarquardt(model)
+    assert optimiser.step(x, y) == 0.0
+    assert optimiser.damping == pytest.approx(1e-2 * 4.0**20)
+    for now, was in zip(model.parameters(), before, strict=True):
+        assert torch.equal(now.detach(), was)

@@ -107,6 +107,9 @@ def test_tell_without_ask_or_with_a_wrong_count_is_refused(name: str) -> None:
     optimiser.ask()
     with pytest.raises(ValueError, match="20 values"):
         optimiser.tell(np.zeros(3))
+    optimiser.tell(np.zeros(20))
+    with pytest.raises(RuntimeError, match="ask"):
+        optimiser.tell(np.zeros(20))
 
 
 @every
@@ -153,6 +156,12 @@ def test_rosenbrock_is_solved_better_than_by_random_search(name: str) -> None:
 def test_differential_evolution_says_how_many_candidates_it_needs() -> None:
     with pytest.raises(UserError, match="at least 3"):
         start("differential-evolution", candidates=2)
+
+
+@every
+def test_without_candidates_nothing_is_searched(name: str) -> None:
+    with pytest.raises(UserError, match="candidates, not 0"):
+        start(name, candidates=0)
 
 
 def test_swarm_with_one_dimension_and_one_candidate_runs() -> None:

@@ -7,11 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import wristctl.tuning
+from tests.values import changeable
 from wristctl.config.control import Objective
+from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.control.table import CONTROLLERS, controller
+from wristctl.simulation.closed_loop import repeat, scenario_of
+from wristctl.simulation.draws import Draws
+from wristctl.simulation.reference import motion
 from wristctl.tuning.gains_file import read_gains, write_gains
-from wristctl.tuning.search import Evaluator, Search, history, objective, search
+from wristctl.tuning.search import Evaluator, Search, check_loops, check_tunable, history, objective, search
 from wristctl.tuning.space import GainSpace
 
 SETTINGS = (
@@ -102,3 +108,72 @@ def test_every_weight_counts_and_what_never_settles_counts_the_whole_horizon() -
     ):
         found = objective(metrics, failed, Objective.model_validate(weights), 5.0)
         np.testing.assert_allclose(found, [*expected, np.inf], rtol=1e-14)
+
+
+MIXED = (
+    "loops={still: {plant_segments: 1}, drawn: {plant_segments: 1, plant: {stiffness_spread: 0.4}}}", "horizon=0.4",
+    "scenarios=[{loop: drawn, reference: {duration: 0.2}}, {loop: still, reference: {kind: step}},"
+    " {loop: drawn, reference: {kind: step, angle_deg: 10}}]", "repetitions=3",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("metric", ["rmse", "tip_rmse_mm"])
+def test_the_objective_is_the_mean_over_scenarios_of_the_mean_over_their_repetitions(metric: str) -> None:
+    """Each as a closed loop by itself, with the noise and plants that tuning draws."""
+    others = ", ".join(f"{name}: 0" for name in ("rmse", "settling", "chattering") if name != metric)
+    study = load_study([], [*MIXED, f"objective={{{metric}: 2.0, {others}}}"], "tune")
+    law, gains = controller("pid"), np.array([[30.0, 10.0, 0.5], [100.0, 10.0, 1.0], [3.0, 1.0, 0.1]])
+    wanted = np.zeros(3)
+    for scenario in study.tune.scenarios:
+        loop, which = study.tune.loops[scenario.loop], np.zeros(3, np.int64)
+        followed, name = motion(scenario.reference, study.wrist, 0.4, 1e-3), scenario_of(scenario.reference, "ulnar")
+        done = repeat(law, gains, [followed], which, loop, study.wrist, [name], Draws(study.seed, "tuning"), 3)
+        counts = {len(each.failed) for each in done}
+        assert counts == ({3} if scenario.loop == "drawn" else {1})
+        wanted += [2.0 * each.metrics[metric].mean() / 3.0 for each in done]
+    np.testing.assert_allclose(Evaluator(study, law)(gains), wanted, rtol=1e-9)
+
+
+def test_a_scenario_on_a_loop_that_is_not_there_is_named_by_its_number() -> None:
+    settings = load_study([], list(MIXED), "tune").tune
+    check_loops(settings)
+    lost = settings.model_copy(update={"loops": {"drawn": settings.loops["drawn"]}})
+    with pytest.raises(UserError, match="unknown loop 'still'") as caught:
+        check_loops(lost)
+    assert caught.value.where == "scenarios.1.loop"
+
+
+def test_a_controller_without_gains_is_not_tuned() -> None:
+    check_tunable(controller("pid"))
+    with pytest.raises(UserError, match="feedforward has no gains to tune"):
+        check_tunable(controller("feedforward"))
+
+
+def test_what_was_found_is_the_least_value_with_its_own_gains() -> None:
+    result = found()
+    assert result.controller == "pid" and result.values.shape == (5, 8) and result.tried.shape == (5, 8, 3)
+    at = np.unravel_index(result.values.argmin(), result.values.shape)
+    assert [result.gains[name] for name in ("Kp", "Ki", "Kd")] == result.tried[at].tolist()
+    assert list(result.gains) == list(controller("pid").gains)
+    course = Search("pid", {}, 2.0, 6, np.array([[5.0, 4.0], [6.0, 3.5], [2.0, 9.0], [8.0, 8.0]]), np.zeros((4, 2, 0)))
+    assert course.best_so_far.tolist() == [4.0, 3.5, 2.0, 2.0]
+
+
+def test_each_line_of_the_history_is_a_candidate_of_its_iteration() -> None:
+    result = found()
+    lines = history(result).to_dict("records")
+    assert [(line["iteration"], line["candidate"]) for line in lines] == list(np.ndindex(5, 8))
+    for line, at in zip(lines, np.ndindex(5, 8), strict=True):
+        assert line["objective"] == result.values[at]
+        assert [line[name] for name in ("Kp", "Ki", "Kd")] == result.tried[at].tolist()
+
+
+def test_what_a_search_hands_out_cannot_be_changed() -> None:
+    assert changeable(wristctl.tuning) == []
+
+
+@pytest.mark.parametrize("text", ["[]", "{", '{"pid": 3}', '{"pid": {"Kp": "high"}}'])
+def test_another_file_is_no_file_of_tuned_gains(tmp_path: Path, text: str) -> None:
+    (tmp_path / "gains.json").write_text(text)
+    with pytest.raises(UserError, match="not a file of tuned gains"):
+        read_gains(tmp_path / "gains.json")

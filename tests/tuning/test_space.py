@@ -32,3 +32,13 @@ def test_gains_and_unit_undo_each_other() -> None:
 def test_gain_outside_its_box_is_named(gains: list[float]) -> None:
     with pytest.raises(UserError, match=r"P2.*0\.001 to 1000"):
         SPACE.unit(np.array(gains))
+
+
+def test_of_many_gains_that_which_lies_outside_is_named() -> None:
+    three = GainSpace.of({name: Gain("", "", 1.0, 10.0**k) for k, name in enumerate("abc", start=1)})
+    for at, name in enumerate("abc"):
+        gains = np.full((2, 4, 3), 5.0)
+        gains[1, 2, at] = 2.0 * 10.0 ** (at + 1)
+        with pytest.raises(UserError, match=f"gain {name} outside"):
+            three.unit(gains)
+    assert three.unit(np.array([10.0, 1.0, 10.0])) == pytest.approx([1.0, 0.0, 1.0 / 3.0])

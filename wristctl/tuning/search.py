@@ -97,12 +97,12 @@ class Evaluator:
         """Objective (P,) of gains (P, g)."""
         total, count = np.zeros(len(gains)), 0
         for name, (motions, scenarios) in self.by_loop.items():
-            total += self._on(self.study.tune.loops[name], motions, scenarios, gains).sum(axis=1)
+            total += self._on(self.study.tune.loops[name], motions, scenarios, gains)
             count += len(motions)
         return total / count
 
     def _on(self, loop: Loop, motions: list[Motion], scenarios: list[str], gains: Array) -> Array:
-        """Objective of each candidate on each of a loop's scenarios, the mean over repetitions, (P, scenarios)."""
+        """Objective of each candidate, the mean over repetitions, summed over a loop's scenarios, (P,)."""
         settings, wrist = self.study.tune, self.study.wrist
         times = settings.repetitions if is_random(loop) else 1
         loops = loops_of(loop, [self.draws.plant(each) for each in range(times)])
@@ -124,8 +124,8 @@ class Evaluator:
             ]
             metrics |= {name: np.array([of_trajectory(each)[name] for each in courses]) for name in recorded}
         value = objective(metrics, outcome.failed, settings.objective, settings.horizon)
-        mean: Array = value.reshape(len(gains), count, times).sum(axis=2) / times
-        return mean
+        total: Array = value.reshape(len(gains), count * times).sum(axis=1) / times
+        return total
 
 
 def search(
@@ -172,7 +172,7 @@ def history(found: Search) -> pd.DataFrame:
     columns = {
         "iteration": np.repeat(np.arange(iterations), candidates),
         "candidate": np.tile(np.arange(candidates), iterations),
-        "objective": found.values.reshape(-1),
+        "objective": found.values.ravel(),
     }
-    each = found.tried.reshape(iterations * candidates, -1)
-    return pd.DataFrame(columns | dict(zip(found.gains, each.T, strict=True)))
+    gains = np.concatenate(found.tried).T
+    return pd.DataFrame(columns | dict(zip(found.gains, gains, strict=True)))

@@ -1,0 +1,108 @@
+"""The tables of a rehearsed bench: clocks, steps, and what its camera shows of the wrist."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.identification.benches import LEVEL, STEPS, TENDONS
+from wristctl.config.loop import DirectionName, Reference
+from wristctl.identification import rehearsal
+from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.simulation.reference import toward
+from wristctl.wrist.directions import in_plane
+
+SOFT = LEVEL.model_copy(update={"stiffness": 0.4, "gravity": (-3.0, 5.0), "gravity_flexion": -2.0})
+TRUE = RehearsedTruth(SOFT, TENDONS, delay=0.02, noise_deg=0.0, exposure=0.0, dropped=0.0)
+MOVES: tuple[tuple[DirectionName, Reference], ...] = (("radial", STEPS), ("flexion", STEPS))
+Tables = tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]
+
+
+def rehearsed(
+    truth: RehearsedTruth = TRUE, seed: int = 0, moves: Sequence[tuple[DirectionName, Reference]] = MOVES
+) -> Tables:
+    return rehearse(LEVEL, truth, moves, 5.0, np.random.default_rng(seed))
+
+
+def of(table: pd.DataFrame, trial: int, name: str) -> np.ndarray:
+    return table[table.trial == trial][name].to_numpy()
+
+
+def test_the_log_has_a_line_every_5_ms_with_steps_counted_half_a_tick_later() -> None:
+    log, _, kinds = rehearsed()
+    np.testing.assert_allclose(of(log, 1, "time"), 0.005 * np.arange(1000), atol=1e-12)
+    np.testing.assert_allclose(log.counted - log.time, 5e-4)
+    assert kinds.to_dict("list") == {"trial": [0, 1], "direction": ["radial", "flexion"], "push": [0.0, 0.0]}
+
+
+def test_both_tendons_of_a_side_turn_alike_and_the_steps_are_what_the_motors_reeled_in() -> None:
+    log, _, _ = rehearsed()
+    for number, (plus, minus) in enumerate((((4, 5), (1, 2)), ((2, 5), (1, 4)))):
+        direction = MOVES[number][0]
+        reeled = rehearsal.spools(in_plane(LEVEL, direction), toward(STEPS, direction), TENDONS, 5.0)[::5]
+        for side, tendons in enumerate((plus, minus)):
+            for tendon in tendons:
+                steps = of(log, number, f"position_{tendon}")
+                np.testing.assert_allclose(
+                    steps * TENDONS.step_length, reeled[:, side], atol=0.5001 * TENDONS.step_length
+                )
+        assert np.ptp(of(log, number, f"position_{plus[0]}")) > 100
+
+
+def test_pictures_come_at_the_frame_rate_from_any_moment_on_and_are_used_10_ms_later() -> None:
+    begun = []
+    for seed in range(12):
+        _, frames, _ = rehearsed(replace(TRUE, frame_rate=50.0), seed, MOVES[:1])
+        captured = frames.captured.to_numpy()
+        assert np.diff(captured) == pytest.approx(0.02) and 4.98 <= captured[-1] < 5.0
+        begun.append(captured[0])
+        np.testing.assert_allclose(frames.used - frames.captured, 0.01)
+    assert 0.0 <= min(begun) < 0.007 and 0.013 < max(begun) < 0.02
+
+
+def test_pictures_show_the_true_wrist_a_delay_ago_and_the_markers_zero_of_its_plane() -> None:
+    truth = replace(TRUE, zero_deg=(3.0, -5.0), taut=(1e-4, -2e-4, 3e-4, -4e-4))
+    _, frames, _ = rehearsed(truth)
+    taut = {"radial": (3e-4, -4e-4, 1e-4, -2e-4), "flexion": (-2e-4, -4e-4, 1e-4, 3e-4)}
+    for number, (direction, zero) in enumerate((("radial", 3.0), ("flexion", -5.0))):
+        reeled = rehearsal.spools(in_plane(LEVEL, direction), toward(STEPS, direction), TENDONS, 5.0)  # type: ignore[arg-type]
+        own = SupposedWrist(in_plane(SOFT, direction), TENDONS.tendon_stiffness, TENDONS.friction, taut[direction])
+        course = angles([own], np.repeat(reeled, 2, axis=1), 1e-3, 4)[0]
+        then = of(frames, number, "captured") - 0.02
+        wanted = np.interp(then, 1e-3 * np.arange(5000), course) + np.radians(zero)
+        np.testing.assert_allclose(of(frames, number, "theta"), wanted, atol=1e-12)
+        assert np.ptp(course) > 0.3
+
+
+def test_noise_and_losses_are_as_large_as_told_and_exposure_blurs_about_the_time_stamp() -> None:
+    _, sharp, _ = rehearsed(moves=MOVES[:1] * 4)
+    _, noisy, _ = rehearsed(replace(TRUE, noise_deg=0.5, dropped=0.3), moves=MOVES[:1] * 4)
+    lost = noisy.verdict.to_numpy() == "no tip"
+    assert lost.mean() == pytest.approx(0.3, abs=0.05) and set(noisy.verdict[~lost]) == {"ok"}
+    assert np.isnan(noisy.theta[lost]).all() and np.isfinite(noisy.theta[~lost]).all()
+    first = noisy[noisy.trial == 0], sharp[sharp.trial == 0]
+    error = np.degrees(first[0].theta - first[1].theta)
+    assert error.std() == pytest.approx(0.5, rel=0.15) and abs(error.mean()) < 0.1
+    _, blurred, _ = rehearsed(replace(TRUE, exposure=0.2), moves=MOVES[:1])
+    fine = np.array([np.interp(sharp.captured[sharp.trial == 0] + shift, first[1].captured, first[1].theta)
+                     for shift in np.linspace(-0.1, 0.1, 81)]).mean(axis=0)  # fmt: skip
+    inner = slice(10, -10)
+    np.testing.assert_allclose(blurred.theta.to_numpy()[inner], fine[inner], atol=4e-3)
+    assert np.abs(blurred.theta.to_numpy() - first[1].theta.to_numpy()).max() > 0.02
+
+
+def test_a_bench_is_late_and_imperfect_unless_told_otherwise() -> None:
+    """A camera of 60 pictures a second, 30 ms late, open for 4 ms, that loses one in twenty."""
+    plain = RehearsedTruth(LEVEL, TENDONS)
+    assert (plain.frame_rate, plain.delay, plain.exposure, plain.dropped, plain.noise_deg) == (
+        60.0,
+        0.03,
+        4e-3,
+        0.05,
+        0.05,
+    )
