@@ -50,13 +50,13 @@ _LOOKS = {
     "width", "height", "height_ratios", "width_ratios", "pad", "labelpad", "rotation", "ha", "va", "loc", "ncols",
     "dpi", "indent", "refresh_per_second", "padding", "aspect", "markevery", "thickness", "stacklevel", "timeout",
     "maxsize", "max_workers", "min_length", "bbox_to_anchor", "rasterized", "clip_on", "capsize", "s", "marker",
-    "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate",
+    "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate", "frozen",
 }  # fmt: skip
 """Keywords that say how something looks, how long somebody is waited for, or what to check that is never so."""
 
 _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",
-    "figure", "add_patch", "tick_params", "Circle", "Polygon", "Rectangle", "axvspan", "axhspan", "axhline", "axvline",
+    "figure", "add_patch", "tick_params", "set_box_aspect", "Circle", "Polygon", "Rectangle", "axvspan", "axhspan", "axhline", "axvline",
     "Normalize", "subplots_adjust", "pcolormesh", "fill_between", "scatter", "step", "legend_below", "margins",
 }  # fmt: skip
 """Calls in report/ whose numbers are places on a page."""
