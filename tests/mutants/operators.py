@@ -56,8 +56,9 @@ _LOOKS = {
 
 _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",
-    "figure", "add_patch", "tick_params", "set_box_aspect", "Circle", "Polygon", "Rectangle", "axvspan", "axhspan", "axhline", "axvline",
+    "figure", "add_patch", "tick_params", "Circle", "Polygon", "Rectangle", "axvspan", "axhspan", "axhline", "axvline",
     "Normalize", "subplots_adjust", "pcolormesh", "fill_between", "scatter", "step", "legend_below", "margins",
+    "set_box_aspect",
 }  # fmt: skip
 """Calls in report/ whose numbers are places on a page."""
 

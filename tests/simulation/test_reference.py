@@ -129,3 +129,16 @@ def test_a_mirrored_reference_is_the_same_motion_to_the_other_side(reference: Re
     np.testing.assert_allclose(other.tip_desired, one.tip_desired * [1.0, -1.0], atol=1e-15)
     assert other.move == pytest.approx(-one.move) and (other.begin, other.rest) == (one.begin, one.rest)
     assert reference.mirrored().mirrored() in (reference, reference.model_copy(update={"angle_deg": reference.end_deg}))
+
+
+def test_a_motion_is_worked_out_once_and_cannot_be_changed() -> None:
+    """Rollouts share it; another reference, wrist, horizon or period is another motion."""
+    asked = Reference(angle_deg=20.0), WristParameters(), 1.0, 1e-3
+    first = motion(*asked)
+    assert motion(*asked) is first
+    for array in (first.time, first.theta_ref, first.rate_ref, first.acceleration_ref, first.tip_desired):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+    longer = WristParameters().model_copy(update={"length": 0.1})
+    for other in ((Reference(angle_deg=21.0), *asked[1:]), (asked[0], longer, 1.0, 1e-3), (*asked[:2], 1.1, 1e-3)):
+        assert motion(*other).tip_desired.tobytes() != first.tip_desired.tobytes()
