@@ -40,7 +40,7 @@ class RigBoard:
         self.sent = np.zeros(AXES)
         self.told: list[Any] = []
         self.state, self.faults, self.flags = State.ENABLED, Fault(0), Flag(0)
-        self.round_trip = 0.003
+        self.round_trip = self.takes = 0.003
         self.pings: list[float] = []
         self.hello: Any = SimpleNamespace(boot_nonce=7)
 
@@ -74,12 +74,12 @@ class RigBoard:
         self.told.append((flag, timeout))
         return self.read()
 
-    def turn(self, rates: Sequence[float]) -> tuple[tuple[int, ...], Status]:
+    def turn(self, rates: Sequence[float]) -> tuple[tuple[float, ...], Status]:
         """Take the rates over; a period later they have moved the axes."""
         self.sent = np.rint(rates)
         self.told.append(("turn", tuple(rates)))
-        self.transport.wait(self.round_trip)
-        return tuple(int(each) for each in self.sent), self.read()
+        self.transport.wait(self.takes)
+        return tuple(float(each) for each in self.sent), self.read()
 
 
 class Marker:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import FrozenInstanceError
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,8 @@ def test_taut_points_steps_per_radian_senses_and_the_glued_on_angle_are_found(
     assert zero.plain() == {
         "signs": zero.signs, "steps_per_radian": zero.steps_per_radian, "marker": zero.marker, "slack": zero.slack,
     }  # fmt: skip
+    with pytest.raises(FrozenInstanceError):
+        zero.marker = 0.0  # type: ignore[misc]
     assert wrist.board.told[-1] == ("home", (0, 0, 0, 0))
     assert wrist.board.position == pytest.approx(START + signs * SLACK), "every tendon just taut is zero"
 
@@ -91,6 +94,14 @@ def test_moves_are_as_small_as_the_settings_say() -> None:
     looked = jogs[: np.flatnonzero(jogs[:, 0] == START[0])[0], 0] - START[0]
     assert looked.tolist() == [2 * move * (k + 1) for k in range(len(looked))]
     assert looked[-2] < SLACK[0] + 10 < looked[-1] + 10, "it stops at the first bend"
+
+
+def test_a_wrist_that_straightens_at_once_is_not_waited_for() -> None:
+    """Each of eight letting goes may take `let_go` at most."""
+    quick, patient = Wrist(), Wrist()
+    quick.homed(let_go=1.0)
+    patient.homed(let_go=100.0)
+    assert patient.board.transport.now() == quick.board.transport.now()
 
 
 def test_slack_within_the_longest_is_found_and_beyond_it_is_not() -> None:
