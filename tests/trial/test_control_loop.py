@@ -18,6 +18,7 @@ from wristctl.control.table import controller
 from wristctl.trial.control_loop import ControlLoop, TickTiming
 from wristctl.trial.log import TrialLog
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.steering import Steering
 from wristctl.trial.trial_motions import at_rest, back
 from wristctl.vision.marker import SightingVerdict
 
@@ -195,6 +196,27 @@ def test_positions_are_of_when_the_board_read_the_command_a_third_of_the_round_t
     busiest = int(np.argmax(sent[:-1]))
     assert after[1:] == pytest.approx(after[busiest + 1] / sent[busiest] * np.array(sent[:-1]), abs=1e-9)
     assert 3e-9 < after[busiest + 1] / sent[busiest] < 1e-8, "and its interrupts come first"
+
+
+def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
+    rig_of: RigOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third of the round trip of it has gone by where the board said its positions."""
+    told, predict = [], Steering.predict
+
+    def heard(steering: Steering, plus: float, minus: float) -> None:
+        told.append((plus, minus))
+        predict(steering, plus, minus)
+
+    monkeypatch.setattr(Steering, "predict", heard)
+    rig = rig_of()
+    rig.follow(at_rest(0.05, PERIOD))
+    ahead = 0.5 * PERIOD - 0.33 * 0.003
+    for row, sides in zip(rig.rows, told, strict=True):
+        one, two, four, five = (row[f"position_{k}"] + ahead * row[f"sent_{k}"] for k in (1, 2, 4, 5))
+        step = SETTINGS.actuator.step_length
+        assert sides == pytest.approx((0.5 * step * (four + five), 0.5 * step * (one + two)), abs=1e-12)
+    assert told[0][0] > 0.0
 
 
 def test_of_a_very_long_round_trip_half_a_period_at_most_is_underway(rig_of: RigOf) -> None:

@@ -131,6 +131,13 @@ def test_a_base_may_move_by_a_tenth_of_its_side(
     assert eye.see(base=BASE + pixels * np.array(toward)).verdict is verdict
 
 
+def test_one_corner_that_moved_is_a_base_that_moved(eye: Eye) -> None:
+    eye.see()
+    bent = BASE.copy()
+    bent[1, 0] += 0.102 * SIDE
+    assert eye.see(base=bent).verdict is MOVED
+
+
 def test_a_base_is_believed_for_its_memory_and_learnt_anew_after_it(eye: Eye) -> None:
     eye.open(base_memory=0.5).see()
     assert eye.see(base=None, wait=0.49).verdict is OK
