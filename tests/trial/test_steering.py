@@ -64,6 +64,21 @@ def test_an_angle_seen_is_believed_and_one_from_the_past_moves_the_present() -> 
     assert again.estimate.theta == pytest.approx(0.05, abs=0.01), "seen often enough"
 
 
+def test_an_angle_is_compared_with_what_was_believed_when_it_was_taken() -> None:
+    """Seen late, the angle of that time changes nothing, and the present one, of a wrist that moved on, does."""
+    changes = []
+    for seen_at in (30, 60):
+        steered, course = steering(), []
+        for _ in range(60):
+            course.append(steered.estimate.theta)
+            plus, minus = reeled(10.0)
+            steered.predict(plus + 5e-4, minus - 5e-4)
+        before = steered.estimate.theta
+        assert steered.see([*course, before][seen_at], 30 * PERIOD + 1e-9)
+        changes.append(abs(steered.estimate.theta - before))
+    assert changes[0] < 1e-6 < 1e-5 < changes[1]
+
+
 @pytest.mark.parametrize(
     ("captured", "taken"),
     [(0.0, True), (-0.001, False), (39.0 * PERIOD, True), (40.999 * PERIOD, True), (41.001 * PERIOD, False)],
