@@ -99,11 +99,11 @@ def test_the_last_board_lies_in_the_bending_plane_on_its_side_before_the_wrist(s
 def test_ink_and_paper_are_as_far_apart_as_the_contrast_says() -> None:
     (frame,) = (
         each
-        for each in board_shots(PLAIN.model_copy(update={"contrast": 0.5}), BOARD, 2, np.random.default_rng(0))
+        for each in board_shots(PLAIN.model_copy(update={"contrast": 0.75}), BOARD, 2, np.random.default_rng(0))
         if each.number
     )
     levels, counts = np.unique(frame.image, return_counts=True)
-    ink, paper = (round(128 + 0.5 * (each - 128)) for each in (0, 255))
+    ink, paper = (round(128 + 0.75 * (each - 128)) for each in (0, 255))
     common = {int(level) for level, count in zip(levels, counts, strict=True) if count > 3000}
     assert common == {ink, paper, 122} and levels.min() == ink and levels.max() == paper
 
