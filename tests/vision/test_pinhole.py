@@ -78,9 +78,12 @@ def test_pixels_are_those_that_opencv_projects_with_the_same_lens(positive: Side
     assert camera.distortion == pytest.approx([-0.2, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("distortion", [0.0, -0.1])
 @pytest.mark.parametrize("positive", SIDES)
-def test_its_own_view_gives_metres_to_the_right_and_down_as_the_picture_shows_them(positive: Side) -> None:
-    camera = pinhole(positive, distortion=-0.1, tilt_deg=12.0, pan_deg=-6.0)
+def test_its_own_view_gives_metres_to_the_right_and_down_as_the_picture_shows_them(
+    positive: Side, distortion: float
+) -> None:
+    camera = pinhole(positive, distortion=distortion, tilt_deg=12.0, pan_deg=-6.0)
     points = np.random.default_rng(1).uniform(-0.05, 0.1, (20, 3)) * [1.0, 1.0, 0.0]
     right = points[:, 1] * (1.0 if positive == "right" else -1.0)
     found = camera.view.rectify(camera.project(points))
