@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.board.flash_image import chip_with
 from wristctl.board.emulator import Atmega2560, Halted
 from wristctl.config.errors import UserError
 
@@ -16,18 +17,6 @@ UCSRA, UCSRB, UBRR, UDR = 0xC0, 0xC1, 0xC4, 0xC6
 TCCR1B, TCNT1, OCR1A, TIFR1, TIMSK1 = 0x81, 0x84, 0x88, 0x36, 0x6F
 BYTE = 640  # cycles at 250,000 baud
 R16 = 16
-
-
-def chip_with(tmp_path: Path, words: dict[int, list[int]]) -> Atmega2560:
-    """A chip whose flash holds these words, by word address."""
-    lines = []
-    for at, code in words.items():
-        for k, word in enumerate(code):
-            record = bytes([2]) + (2 * (at + k)).to_bytes(2, "big") + b"\0" + word.to_bytes(2, "little")
-            lines.append(":" + (record + bytes([-sum(record) & 0xFF])).hex())
-    path = tmp_path / "program.hex"
-    path.write_text("\n".join([*lines, ":00000001FF"]))
-    return Atmega2560(path)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
@@ -78,3 +79,28 @@ def test_an_endless_frame_does_not_fill_the_memory() -> None:
     for _ in range(100):
         decoder.feed(b"\x55" * 1000)
     assert len(decoder._part) <= 2 * LONGEST
+
+
+def test_the_longest_frame_goes_through_and_a_longer_one_is_refused() -> None:
+    assert LONGEST == 254, "as long as COBS needs one byte more"
+    longest = WireFrame(1, 2, bytes([7]) * (LONGEST - 4))
+    assert Decoder().feed(encode(*longest)) == [longest]
+    with pytest.raises(ValueError, match="a payload of 251 bytes, at most 250"):
+        encode(1, 2, bytes(LONGEST - 3))
+
+
+def test_each_piece_that_is_no_frame_is_counted_as_what_it_is() -> None:
+    decoder = Decoder()
+    good, spoilt = encode(1, 2, b"ab"), bytearray(encode(1, 2, b"ab"))
+    spoilt[4] ^= 0x20
+    assert decoder.feed(good + b"\0\0\0" + bytes(spoilt)) == [WireFrame(1, 2, b"ab")]
+    assert (decoder.bad_frames, decoder.bad_crc) == (0, 1)
+    decoder.feed(b"\0\x09a\0" + b"\0" + stuff(b"abc") + b"\0")
+    assert (decoder.bad_frames, decoder.bad_crc) == (2, 1), "no COBS, and too short"
+    assert decoder.feed(encode(9, 9)) == [WireFrame(9, 9, b"")], "four bytes are enough"
+
+
+def test_a_frame_that_arrives_byte_by_byte_after_a_long_rest_is_whole() -> None:
+    decoder, frame = Decoder(), WireFrame(3, 4, bytes(range(250)))
+    found = [each for byte in encode(*frame) for each in decoder.feed(bytes([byte]))]
+    assert found == [frame] and decoder.bad_frames == decoder.bad_crc == 0

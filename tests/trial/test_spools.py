@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -47,6 +48,11 @@ def test_the_change_of_the_taut_length_is_its_derivative() -> None:
 def test_each_direction_is_pulled_by_the_papers_two_tendons() -> None:
     for plane, tendons in (("ulnar", {4, 5}), ("flexion", {2, 5})):
         assert {tendon for tendon, on in zip(ACTIVE, on_plus_side(plane), strict=True) if on} == tendons
+
+
+def test_spools_cannot_be_changed_once_they_are_made() -> None:
+    with pytest.raises(FrozenInstanceError):
+        SPOOLS.speed = 1.0  # type: ignore[misc]
 
 
 def test_torque_at_the_pulley_is_tension_times_radius() -> None:

@@ -1,0 +1,97 @@
+"""When the bench's camera takes its frames, which get through, and what an exposure is made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.bench.fault_injection import Faults
+from wristctl.bench.shutter import Shutter
+from wristctl.config.bench import InjectedFault, RenderedCamera
+
+
+class Turning:
+    """A wrist of two segments that turns at a steady rate [rad/s]."""
+
+    def __init__(self, rate: float = 0.0, time: float = 10.0) -> None:
+        self.rate, self.time = rate, time
+
+    def angles(self, times: np.ndarray) -> np.ndarray:
+        return 0.5 * self.rate * np.stack([times, times], axis=-1)
+
+    def tip_angle(self, coordinates: np.ndarray) -> np.ndarray:
+        return np.asarray(coordinates.sum(axis=-1))
+
+
+def shutter(wrist: Any = None, *faults: InjectedFault, **camera: Any) -> Shutter:
+    known = Faults(faults)
+    known.begin(0.0)
+    settings = RenderedCamera.model_validate({"frame_rate": 50.0, "dropped": 0.0, "exposure": 0.01, **camera})
+    seen: Any = wrist or Turning()
+    return Shutter(settings, known, seen, (1, 2))
+
+
+@pytest.mark.parametrize(
+    ("time", "delay", "newest"),
+    [(1.0, 0.02, 49), (1.0199, 0.02, 49), (1.02, 0.02, 50), (1.0, 0.0, 49), (1.005, 0.0, 50), (0.004, 0.0, -1)],
+)
+def test_a_frame_is_there_once_its_delay_and_at_least_half_its_exposure_are_over(
+    time: float, delay: float, newest: int
+) -> None:
+    assert shutter(Turning(time=time)).newest(delay) == newest
+
+
+def test_the_delay_is_in_frames() -> None:
+    assert shutter(delay_frames=2.5).delay == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("degrees", "parts"), [(0.0, 1), (0.2, 1), (0.3, 2), (-0.6, 3), (1.9, 8), (9.0, 8)])
+def test_an_exposure_is_drawn_in_parts_of_a_quarter_degree_and_eight_at_most(degrees: float, parts: int) -> None:
+    rate = np.radians(degrees) / 0.01
+    exposure = shutter(Turning(float(rate))).expose(100)
+    assert exposure.theta.shape == (parts, 2)
+    assert exposure.theta.sum(axis=1).mean() == pytest.approx(rate * 2.0, abs=1e-9), "around its middle"
+    if parts > 1:
+        turned = np.diff(exposure.theta.sum(axis=1))
+        assert turned == pytest.approx(np.full(parts - 1, rate * 0.01 / parts)), "evenly over its time"
+
+
+def test_frames_are_numbered_and_timed_by_the_frame_rate() -> None:
+    exposure = shutter().expose(75)
+    assert (exposure.number, exposure.shown, exposure.time) == (75, 75, 1.5)
+    assert not exposure.covered and not exposure.swapped
+
+
+def test_each_frame_has_its_own_noise_by_its_number_in_its_stream() -> None:
+    taken = shutter()
+    assert taken.expose(3).noise == (1, 2, 3)
+    taken.begin(0.2, (7,))
+    taken.begin(0.41, (8, 9))
+    noises = {number: taken.expose(number).noise for number in (9, 10, 20, 21, 30)}
+    assert noises == {9: (1, 2, 9), 10: (7, 0), 20: (7, 10), 21: (8, 9, 0), 30: (8, 9, 9)}
+
+
+def test_a_frozen_camera_shows_the_last_frame_before_it_froze() -> None:
+    frozen = shutter(Turning(1.0), InjectedFault(kind="camera-frozen", at=0.51, duration=0.2))
+    exposure = frozen.expose(30)
+    assert (exposure.number, exposure.shown, exposure.time) == (30, 25, 0.6)
+    assert exposure.theta.sum(axis=1).mean() == pytest.approx(0.5) and exposure.noise == (1, 2, 25)
+    assert frozen.expose(40).shown == 40 and frozen.expose(25).shown == 25
+
+
+@pytest.mark.parametrize(("kind", "which"), [("marker-covered", "covered"), ("markers-swapped", "swapped")])
+def test_only_its_own_fault_covers_or_swaps(kind: Any, which: str) -> None:
+    taken = shutter(None, InjectedFault(kind=kind, at=0.5, duration=0.1))
+    for number, on in ((24, False), (25, True), (29, True), (31, False)):
+        exposure = taken.expose(number)
+        assert getattr(exposure, which) == on and exposure.covered + exposure.swapped == on
+
+
+def test_frames_are_lost_by_chance_and_by_fault() -> None:
+    some = shutter(dropped=0.25)
+    assert np.mean([some.arrives(k) for k in range(2000)]) == pytest.approx(0.75, abs=0.04)
+    assert all(shutter().arrives(k) for k in range(100))
+    faulty = shutter(None, InjectedFault(kind="frames-dropped", at=0.5, duration=0.1))
+    assert [faulty.arrives(k) for k in (24, 25, 29, 31)] == [True, False, False, True]

@@ -1,0 +1,253 @@
+"""The loop's ticks on a board that does at once what it is told: when they come, and what is logged of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.trial.conftest import WRIST, settings_of
+from tests.trial.rig import Marker, RigBoard
+from wristctl.board.messages import Fault, State
+from wristctl.control.table import controller
+from wristctl.trial.control_loop import ControlLoop, TickTiming
+from wristctl.trial.log import TrialLog
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.steering import Steering
+from wristctl.trial.trial_motions import at_rest, back
+from wristctl.vision.marker import SightingVerdict
+
+PERIOD = 5e-3
+SETTINGS = settings_of()
+
+
+RigOf = Callable[..., Any]
+
+
+class Rig:
+    """A loop on a rig without physics; the marker shows what `angle` gives."""
+
+    def __init__(
+        self, folder: Path, angle: Callable[[], float] = lambda: 0.0, signs: Any = (1, 1, 1, 1), **settings: Any
+    ) -> None:
+        board: Any = RigBoard()
+        marker: Any = Marker(board, angle)
+        self.board, self.marker = board, marker
+        self.timing, self.log, self.folder = TickTiming(PERIOD), TrialLog(folder, None, PERIOD), folder
+        self.rows: list[dict[str, Any]] = []
+        chosen = settings_of(**settings)
+        self.loop = ControlLoop(board, marker, chosen, WRIST, "ulnar", signs, self.timing, self.log, self.rows.append)
+
+    def follow(self, motion: Any, trial: int = -1) -> None:
+        self.loop.follow(motion, controller("feedforward"), (), trial)
+
+    def table(self, name: str) -> pd.DataFrame:
+        self.log.close()
+        return pd.read_csv(self.folder / f"{name}.csv")
+
+
+@pytest.fixture
+def rig_of(tmp_path: Path) -> Iterator[RigOf]:
+    """Makes rigs, and closes their logs."""
+    made: list[Rig] = []
+
+    def make(*given: Any, **settings: Any) -> Rig:
+        made.append(Rig(tmp_path, *given, **settings))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.log.close()
+
+
+def test_ticks_come_at_the_period_on_the_clock(rig_of: RigOf) -> None:
+    rig = rig_of()
+    assert rig.loop.next_tick == 100.0
+    rig.follow(at_rest(0.2, PERIOD))
+    assert [row["clock"] for row in rig.rows] == pytest.approx(100.0 + PERIOD * np.arange(40))
+    assert [row["time"] for row in rig.rows] == pytest.approx(PERIOD * np.arange(40))
+    assert rig.loop.next_tick == pytest.approx(100.2) and rig.timing.overruns == 0
+    assert rig.timing.late == pytest.approx([0.0] * 40, abs=1e-9)
+
+
+def test_a_second_motion_counts_its_own_time(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.follow(at_rest(0.1, PERIOD))
+    rig.follow(at_rest(0.1, PERIOD), trial=0)
+    assert rig.rows[20]["time"] == pytest.approx(0.0) and rig.rows[20]["clock"] == pytest.approx(100.1)
+
+
+def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: RigOf) -> None:
+    rig = rig_of()
+    motion, held = back(0.02, 0.1, 0.1, PERIOD), [0]
+    turn = rig.board.turn
+
+    def slow(rates: Any) -> Any:
+        held[0] += 1
+        rig.board.transport.wait(0.013 if held[0] == 11 else 0.0)
+        return turn(rates)
+
+    rig.board.turn = slow
+    rig.follow(motion)
+    assert rig.timing.overruns == 2 and len(rig.rows) == 40 - 2
+    assert rig.rows[11]["late"] == pytest.approx(0.001) == rig.timing.late[11]
+    assert rig.rows[11]["theta_ref"] == motion.theta_ref[13], "it goes on where the reference is by then"
+    assert rig.rows[12]["late"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_tick_that_is_too_late_is_a_reason_to_stop(rig_of: RigOf) -> None:
+    rig = rig_of(safety={"late": 0.02, "stale": 1.0})
+    turn = rig.board.turn
+
+    def hangs(rates: Any) -> Any:
+        rig.board.transport.wait(0.026 if len(rig.rows) == 5 else 0.0)
+        return turn(rates)
+
+    rig.board.turn = hangs
+    with pytest.raises(SafetyStop, match="a tick came 24 ms late"):
+        rig.follow(at_rest(0.2, PERIOD))
+
+
+def test_lateness_has_quantiles_and_none_without_ticks() -> None:
+    timing = TickTiming(PERIOD, late=[0.004, 0.001, 0.002, 0.003, 0.0])
+    assert (timing.jitter(0.0), timing.jitter(0.5), timing.jitter(1.0)) == (0.0, 0.002, 0.004)
+    assert math.isnan(TickTiming(PERIOD).jitter(0.5))
+
+
+def test_the_log_has_reference_and_error_of_the_tick(rig_of: RigOf) -> None:
+    rig = rig_of()
+    motion = back(0.02, 0.1, 0.1, PERIOD)
+    rig.follow(motion, trial=4)
+    for k in (0, 7, 39):
+        row = rig.rows[k]
+        assert row["trial"] == 4
+        for name in ("theta_ref", "rate_ref", "acceleration_ref", "theta_desired"):
+            assert row[name] == getattr(motion, name)[k]
+        assert row["error"] == pytest.approx(row["theta"] - row["theta_ref"])
+    assert len(rig.table("log")) == 40 and rig.table("between").empty
+
+
+def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf) -> None:
+    angles = iter([0.01, math.nan, 0.02] + [0.0] * 40)
+    rig = rig_of(lambda: next(angles))
+    rig.marker.delay = 0.002
+    rig.follow(at_rest(0.1, PERIOD))
+    rig.rows.clear()
+    angles = iter([0.01, math.nan, 0.02] + [0.0] * 40)
+    rig.follow(at_rest(0.05, PERIOD), trial=0)
+    first, second, third = rig.rows[:3]
+    assert (first["theta_measured"], first["verdict"]) == (0.01, "ok")
+    assert first["captured"] == pytest.approx(-0.002)
+    assert math.isnan(second["theta_measured"]) and math.isnan(second["captured"]) and second["verdict"] == "no tip"
+    assert third["captured"] == pytest.approx(2 * PERIOD - 0.002)
+    frames = rig.table("frames")
+    assert frames["number"].tolist() == list(range(20, 30)), "frames of trials alone are listed"
+    assert (frames["used"] - frames["captured"]).tolist() == pytest.approx([0.002] * 10)
+    assert frames["theta"].isna().tolist() == [False, True] + [False] * 8
+
+
+def test_no_usable_angle_for_too_long_is_a_reason_to_stop_with_the_newest_verdict(rig_of: RigOf) -> None:
+    rig = rig_of(lambda: math.nan, safety={"stale": 0.152})
+    with pytest.raises(SafetyStop, match=r"no usable marker angle for 155 ms \(newest frame: no tip\)"):
+        rig.follow(at_rest(0.5, PERIOD))
+    assert len(rig.rows) == 31
+    blind: Any = rig_of()
+    blind.marker.look = list  # it sees nothing
+    with pytest.raises(SafetyStop, match="newest frame: no frame"):
+        blind.follow(at_rest(0.5, PERIOD))
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (1, -1, -1, 1)], ids=str)
+def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigOf, signs: tuple[int, ...]) -> None:
+    """Each tendon holds its pretension: taut, and stretched by it."""
+    rig = rig_of(signs=signs)
+    turn, since = rig.board.turn, [100.0, np.zeros(4)]
+
+    def turned(rates: Any) -> Any:
+        now = rig.board.transport.now()
+        rig.board.position += since[1] * (now - since[0])
+        since[:] = now, np.rint(rates)
+        return turn(rates)
+
+    rig.board.turn = turned
+    rig.follow(at_rest(0.5, PERIOD))
+    actuator, last = SETTINGS.actuator, rig.rows[-1]
+    steps = WRIST.pretension / actuator.tendon_stiffness / actuator.step_length
+    for k, tendon in enumerate((1, 2, 4, 5)):
+        assert last[f"tension_{tendon}"] == pytest.approx(WRIST.pretension)
+        assert last[f"target_{tendon}"] == pytest.approx(steps)
+        assert last[f"position_{tendon}"] == pytest.approx(steps, abs=1.0)
+        assert rig.board.position[k] == pytest.approx(signs[k] * steps, abs=1.0)
+        assert abs(last[f"sent_{tendon}"]) < 200.0
+    assert rig.rows[0]["sent_1"] > 100.0, "positive reels in"
+
+
+def test_positions_are_of_when_the_board_read_the_command_a_third_of_the_round_trip_after(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.follow(at_rest(0.1, PERIOD))
+    after = np.array([row["counted"] - row["time"] for row in rig.rows]) - 0.33 * 0.003
+    sent = [sum(abs(row[f"sent_{tendon}"]) for tendon in (1, 2, 4, 5)) for row in rig.rows]
+    assert after[0] == pytest.approx(0.0, abs=1e-9) and np.abs(after).max() < 1e-4
+    busiest = int(np.argmax(sent[:-1]))
+    assert after[1:] == pytest.approx(after[busiest + 1] / sent[busiest] * np.array(sent[:-1]), abs=1e-9)
+    assert 3e-9 < after[busiest + 1] / sent[busiest] < 1e-8, "and its interrupts come first"
+
+
+def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
+    rig_of: RigOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third of the round trip of it has gone by where the board said its positions."""
+    told, predict = [], Steering.predict
+
+    def heard(steering: Steering, plus: float, minus: float) -> None:
+        told.append((plus, minus))
+        predict(steering, plus, minus)
+
+    monkeypatch.setattr(Steering, "predict", heard)
+    rig = rig_of()
+    rig.follow(at_rest(0.05, PERIOD))
+    ahead = 0.5 * PERIOD - 0.33 * 0.003
+    for row, sides in zip(rig.rows, told, strict=True):
+        one, two, four, five = (row[f"position_{k}"] + ahead * row[f"sent_{k}"] for k in (1, 2, 4, 5))
+        step = SETTINGS.actuator.step_length
+        assert sides == pytest.approx((0.5 * step * (four + five), 0.5 * step * (one + two)), abs=1e-12)
+    assert told[0][0] > 0.0
+
+
+def test_of_a_very_long_round_trip_half_a_period_at_most_is_underway(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.follow(at_rest(0.05, PERIOD))
+    rig.board.round_trip = 0.03
+    rig.follow(at_rest(0.05, PERIOD))
+    assert rig.rows[-1]["counted"] - rig.rows[-1]["time"] == pytest.approx(0.5 * PERIOD, abs=1e-4)
+
+
+def test_the_boards_state_and_all_its_faults_are_logged_by_name(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.follow(at_rest(0.02, PERIOD))
+    assert (rig.rows[-1]["state"], rig.rows[-1]["faults"]) == ("ENABLED", "")
+    rig.board.faults = Fault.ESTOP_INPUT | Fault.LINK
+    rig.follow(at_rest(0.02, PERIOD))
+    assert rig.rows[-1]["faults"] == "LINK+ESTOP_INPUT"
+    rig.board.state = State.FAULT
+    with pytest.raises(SafetyStop, match="the board is FAULT"):
+        rig.follow(at_rest(0.02, PERIOD))
+
+
+def test_a_law_that_raises_stops_as_such(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.loop._steering.respond = lambda *_: 1 / 0
+    with pytest.raises(SafetyStop, match="the controller failed: ZeroDivisionError"):
+        rig.follow(at_rest(0.02, PERIOD))
+
+
+def test_verdicts_are_told_as_they_are(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.marker._verdict = SightingVerdict.JUMP
+    rig.follow(at_rest(0.02, PERIOD))
+    assert {row["verdict"] for row in rig.rows} == {"jump"}

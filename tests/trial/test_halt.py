@@ -1,0 +1,94 @@
+"""Motors are stopped gently first, hard if they do not stand, and a board that does not answer is told of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.trial.conftest import settings_of
+from tests.trial.rig import RigBoard
+from wristctl.board.board_errors import BoardError
+from wristctl.board.messages import Command, Configure, Flag, Limits, State
+from wristctl.config.plant import Actuator
+from wristctl.trial.halt import halt
+from wristctl.trial.prepare import prepare
+from wristctl.trial.spools import spools_of
+
+
+class Moving(RigBoard):
+    """Stands so many seconds after a command that it heeds; refuses or fails where a test says so."""
+
+    def __init__(self, heeds: Command | None, after: float = 0.1, failing: tuple[Command, ...] = ()) -> None:
+        super().__init__()
+        self.heeds, self.after, self.failing, self.stands = heeds, after, failing, float("inf")
+        self.dead = False
+
+    def send(self, message: Any) -> None:
+        self.told.append(message)
+        if message in self.failing or self.dead:
+            raise BoardError("host", f"{message.name} fails")
+        if message is self.heeds:
+            self.stands = self.transport.now() + self.after
+
+    def read(self) -> Any:
+        if self.dead:
+            raise BoardError("cable", "nothing answers")
+        self.flags = Flag.MOVING if self.transport.now() < self.stands else Flag(0)
+        return super().read()
+
+
+def halted(board: Any) -> Any:
+    return halt(board, 0.1)
+
+
+def test_a_board_that_ramps_down_is_seen_to_stand() -> None:
+    board = Moving(Command.STOP)
+    done = halted(board)
+    assert done.verified and done.how == "STOP, board ENABLED" and board.told == [Command.STOP]
+    assert done.seconds == pytest.approx(0.1, abs=0.006) and done.status.state is State.ENABLED
+
+
+def test_one_that_does_not_stand_within_half_a_second_is_stopped_hard() -> None:
+    board = Moving(Command.ESTOP, after=0.0)
+    done = halted(board)
+    assert done.verified and done.how == "ESTOP, board ENABLED" and board.told == [Command.STOP, Command.ESTOP]
+    assert done.seconds == pytest.approx(0.5, abs=0.01)
+
+
+def test_one_that_refuses_but_stands_is_stopped() -> None:
+    """In a fault it has stopped already: its status is what counts."""
+    board = Moving(None, failing=(Command.STOP,))
+    board.stands, board.state = 0.0, State.FAULT
+    done = halted(board)
+    assert done.verified and done.how == "STOP, board FAULT" and board.told == [Command.STOP]
+
+
+def test_one_that_goes_on_moving_is_left_to_its_watchdog() -> None:
+    done = halted(Moving(None))
+    assert not done.verified and done.status is None
+    assert done.how.startswith("still moving; the board stops by itself 100 ms after")
+    assert done.seconds == pytest.approx(0.5, abs=0.02)
+
+
+def test_one_that_does_not_answer_is_told_of_by_its_last_error() -> None:
+    board = Moving(None)
+    board.dead = True
+    done = halted(board)
+    assert not done.verified and "nothing answers" in done.how and board.told == [Command.STOP, Command.ESTOP]
+
+
+def test_before_anything_moves_ramps_watchdog_and_limits_are_set_and_drives_switched_on() -> None:
+    board: Any = RigBoard()
+    actuator = Actuator(level="tendon", step_acceleration=30_000.0)
+    settings = settings_of(actuator=actuator, safety={"watchdog": 0.2, "travel": 0.01, "hold": True})
+    prepare(board, settings)
+    steps = round(0.01 / spools_of(actuator).step)
+    assert board.told == [Configure(0.2, 1, 30_000), Limits((-steps,) * 4, (steps,) * 4), "enable"]
+
+
+def test_an_old_fault_is_cleared_first() -> None:
+    board: Any = RigBoard()
+    board.state = State.FAULT
+    prepare(board, settings_of())
+    assert board.told[0] == "clear" and board.told[1].hold_on_fault == 0 and board.told[-1] == "enable"

@@ -1,0 +1,188 @@
+"""Homing on tendons that are just lines: what it finds is what they are, and what it does is small and undone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.trial.rig import Marker, RigBoard
+from wristctl.board.messages import JOG_RATE, Flag, Target
+from wristctl.config.hw_run import Homing
+from wristctl.config.plant import Actuator
+from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import on_plus_side, spools_of
+
+SPOOLS = spools_of(Actuator(level="tendon"))
+SLACK, PER_RADIAN = np.array([31, 52, 17, 44]), np.array([900.0, 1000.0, 1100.0, 950.0])
+"""Steps reeled in until taut, and then for one radian."""
+START, GLUED = np.array([5, -6, 7, -8]), 0.07
+
+
+class Wrist:
+    """Bends linearly with what is reeled in beyond the taut point; `signs` say how motors are wired."""
+
+    def __init__(self, signs: tuple[int, ...] = (1, 1, 1, 1), plane: str = "ulnar", **changes: Any) -> None:
+        self.board, self.signs, self.plane = RigBoard(START.tolist()), np.array(signs), plane
+        self.sides = np.where(on_plus_side(plane), 1.0, -1.0)
+        self.gain = 1.0 / PER_RADIAN
+        self.bends: list[float] = []
+        for name, value in changes.items():
+            setattr(self, name, value)
+        self.tracking: Any = Marker(self.board, self.angle)
+
+    def angle(self) -> float:
+        taut = np.maximum(0.0, self.signs * (self.board.position - START) - SLACK)
+        bend = float((self.sides * taut * self.gain).sum())
+        self.bends.append(bend)
+        return GLUED + bend
+
+    def homed(self, known: tuple[int, ...] | None = None, **settings: Any) -> Zero:
+        board: Any = self.board
+        homing = Homing(frames=1, rest=0.0, **settings)
+        return find_zero(board, self.tracking, SPOOLS, homing, self.plane, known)
+
+
+@pytest.mark.parametrize("plane", ["ulnar", "flexion"])
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (-1, 1, -1, -1)], ids=str)
+def test_taut_points_steps_per_radian_senses_and_the_glued_on_angle_are_found(
+    plane: str, signs: tuple[int, ...]
+) -> None:
+    wrist = Wrist(signs, plane)
+    zero = wrist.homed()
+    assert zero.signs == signs
+    assert zero.slack == pytest.approx(SLACK * SPOOLS.step, abs=1e-9)
+    assert zero.steps_per_radian == pytest.approx(PER_RADIAN, rel=1e-9)
+    assert zero.marker == pytest.approx(GLUED)
+    assert zero.plain() == {
+        "signs": zero.signs, "steps_per_radian": zero.steps_per_radian, "marker": zero.marker, "slack": zero.slack,
+    }  # fmt: skip
+    with pytest.raises(FrozenInstanceError):
+        zero.marker = 0.0  # type: ignore[misc]
+    assert wrist.board.told[-1] == ("home", (0, 0, 0, 0))
+    assert wrist.board.position == pytest.approx(START + signs * SLACK), "every tendon just taut is zero"
+
+
+def test_known_senses_are_not_tried_the_other_way_round() -> None:
+    assert Wrist((1, -1, 1, 1)).homed((1, -1, 1, 1)).signs == (1, -1, 1, 1)
+    with pytest.raises(SafetyStop, match=r"axis 1 \(tendon 2\) does not bend the wrist within 2 mm"):
+        Wrist((1, -1, 1, 1)).homed((1, 1, 1, 1))
+
+
+def test_the_wrist_is_never_bent_much_and_one_tendon_moves_at_a_time() -> None:
+    wrist = Wrist()
+    wrist.homed()
+    assert np.abs(np.degrees(wrist.bends)).max() < 5.0
+    jogs = np.array([where for what, where in wrist.board.told[:-1] if what == "jog"])
+    changed = (np.diff(jogs, axis=0) != 0).sum(axis=1)
+    slackened = np.flatnonzero(changed > 1)
+    assert len(slackened) == 2, "all let go at once before they are measured, and all are taken up at the end"
+    pull = round(Homing().pull / SPOOLS.step)
+    assert (jogs[slackened[0] + 1] == START - 2 * pull).all()
+    assert (jogs - START).min() == -2 * pull
+
+
+def test_moves_are_as_small_as_the_settings_say() -> None:
+    wrist = Wrist()
+    wrist.homed()
+    jogs = np.array([where for what, where in wrist.board.told[:-1] if what == "jog"])
+    move = round(Homing().move / SPOOLS.step)
+    looked = jogs[: np.flatnonzero(jogs[:, 0] == START[0])[0], 0] - START[0]
+    assert looked.tolist() == [2 * move * (k + 1) for k in range(len(looked))]
+    assert looked[-2] < SLACK[0] + 10 < looked[-1] + 10, "it stops at the first bend"
+
+
+def test_a_wrist_that_straightens_at_once_is_not_waited_for() -> None:
+    """Each of eight letting goes may take `let_go` at most."""
+    quick, patient = Wrist(), Wrist()
+    quick.homed(let_go=1.0)
+    patient.homed(let_go=100.0)
+    assert patient.board.transport.now() == quick.board.transport.now()
+
+
+def test_slack_within_the_longest_is_found_and_beyond_it_is_not() -> None:
+    longest = (SLACK.max() + 30) * SPOOLS.step
+    assert Wrist().homed(slack=longest).signs == (1, 1, 1, 1)
+    with pytest.raises(SafetyStop, match=r"axis 1 \(tendon 2\)"):
+        Wrist().homed(slack=0.8 * SLACK.max() * SPOOLS.step)
+
+
+def test_a_tendon_on_the_other_side_than_it_should_be_stops_homing() -> None:
+    wrist = Wrist()
+    wrist.sides = np.array([-1.0, 1.0, 1.0, 1.0])
+    with pytest.raises(SafetyStop, match="axis 1 bends the wrist to the other side than tendon 2 should"):
+        wrist.homed()
+
+
+def test_a_bend_beyond_ten_degrees_stops_homing_with_that_tendon_slack() -> None:
+    wrist = Wrist(gain=1.0 / np.array([900.0, 20.0, 900.0, 900.0]))
+    with pytest.raises(SafetyStop, match=r"axis 1 bent the wrist by -\d\d\.\d deg while homing"):
+        wrist.homed()
+    assert wrist.board.position[1] < START[1]
+
+
+def test_a_bend_of_just_under_ten_degrees_does_not() -> None:
+    """One move beyond the taut point bends that far."""
+    pull = Homing().pull / SPOOLS.step + 2 * Homing().move / SPOOLS.step
+    steepest = math.radians(9.0) / (pull + 1)
+    assert Wrist(gain=np.full(4, steepest)).homed().steps_per_radian == pytest.approx([1.0 / steepest] * 4)
+
+
+def test_a_tendon_that_slips_while_it_is_measured_stops_homing() -> None:
+    wrist = Wrist()
+    bend = wrist.angle
+
+    def slipping() -> float:
+        measured = (np.abs(wrist.board.position - START) > 1).all()
+        return GLUED if measured else bend()
+
+    wrist.tracking = Marker(wrist.board, slipping)
+    with pytest.raises(SafetyStop, match="tendon 1 pulls differently each time"):
+        wrist.homed()
+
+
+def test_slackened_tendons_are_paid_out_by_the_pull_each_in_its_sense() -> None:
+    board: Any = RigBoard((1, 2, 3, 4))
+    assert slacken(board, SPOOLS, Homing(pull=1e-3), (1, -1, 1, -1)) == (1, 2, 3, 4)
+    steps = round(1e-3 / SPOOLS.step)
+    assert board.told == [Target((-steps, steps, -steps, steps), (JOG_RATE,) * 4), (Flag.MOVING, 5.0)]
+
+
+# --- reading the marker -----------------------------------------------------------------------------------------------
+
+
+def test_waiting_keeps_the_boards_link_alive() -> None:
+    board: Any = RigBoard()
+    Patience(board).wait(0.1)
+    assert board.transport.now() == pytest.approx(100.1)
+    assert len(board.pings) == pytest.approx(5, abs=1) and max(np.diff(board.pings)) < 0.05
+    Patience(board).wait(0.0)
+    assert board.transport.now() == pytest.approx(100.1)
+
+
+def test_a_reading_is_the_median_of_as_many_usable_frames_as_asked_for() -> None:
+    board: Any = RigBoard()
+    angles = iter([9.0, 0.1, math.nan, 0.5, 0.2, 7.0, 7.0])
+    tracking: Any = Marker(board, lambda: next(angles))
+    assert Patience(board).angle(tracking, 3) == 0.2, "what was seen before does not count"
+    assert next(angles) == 7.0
+
+
+def test_frames_taken_before_the_reading_began_do_not_count() -> None:
+    board: Any = RigBoard()
+    angles = iter([0.0, 1.0, 2.0, 3.0, 4.0])
+    tracking: Any = Marker(board, lambda: next(angles))
+    tracking.delay = 0.03  # at 20 ms between looks: the first comes from before
+    assert Patience(board).angle(tracking, 1) == 2.0
+
+
+def test_a_marker_that_cannot_be_read_for_two_seconds_is_said_with_why() -> None:
+    board: Any = RigBoard()
+    tracking: Any = Marker(board, lambda: math.nan)
+    with pytest.raises(SafetyStop, match=r"could not be read \(no tip\)"):
+        Patience(board).angle(tracking, 1)
+    assert 2.0 < board.transport.now() - 100.0 < 2.1

@@ -1,0 +1,141 @@
+"""What a trial's log shows in numbers, from logs that are written by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.trial.conftest import WRIST, settings_of
+from wristctl.arrays import Array
+from wristctl.config.plant import Push
+from wristctl.trial.trial_metrics import JUDGED, evaluated
+from wristctl.trial.trial_motions import motion_of
+from wristctl.trial.trials import Trial
+
+PERIOD, HORIZON = 5e-3, 3.0
+SETTINGS = settings_of(horizon=HORIZON)
+MOTION = motion_of(SETTINGS, WRIST, "ulnar")
+TIME = MOTION.time
+PUSH = Push(force=2.0, start=2.0, duration=0.4)
+TENSIONS = {1: 2.0, 2: 6.0, 4: 10.0, 5: 14.0}
+NAMES = {f"tension_{tendon}": value for tendon, value in TENSIONS.items()}
+
+
+def course(error: float | Array = 0.0, load: float | Array = 0.3, **columns: Any) -> pd.DataFrame:
+    known = {"time": TIME, "theta": MOTION.theta_ref + error, "error": error + 0.0 * TIME, "load": load}
+    return pd.DataFrame(known | {"torque_wanted": 0.5, "torque": 0.5} | NAMES | columns)
+
+
+def found(
+    log: pd.DataFrame, truth: pd.DataFrame | None = None, pushed: bool = False, push: Push = PUSH
+) -> dict[str, float]:
+    trial = Trial(0, "ulnar", 0, push.force if pushed else 0.0, 0)
+    return evaluated(trial, log, MOTION, push, PERIOD, truth)
+
+
+def bump(start: float, end: float, size: float) -> Array:
+    """A load of 0.3 N m with a push on top."""
+    return 0.3 + np.where((start <= TIME) & (end > TIME), size, 0.0)
+
+
+def test_a_constant_error_is_its_own_rmse_and_steady_state() -> None:
+    values = found(course(error=0.01))
+    assert values["rmse"] == pytest.approx(0.01) and values["steady_state"] == pytest.approx(0.01)
+    assert values["iae"] == pytest.approx(0.01 * HORIZON)
+    assert values["overshoot"] == pytest.approx(100.0 * 0.01 / MOTION.final, rel=1e-6)
+
+
+def test_no_error_settles_with_the_reference() -> None:
+    assert MOTION.rest - 0.15 < found(course())["settling"] < MOTION.rest
+
+
+@pytest.mark.parametrize(("direction", "peak", "other"), [("ulnar", 12.0, 4.0), ("flexion", 10.0, 6.0)])
+def test_a_sides_tension_is_the_mean_of_its_two_tendons(direction: Any, peak: float, other: float) -> None:
+    """4 and 5 pull toward ulnar, 2 and 5 toward flexion."""
+    values = evaluated(Trial(0, direction, 0, 0.0, 0), course(), MOTION, PUSH, PERIOD, None)
+    assert values["peak_tension"] == pytest.approx(peak) and values["chattering"] == 0.0
+    assert values["rms_tension"] == pytest.approx(math.sqrt(0.5 * (peak**2 + other**2)))
+
+
+def test_the_law_is_saturated_where_it_wanted_another_torque() -> None:
+    wanted = np.where(TIME < 0.25 * HORIZON, 0.6, 0.5) + 1e-12
+    assert found(course(torque_wanted=wanted))["saturation"] == pytest.approx(0.25, abs=0.01)
+
+
+def test_a_log_sampled_a_little_late_is_judged_on_the_motions_own_grid() -> None:
+    late = TIME + 0.4 * PERIOD
+    angle = np.interp(late, TIME, MOTION.theta_ref) + 0.01
+    assert found(course(time=late, theta=angle))["rmse"] == pytest.approx(0.01, rel=0.01)
+
+
+@pytest.mark.parametrize("rows", [0, 1, len(TIME) - 1])
+def test_a_log_that_is_not_whole_has_no_numbers_but_all_their_names(rows: int) -> None:
+    whole = found(course(), pushed=True)
+    part = found(course().iloc[:rows], pushed=True)
+    assert set(part) == set(whole) and all(map(math.isnan, part.values()))
+    assert {f"true_{name}" for name in JUDGED} | {"recovery", "true_recovery", "push_torque"} <= set(part)
+
+
+def test_without_a_push_there_is_nothing_to_recover_from() -> None:
+    values = found(course(load=bump(2.0, 2.4, 0.1)))
+    assert all(math.isnan(values[name]) for name in ("recovery", "true_recovery", "push_torque"))
+
+
+def test_a_push_is_found_in_the_load_and_recovered_from_after_its_end() -> None:
+    error = np.where((TIME > 2.0) & (TIME < 2.7), 0.05 * MOTION.final, 0.001 * MOTION.final)
+    values = found(course(error=error, load=bump(2.0, 2.4, 0.1)), pushed=True)
+    assert values["push_torque"] == pytest.approx(0.1)
+    assert values["recovery"] == pytest.approx(0.3, abs=2 * PERIOD)
+
+
+@pytest.mark.parametrize(("start", "seen"), [(1.55, True), (1.3, False)])
+def test_a_person_may_push_half_a_second_early(start: float, seen: bool) -> None:
+    values = found(course(load=bump(start, start + 0.1, 0.1)), pushed=True)
+    assert (values["push_torque"] == pytest.approx(0.1)) == seen
+
+
+def test_nobody_pushes_before_the_move_is_over() -> None:
+    early = Push(force=2.0, start=MOTION.rest + 0.2, duration=0.2)
+    load = bump(MOTION.rest - 0.1, MOTION.rest, 0.1)
+    assert math.isnan(found(course(load=load), pushed=True, push=early)["push_torque"])
+
+
+@pytest.mark.parametrize(("size", "seen"), [(0.0101, True), (-0.0101, True), (0.0099, False)])
+def test_a_hundredth_of_a_newton_metre_is_a_push(size: float, seen: bool) -> None:
+    values = found(course(load=bump(2.0, 2.4, size)), pushed=True)
+    assert math.isnan(values["push_torque"]) != seen and math.isnan(values["recovery"]) != seen
+
+
+def true_course(error: float | Array) -> pd.DataFrame:
+    """The bench's own, twice as dense and not from the same instants."""
+    time = np.arange(-0.1, HORIZON + 0.1, 2e-3)
+    wrong = np.interp(time, TIME, error + 0.0 * TIME)
+    return pd.DataFrame({"time": time, "theta": np.interp(time, TIME, MOTION.theta_ref) + wrong})
+
+
+def test_the_true_angle_is_judged_beside_the_estimated_one() -> None:
+    values = found(course(error=0.01), true_course(0.02))
+    assert values["rmse"] == pytest.approx(0.01) and values["true_rmse"] == pytest.approx(0.02, rel=0.01)
+    assert values["true_steady_state"] == pytest.approx(0.02, rel=0.01)
+    assert math.isnan(values["true_recovery"])
+    assert {name for name in values if name.startswith("true_")} == {
+        *(f"true_{each}" for each in JUDGED),
+        "true_recovery",
+    }
+
+
+def test_the_true_recovery_counts_from_when_the_push_should_end() -> None:
+    error = np.where((TIME > 2.0) & (TIME < 2.7), 0.05 * MOTION.final, 0.0)
+    values = found(course(), true_course(error), pushed=True)
+    assert values["true_recovery"] == pytest.approx(2.7 - 2.4, abs=2 * PERIOD)
+    assert math.isnan(values["recovery"]), "the log shows no push"
+
+
+def test_without_any_truth_nothing_true_is_known() -> None:
+    for truth in (None, true_course(0.0).iloc[:0]):
+        values = found(course(), truth, pushed=True)
+        assert math.isnan(values["true_rmse"]) and values["rmse"] == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,42 @@
+"""The ways of a trial: there, back and rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.trial.conftest import WRIST, settings_of
+from wristctl.trial.trial_motions import at_rest, back, motion_of
+
+PERIOD = 5e-3
+
+
+def test_the_way_back_begins_where_the_wrist_is_and_ends_straight_and_at_rest() -> None:
+    way = back(0.4, 1.0, 0.5, PERIOD)
+    assert way.time == pytest.approx(np.arange(300) * PERIOD)
+    assert way.theta_ref[0] == 0.4 and (way.theta_ref[way.time >= 1.0] == 0.0).all()
+    assert way.theta_ref[100] == pytest.approx(0.2), "half way in half of its time"
+    assert (way.rate_ref[[0, -1]] == 0.0).all() and way.rate_ref[100] == pytest.approx(-0.4 * 15.0 / 8.0)
+    assert (way.move, way.begin, way.rest, way.horizon, way.final) == (-0.4, 0.0, 1.0, 1.5, 0.0)
+    assert np.array_equal(way.theta_desired, way.theta_ref)
+    assert way.tip_desired.shape == (300, 2)
+
+
+def test_its_rate_and_acceleration_are_its_derivatives() -> None:
+    way = back(-0.3, 0.8, 0.0, 1e-3)
+    assert np.gradient(way.theta_ref, way.time)[1:-1] == pytest.approx(way.rate_ref[1:-1], abs=1e-4)
+    assert np.gradient(way.rate_ref, way.time)[1:-1] == pytest.approx(way.acceleration_ref[1:-1], abs=1e-2)
+
+
+def test_at_rest_it_stays_straight() -> None:
+    way = at_rest(0.25, PERIOD)
+    assert len(way.time) == 50
+    assert not np.any([way.theta_ref, way.rate_ref, way.acceleration_ref])
+
+
+def test_a_trials_motion_is_mirrored_where_its_direction_counts_negative() -> None:
+    settings = settings_of(horizon=0.6)
+    there, other, flexion = (motion_of(settings, WRIST, each) for each in ("ulnar", "radial", "flexion"))
+    assert np.degrees(there.final) == pytest.approx(8.0) and len(there.time) == 120 and there.horizon == 0.6
+    assert there.theta_ref == pytest.approx(-other.theta_ref) and there.theta_ref == pytest.approx(flexion.theta_ref)
+    assert np.diff(there.time) == pytest.approx(PERIOD)

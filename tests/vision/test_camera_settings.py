@@ -1,0 +1,133 @@
+"""What a device is asked for, how its frames are timed, and rates where nothing says one."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from wristctl.config.vision import Device
+from wristctl.vision.camera import CameraError, DeviceCamera, FolderCamera, VideoCamera
+
+
+class Capture:
+    """Stands in for OpenCV's: gives one picture, and stamps it so many seconds from now."""
+
+    def __init__(self) -> None:
+        self.asked: dict[int, float] = {}
+        self.opened: Any = None
+        self.stamp, self.given, self.pictures, self.rate = 0.0, 0.0, 1, 25.0
+        self.released, self.done = False, threading.Event()
+
+    def isOpened(self) -> bool:
+        return True
+
+    def set(self, name: int, value: float) -> None:
+        self.asked[name] = value
+
+    def get(self, name: int) -> float:
+        if name == cv2.CAP_PROP_FPS:
+            return self.rate
+        self.given = time.monotonic() + self.stamp
+        return 1e3 * self.given
+
+    def read(self) -> tuple[bool, Any]:
+        if self.pictures == 0:
+            self.done.wait(5.0)
+            return False, None
+        self.pictures -= 1
+        return True, np.full((4, 6, 3), (255, 0, 0), np.uint8)  # blue
+
+    def release(self) -> None:
+        self.released = True
+
+
+@pytest.fixture
+def capture(monkeypatch: pytest.MonkeyPatch) -> Capture:
+    made = Capture()
+
+    def opened(place: Any) -> Capture:
+        made.opened = place
+        return made
+
+    monkeypatch.setattr(cv2, "VideoCapture", opened)
+    return made
+
+
+def closed(camera: DeviceCamera, capture: Capture) -> None:
+    capture.done.set()
+    camera.close()
+    assert capture.released
+
+
+@pytest.mark.parametrize(("source", "place"), [("2", 2), ("/dev/video2", "/dev/video2")])
+def test_a_device_is_asked_for_what_is_set_and_for_one_frame_of_buffer(
+    capture: Capture, source: str, place: Any
+) -> None:
+    camera = DeviceCamera(source, Device(width=800, height=600, frame_rate=60.0, exposure=7.0))
+    assert capture.opened == place and camera.name == source
+    assert capture.asked == {
+        cv2.CAP_PROP_FRAME_WIDTH: 800, cv2.CAP_PROP_FRAME_HEIGHT: 600, cv2.CAP_PROP_FPS: 60.0,
+        cv2.CAP_PROP_AUTO_EXPOSURE: 1, cv2.CAP_PROP_EXPOSURE: 7.0, cv2.CAP_PROP_BUFFERSIZE: 1,
+    }  # fmt: skip
+    closed(camera, capture)
+
+
+def test_what_is_not_set_is_left_as_it_is(capture: Capture) -> None:
+    camera = DeviceCamera("0", Device())
+    assert capture.asked == {cv2.CAP_PROP_BUFFERSIZE: 1}
+    frame = camera.newest()
+    assert frame is not None and frame.number == 0
+    assert frame.image.shape == (4, 6) and frame.image[0, 0] == 29, "blue is a dark grey"
+    assert camera.newest() is None, "no more has come, and none is lost yet"
+    closed(camera, capture)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "believed"), [(-0.5, True), (-0.9, True), (-1.5, False), (9.0, False), (-1e6, False)]
+)
+def test_the_drivers_stamp_is_believed_where_it_is_of_the_last_second(
+    capture: Capture, stamp: float, believed: bool
+) -> None:
+    capture.stamp = stamp
+    before = time.monotonic()
+    camera = DeviceCamera("0", Device(delay=0.25))
+    after, frame = time.monotonic(), camera.newest()
+    assert frame is not None
+    if believed:
+        assert frame.time == pytest.approx(capture.given - 0.25)
+    else:
+        assert before <= frame.time + 0.25 <= after
+    closed(camera, capture)
+
+
+def test_a_device_without_a_picture_is_given_back(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wristctl.vision.camera._FIRST_FRAME", 0.05)
+    capture.pictures = 0
+    threading.Timer(0.2, capture.done.set).start()
+    with pytest.raises(CameraError, match="gave no picture within"):
+        DeviceCamera("0", Device())
+    assert capture.released
+
+
+@pytest.mark.parametrize(("given", "told", "rate"), [(None, 25.0, 25.0), (None, 0.0, 30.0), (10.0, 25.0, 10.0)])
+def test_a_videos_rate_is_the_given_one_its_own_or_thirty(
+    capture: Capture, tmp_path: Path, given: float | None, told: float, rate: float
+) -> None:
+    capture.rate, capture.pictures = told, 2
+    capture.done.set()
+    (tmp_path / "video.avi").write_bytes(b"x")
+    assert VideoCamera(tmp_path / "video.avi", given).frame_rate == rate
+
+
+def test_a_folders_rate_is_thirty_where_nothing_says_it(tmp_path: Path) -> None:
+    for name in ("b.png", "a.JPG", "c.tiff"):
+        cv2.imencode(Path(name).suffix.lower(), np.zeros((4, 6), np.uint8))[1].tofile(tmp_path / name)
+    frames = list(FolderCamera(tmp_path))
+    assert [frame.time for frame in frames] == pytest.approx([0.0, 1 / 30, 2 / 30])
+    assert [file.name for file in FolderCamera(tmp_path).files] == ["a.JPG", "b.png", "c.tiff"]

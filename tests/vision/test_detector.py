@@ -1,0 +1,84 @@
+"""Markers are found where they were printed, once each or twice, in the whole picture or near a place."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from wristctl.vision.detector import Detector, edges, print_of, square_angle
+
+SIDE, CELL = 48.0, 8
+Image = NDArray[np.uint8]
+
+
+def picture(*placed: tuple[int, int, int], turned: int = 0) -> Image:
+    """480 x 640 pixels of white with markers of 48 px, each by its id and where its quiet zone begins (x, y)."""
+    made = np.full((480, 640), 255, np.uint8)
+    for number, x, y in placed:
+        ink = np.rot90(print_of(number).repeat(CELL, 0).repeat(CELL, 1), turned)
+        made[y : y + len(ink), x : x + len(ink)] = ink
+    return made
+
+
+def corners(x: int, y: int) -> NDArray[np.float64]:
+    """Of the black square, whose edge lies between pixels."""
+    square = SIDE * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    return square + np.array([x + CELL - 0.5, y + CELL - 0.5])
+
+
+@pytest.mark.parametrize("number", [0, 1, 17, 49])
+def test_a_print_is_the_dictionarys_bits_in_a_black_border_in_a_white_zone(number: int) -> None:
+    ink = print_of(number)
+    assert ink.shape == (8, 8)
+    rim = np.ones((8, 8), bool)
+    rim[1:-1, 1:-1] = False
+    border = np.zeros((8, 8), bool)
+    border[1:-1, 1:-1] = True
+    border[2:-2, 2:-2] = False
+    assert (ink[rim] == 255).all() and (ink[border] == 0).all()
+    known = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    assert np.array_equal(ink[2:-2, 2:-2], 255 * known.generateImageMarker(number, 6)[1:-1, 1:-1].astype(bool))
+
+
+def test_markers_are_found_by_number_with_corners_clockwise_from_the_prints_upper_left() -> None:
+    found = Detector().everywhere(picture((3, 100, 50), (7, 400, 300)))
+    assert set(found) == {3, 7}
+    assert found[3][0] == pytest.approx(corners(100, 50), abs=0.05)
+    assert found[7][0] == pytest.approx(corners(400, 300), abs=0.05)
+    assert Detector().everywhere(picture()) == {}
+
+
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_corners_begin_at_the_prints_own_upper_left_however_it_is_turned(quarters: int) -> None:
+    (found,) = Detector().everywhere(picture((3, 100, 50), turned=quarters))[3]
+    assert found == pytest.approx(np.roll(corners(100, 50), quarters, axis=0), abs=0.05)
+    assert math.cos(square_angle(found) + quarters * math.pi / 2) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_number_seen_in_two_places_is_found_in_both() -> None:
+    found = Detector().everywhere(picture((3, 100, 50), (3, 400, 300)))[3]
+    assert sorted(each[0, 0] for each in found) == pytest.approx([107.5, 407.5], abs=0.05)
+
+
+@pytest.mark.parametrize("at", [(0, 0), (300, 200), (640 - 64, 480 - 64), (0, 480 - 64), (640 - 64, 0)], ids=str)
+def test_a_marker_near_its_last_place_is_found_at_its_place_in_the_whole_picture(at: tuple[int, int]) -> None:
+    image, before = picture((3, *at)), corners(*at)
+    for moved in ((0.0, 0.0), (15.0, -15.0), (-15.0, 15.0)):
+        (found,) = Detector().around(image, before + moved)[3]
+        assert found == pytest.approx(before, abs=0.05)
+
+
+def test_around_a_place_nothing_further_than_a_side_is_looked_at() -> None:
+    image, place = picture((3, 300, 200)), corners(300, 200)
+    for away in ((80.0, 0.0), (-80.0, 0.0), (0.0, 80.0), (0.0, -80.0)):
+        assert Detector().around(image, place + away) == {}
+    assert Detector().around(image, place + 2000.0 * np.eye(2)[0]) == {}  # nor beyond the picture
+    assert Detector().around(image, place - 2000.0 * np.eye(2)[1]) == {}
+
+
+def test_edges_go_from_each_corner_to_the_next() -> None:
+    assert edges(corners(0, 0)) == pytest.approx(SIDE * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
