@@ -7,6 +7,7 @@ import os
 import tempfile
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -84,13 +85,27 @@ def _entry(run: Run) -> IndexEntry:
         metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
     except (UserError, AttributeError) as error:
         return IndexEntry(
-            run.id, "-", "", "broken", "", None, getattr(error, "what", "metrics.json is no table of metrics")
+            run.id,
+            "-",
+            "",
+            "broken",
+            _dated(run.id),
+            None,
+            getattr(error, "what", "metrics.json is no table of metrics"),
         )
     note = manifest.error.what if manifest.error else ""
     timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
     return IndexEntry(
         run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs
     )
+
+
+def _dated(name: str) -> str:
+    """When a run whose manifest cannot be read began, by its name; nothing where that has no date."""
+    try:
+        return datetime.strptime(name[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC).isoformat()
+    except ValueError:
+        return ""
 
 
 def _stamp(path: str) -> list[int] | None:
