@@ -192,7 +192,7 @@ def test_the_side_on_which_tensions_are_named_and_begin_at_zero(course: Course) 
 def test_tensions_that_act_are_shown_beside_those_commanded_with_a_legend(course: Course) -> None:
     one = course("smc/exchanged")
     made = tensions(replace(one, acting=2.0 * one.tension))
-    plus, close, minus, close_minus, torque, _ = made.axes
+    plus, close, minus, close_minus, *_ = made.axes
     assert [each.get_legend() is not None for each in made.axes] == [False, False, True, False, True, False]
     assert 120.0 < plus.get_ylim()[1] < 132.0 and plus.get_ylim() == minus.get_ylim()
     for side, panel in enumerate((close, close_minus)):
@@ -217,9 +217,8 @@ def test_a_torque_within_its_limits_is_drawn_as_large_as_it_is(course: Course) -
 def test_a_course_is_drawn_sample_by_sample_until_there_are_four_in_a_pixel(course: Course, count: int) -> None:
     tension = np.random.default_rng(0).uniform(2.0, 60.0, (count, 2))
     torque = 0.04 * (tension[:, 0] - tension[:, 1])
-    one = replace(
-        course("smc/exchanged"), time=np.arange(count) * 1e-3, tension=tension, torque=torque, torque_wanted=torque
-    )
+    time = 1e-3 * np.arange(float(count))
+    one = replace(course("smc/exchanged"), time=time, tension=tension, torque=torque, torque_wanted=torque)
     drawn = tensions(one).axes[0].lines[0]
     assert len(np.asarray(drawn.get_xdata())) == (count if count < 2000 else 1000)
     at = np.searchsorted(one.time, np.asarray(drawn.get_xdata()))

@@ -165,7 +165,7 @@ def test_directions_are_drawn_at_30_deg_to_their_own_side_with_their_tendons() -
         assert panel.get_title("left") == said
         theta = np.radians(30.0 * each.sign)
         (x, y) = chain_tip(np.array([[theta]]), L)[0]
-        *_, backbone, plus, minus = lines(panel)
+        *_, backbone, _, _ = lines(panel)
         assert backbone[-1] == pytest.approx(x + 1j * y) and y * each.sign > 0.0
         pulled, other = (panel.lines[-2], panel.lines[-1])[:: each.sign]
         assert pulled.get_linewidth() > other.get_linewidth()
