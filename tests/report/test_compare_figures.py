@@ -143,3 +143,15 @@ def test_chattering_shows_each_reference_beside_the_median(results: list[Compare
     assert [bool(bar.get_hatch()) for bar in axes.patches] == [False, True, False, False, False, False]
     assert axes.get_xscale() == "log" and axes.yaxis_inverted() and axes.get_title("left") == "Loop default"
     assert "[N/s]" in axes.get_xlabel() and not any(line.get_visible() for line in axes.get_ygridlines())
+
+
+def test_panels_and_cells_of_many_rows_and_columns_are_large_enough_to_read_and_no_larger(
+    results: list[ComparedRow],
+) -> None:
+    rows = [dataclasses.replace(results[0], reference=f"r{k}", gains=f"g{k}") for k in range(12)]
+    for draw, least, most in ((angle_grid, (0.8, 0.6), (1.6, 1.3)), (rmse_map, (0.7, 0.25), (1.2, 0.45))):
+        made = draw(rows)
+        made.draw_without_rendering()
+        box = made.axes[0].get_window_extent().transformed(made.dpi_scale_trans.inverted())
+        count = 1 if draw is angle_grid else 12
+        assert least[0] < box.width / count < most[0] and least[1] < box.height / count < most[1], "in inches"

@@ -153,7 +153,7 @@ def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(cour
     assert axes.get_ylim()[0] < -np.radians(30.0) and axes.get_yscale() == "linear"
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "error [rad]")
     assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
-    one, half = course("pid/printed", diverges=True), 0.5 * course("pid/printed").theta_ref
+    one, half = course("pid/printed", diverges=True), np.linspace(0.1, 0.5, 200) * course("pid/printed").theta_ref
     for sign in (1.0, -1.0):
         wild = replace(one, theta=sign * np.tan(one.time))
         reach = 2.0 * np.radians(30.0)

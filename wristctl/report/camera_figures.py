@@ -45,7 +45,7 @@ def lens(view: View) -> Figure:
     for k, (count, across) in enumerate(((_PARTS, height), (rows, width))):
         for at in np.linspace(0.0, (width, height)[k], count + 1):
             along = np.linspace(0.0, across, _FINE)
-            line = np.stack([np.full(_FINE, at), along][:: 1 - 2 * k], axis=-1)
+            line = np.column_stack([np.full(_FINE, at), along][:: 1 - 2 * k])
             straight = view.undistort(line)
             for shown, style, label in ((line, DISTORTED, "in the picture"), (straight, STRAIGHT, "undistorted")):
                 axes.plot(*shown.T, **style, label=label if k + at == 0 else None)
