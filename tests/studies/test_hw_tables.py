@@ -83,6 +83,7 @@ def test_means_are_over_what_ended_well_with_and_without_a_push(tmp_path: Path, 
         ("paper: pushed, radial", 1, 0.207, 0.029, 3.0),
         ("paper: pushed, flexion", 1, 0.291, 0.031, 3.0),
     ]
+    assert {len(row) for row in means.rows} == {len(means.columns)}
     assert [row[0] for row in by_trial.rows] == [0, 1, 3, 4, 5]
     first = dict(zip(by_trial.columns, by_trial.rows[2], strict=True))
     assert (first["direction"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
