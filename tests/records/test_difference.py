@@ -54,7 +54,10 @@ def test_another_machine_package_and_code_file_are_named(results: Path) -> None:
         (b.path / name).write_text(b.file(name).read_text().replace(old, new, 1))
     manifest.environment.packages["numpy"] = "0.1"
     found = difference(a, b)
-    assert [each.name for each in found.environment] == ["cpu", "numpy"]
+    assert found.environment == [
+        Change("cpu", a.manifest.environment.cpu, "another"),
+        Change("numpy", np.__version__, "0.1"),
+    ]
     assert [each.name for each in found.code] == ["tree", a.file("code.txt").read_text().splitlines()[0][66:]]
 
 

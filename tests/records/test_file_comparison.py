@@ -184,3 +184,30 @@ def test_a_file_that_cannot_be_read_differs_and_says_why(tmp_path: Path, ending:
         before.write_bytes(damaged)
         assert compare_files(before, now).verdict == "differs"
         assert compare_files(now, before).verdict == "differs"
+
+
+def test_of_arrays_the_first_place_is_named_and_numbers_are_told_from_words(tmp_path: Path) -> None:
+    words, numbers = np.array(["a", "b"]), np.array([1.0, 2.0])
+    for name, arrays in (("a", {"x": words, "y": numbers}), ("b", {"x": numbers, "y": numbers + np.array([0.0, 1.0])})):
+        np.savez(tmp_path / f"{name}.npz", **arrays)
+    found = compare_files(tmp_path / "a.npz", tmp_path / "b.npz")
+    assert found.verdict == "differs" and found.detail.startswith("array x from row 0")
+
+
+def test_the_earlier_place_is_named_whichever_array_it_is_in(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", x=np.zeros((2, 3)), y=np.zeros((2, 3)))
+    x, y = np.zeros((2, 3)), np.zeros((2, 3))
+    x[1, 0], y[0, 2] = 1.0, 2.0
+    np.savez(tmp_path / "b.npz", x=x, y=y)
+    assert compare_files(tmp_path / "a.npz", tmp_path / "b.npz").detail.startswith("array y from row [0, 2]")
+
+
+def test_a_tolerance_is_of_what_was_before(tmp_path: Path) -> None:
+    pairs = ((1e6, 1e6 + 0.9, "within tolerance"), (1e6, 1e6 + 1.1, "differs"), (0.0, 1e-3, "differs"))
+    for before, after, verdict in pairs:
+        np.savez(tmp_path / "a.npz", x=np.array([before]))
+        np.savez(tmp_path / "b.npz", x=np.array([after]))
+        assert compare_files(tmp_path / "a.npz", tmp_path / "b.npz").verdict == verdict
+    np.savez(tmp_path / "a.npz", x=np.array([1e6 + 1.0 + 5e-7]))
+    np.savez(tmp_path / "b.npz", x=np.array([1e6]))
+    assert compare_files(tmp_path / "a.npz", tmp_path / "b.npz").verdict == "within tolerance", "a millionth of before"

@@ -13,6 +13,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.repetition_figures import error_sizes
+from wristctl.report.style import WIDTH
 from wristctl.simulation.closed_loop import Repeated
 
 
@@ -105,3 +106,97 @@ def test_bars_are_medians_over_the_references(results: list[ComparedRow]) -> Non
     bars = [bar.get_width() for bar in axes.patches]  # type: ignore[attr-defined]
     assert bars == pytest.approx([10.0 * (3 * row + 2) for row in range(6)])
     assert tick_labels(axes)[1] == "smc/exchanged" and axes.patches[1].get_hatch()
+
+
+def test_a_grid_is_drawn_in_degrees_with_the_desired_angle_and_its_units(results: list[ComparedRow]) -> None:
+    made = angle_grid(results, "Loop default")
+    assert (made.get_suptitle(), made.get_supxlabel(), made.get_supylabel()) == (
+        "Loop default",
+        "time [s]",
+        "bending angle [deg]",
+    )
+    panels = np.array(made.axes).reshape(6, 3)
+    for panel, result in zip(panels.flat, results, strict=True):
+        np.testing.assert_array_equal(panel.lines[0].get_xdata(), result.simulation.trajectory.time[::10])
+        np.testing.assert_allclose(np.asarray(panel.lines[1].get_ydata()), 30.0)
+    titles = [each.get_title("left").replace("\n", " ") for each in panels[0]]
+    assert titles == ["step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg"]
+    assert not any(each.get_title("left") for each in panels[1:].flat)
+    sides = [[text for text in texts(each) if text != "diverged"] for each in panels.flat]
+    assert sides == [own for result in results[::3] for own in ([], [], [result.label.replace("/", "/\n")])]
+    assert panels[0, 0].get_ylim() == pytest.approx((-15.0, 45.0)), "what diverged hides no other"
+
+
+def test_loops_may_be_the_columns_of_one_reference(results: list[ComparedRow]) -> None:
+    one = [each for each in results if each.reference == "step 30 deg"]
+    stiff = [dataclasses.replace(each, loop="stiff") for each in one]
+    made = angle_grid([*one, *stiff], across="loop")
+    panels = np.array(made.axes).reshape(6, 2)
+    assert [each.get_title("left") for each in panels[0]] == ["default", "stiff"]
+    ours = rmse_map([*one, *stiff], across="loop").axes[0]
+    assert [label.get_text() for label in ours.get_xticklabels()] == ["default", "stiff"]
+
+
+def test_figures_grow_with_their_rows_and_columns(results: list[ComparedRow]) -> None:
+    many = [dataclasses.replace(results[0], reference=f"r{k}") for k in range(12)]
+    for draw in (angle_grid, rmse_map):
+        small, wide = draw(results[:1]), draw(many)
+        assert wide.get_figwidth() > 1.5 * small.get_figwidth() and wide.get_figheight() == small.get_figheight()
+        assert small.get_figwidth() == draw(results[:2]).get_figwidth() == WIDTH
+    for each in (angle_grid, rmse_map, chattering_bars):
+        assert each(results).get_figheight() > 1.5 * each(results[:3]).get_figheight()
+
+
+def test_every_cell_of_the_map_stands_at_its_row_and_column(results: list[ComparedRow]) -> None:
+    made = rmse_map(results, "Loop default")
+    ours, paper, bar = made.axes
+    values = np.array([each.simulation.metrics["rmse"] for each in results]).reshape(6, 3)
+    np.testing.assert_allclose(np.asarray(ours.images[0].get_array(), float), values)
+    at = {text.get_position(): text.get_text() for text in ours.texts}
+    for (row, column), value in np.ndenumerate(values):
+        assert at[column, row] == ("x" if np.isnan(value) else f"{value:.2g}")
+    (hatched,) = (patch for patch in ours.patches if patch.get_hatch())
+    assert hatched.get_xy() == (-0.5, 0.5)  # type: ignore[attr-defined]  # first column, second row
+    assert {text.get_position(): text.get_text() for text in paper.texts} == {
+        (0, row): f"{T2[name].rmse:.2g}" for row, name in enumerate(("smc", "smc", "smc", "pid"))
+    }
+    assert ours.images[0].get_clim() == pytest.approx((1e-5, T2["pid"].rmse)) == paper.images[0].get_clim()
+    assert bar.get_ylabel() == "RMSE [rad]" and ours.get_title("left") == "Loop default"
+    assert [label.get_text() for label in paper.get_xticklabels()] == ["the paper's\nT2"]
+    assert list(paper.get_xticks()) == [0]
+
+
+def test_numbers_on_dark_cells_are_white_and_on_bright_ones_black(results: list[ComparedRow]) -> None:
+    ours = rmse_map(results).axes[0]
+    ink = {text.get_text(): text.get_color() for text in ours.texts}
+    assert (ink["1e-05"], ink["0.00018"]) == ("w", "k")
+    assert ink["5e-05"] == "w", "dark as the middle of the logarithm is 1.2e-4"
+
+
+def test_chattering_shows_each_reference_beside_the_median(results: list[ComparedRow]) -> None:
+    uneven = [
+        dataclasses.replace(
+            r, repeated=Repeated.once(dataclasses.replace(r.simulation, metrics={"chattering": float(10.0 ** (k % 3))}))
+        )
+        for k, r in enumerate(results)
+    ]
+    (axes,) = chattering_bars(uneven, "Loop default").axes
+    bars = [(bar.get_width(), bar.get_y() + 0.5 * bar.get_height()) for bar in axes.patches]  # type: ignore[attr-defined]
+    assert bars == [pytest.approx((10.0, row)) for row in range(6)]
+    for row, line in enumerate(axes.lines):
+        np.testing.assert_allclose(np.asarray(line.get_data()), np.array([[1.0, 10.0, 100.0], [row] * 3]))
+    assert [bool(bar.get_hatch()) for bar in axes.patches] == [False, True, False, False, False, False]
+    assert axes.get_xscale() == "log" and axes.yaxis_inverted() and axes.get_title("left") == "Loop default"
+    assert "[N/s]" in axes.get_xlabel() and not any(line.get_visible() for line in axes.get_ygridlines())
+
+
+def test_panels_and_cells_of_many_rows_and_columns_are_large_enough_to_read_and_no_larger(
+    results: list[ComparedRow],
+) -> None:
+    rows = [dataclasses.replace(results[0], reference=f"r{k}", gains=f"g{k}") for k in range(12)]
+    for draw, least, most in ((angle_grid, (0.8, 0.6), (1.6, 1.3)), (rmse_map, (0.7, 0.25), (1.2, 0.45))):
+        made = draw(rows)
+        made.draw_without_rendering()
+        box = made.axes[0].get_window_extent().transformed(made.dpi_scale_trans.inverted())
+        count = 1 if draw is angle_grid else 12
+        assert least[0] < box.width / count < most[0] and least[1] < box.height / count < most[1], "in inches"

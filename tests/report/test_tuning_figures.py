@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
+import pytest
 
 from wristctl.control.smc import SMC
 from wristctl.report.tuning_figures import convergence, gain_history
@@ -30,3 +33,50 @@ def test_best_gains_change_only_where_the_objective_improves(search: Search) -> 
     (best,) = (line for line in panel.lines if line.get_label() == "best so far")
     gain, least = np.asarray(best.get_ydata()), np.minimum.accumulate(search.values.min(axis=1))
     np.testing.assert_array_equal(np.diff(gain) != 0.0, np.diff(least) != 0.0)
+
+
+def test_convergence_names_each_controller_with_its_objective_and_its_median(search: Search) -> None:
+    other = dataclasses.replace(search, controller="pid", objective=0.5)
+    made = convergence([search, other])
+    (axes,) = made.axes
+    assert [line.get_label() for line in axes.lines] == [
+        f"smc, best so far ({search.objective:.4g})", "pid, best so far (0.5)",
+        "smc, median of the swarm", "pid, median of the swarm",
+    ]  # fmt: skip
+    for line in axes.lines:
+        np.testing.assert_array_equal(line.get_xdata(), np.arange(1, 13))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("iteration", "objective [1]")
+    colours = [line.get_color() for line in axes.lines]
+    assert colours[:2] == colours[2:] and colours[0] != colours[1]
+
+
+def test_gain_history_shows_the_swarms_middle_and_its_80_in_100_within_the_search_box(search: Search) -> None:
+    made = gain_history(search, SMC.gains)
+    for at, (panel, gain) in enumerate(zip(made.axes, SMC.gains.values(), strict=True)):
+        (median,) = (line for line in panel.lines if line.get_label() == "median of the swarm")
+        np.testing.assert_allclose(np.asarray(median.get_ydata()), np.median(search.tried[:, :, at], axis=1))
+        (band,) = panel.collections
+        assert band.get_label() == "10-90 % of the swarm"
+        ends = np.percentile(search.tried[:, :, at], [10.0, 90.0], axis=1)
+        places = np.asarray(band.get_paths()[0].vertices)
+        for k in range(12):
+            own = places[places[:, 0] == k + 1, 1]
+            assert (own.min(), own.max()) == pytest.approx((ends[0, k], ends[1, k]))
+        low, high = panel.get_ylim()
+        assert low < gain.low < gain.high < high and low > 0.5 * gain.low and high < 2.0 * gain.high
+        assert panel.get_yscale() == "log"
+    assert [panel.get_xlabel() for panel in made.axes] == ["", "", "iteration"]
+    titles = [panel.get_title("left") for panel in made.axes]
+    assert titles == ["Gains of smc in their search boxes", "", ""]
+    ticks = made.axes[-1].get_xticks()
+    assert np.all(ticks == np.round(ticks)), "iterations are whole"
+
+
+def test_the_best_so_far_of_each_iteration_is_the_candidate_that_had_it(search: Search) -> None:
+    panels = gain_history(search, SMC.gains).axes
+    for at, panel in enumerate(panels):
+        (best,) = (line for line in panel.lines if line.get_label() == "best so far")
+        np.testing.assert_array_equal(best.get_xdata(), np.arange(1, 13))
+        for k, gain in enumerate(np.asarray(best.get_ydata())):
+            place = np.unravel_index(search.values[: k + 1].argmin(), search.values[: k + 1].shape)
+            assert gain == search.tried[(*place, at)]

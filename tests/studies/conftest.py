@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wristctl
 from wristctl.config.study import Study
+from wristctl.simulation.closed_loop import Repeated, Simulation
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.trajectory import Trajectory
 
 SMALL = (
     "seed=3", "gen-data.samples=40", "train={hidden: [4], activation: tanh, epochs: 3, workers: 1}",
@@ -31,3 +36,23 @@ def study() -> Study:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder for a whole module."""
     return tmp_path_factory.mktemp("face") / "results"
+
+
+def course(label: str, diverges: bool = False) -> Trajectory:
+    """An exponential approach to 30 deg, sampled every 10 ms for two seconds, on one segment."""
+    time = 0.01 * np.arange(200.0)
+    wanted = np.full(200, np.radians(30.0))
+    theta = np.where(time < 1.0, np.expm1(time), np.nan) if diverges else wanted * -np.expm1(-5.0 * time)
+    tip = np.column_stack([0.08 * np.cos(0.5 * theta), 0.08 * np.sin(0.5 * theta)])
+    own = theta, theta[:, None], np.gradient(theta, time), wanted, wanted, tip, tip
+    return Trajectory(label, time, *own, 0.1 * theta, 0.1 * theta, np.full((200, 2), [30.0, 2.0]))
+
+
+def repeated(label: str, rmse: Sequence[float] = (1e-3,), failed: int = 0, **metrics: float) -> Repeated:
+    """A loop done as often as there are RMSEs, the last `failed` of which diverged: every other metric is 1."""
+    every = {name: np.ones(len(rmse)) for name in METRICS} | {"rmse": np.array(rmse)}
+    every |= {name: np.full(len(rmse), value) for name, value in metrics.items()}
+    bad = np.arange(len(rmse)) >= len(rmse) - failed
+    one = course(label, bool(bad[0]))
+    first = Simulation(one, {name: float(values[0]) for name, values in every.items()}, bool(bad[0]))
+    return Repeated(first, every, bad, one.error[None])

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.report.style import BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title
+from wristctl.report.style import BLUE, DISTORTED, LIGHT, STRAIGHT, VERMILLION, figure, legend_below, title
 from wristctl.vision.camera import Image
 from wristctl.vision.charuco import BoardView, CameraCalibration
 from wristctl.vision.view import View
 
 _PARTS, _FINE = 12, 60
-_SEEN: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
-_STRAIGHT: dict[str, Any] = {"color": BLUE, "linewidth": 1.0}
 
 
 def reprojection(found: CameraCalibration, views: Sequence[BoardView]) -> Figure:
@@ -48,9 +45,9 @@ def lens(view: View) -> Figure:
     for k, (count, across) in enumerate(((_PARTS, height), (rows, width))):
         for at in np.linspace(0.0, (width, height)[k], count + 1):
             along = np.linspace(0.0, across, _FINE)
-            line = np.stack([np.full(_FINE, at), along][:: 1 - 2 * k], axis=-1)
+            line = np.column_stack([np.full(_FINE, at), along][:: 1 - 2 * k])
             straight = view.undistort(line)
-            for shown, style, label in ((line, _SEEN, "in the picture"), (straight, _STRAIGHT, "undistorted")):
+            for shown, style, label in ((line, DISTORTED, "in the picture"), (straight, STRAIGHT, "undistorted")):
                 axes.plot(*shown.T, **style, label=label if k + at == 0 else None)
     centre = view.camera_matrix[:2, 2]
     axes.plot(*centre, marker="+", color=VERMILLION, markersize=9.0, linestyle="", label="optical axis")

@@ -43,7 +43,7 @@ def angle_grid(results: Sequence[ComparedRow], heading: str = "", across: Across
         draw_desired(panel, [course])
         if result.simulation.failed:
             panel.text(0.98, 0.06, "diverged", transform=panel.transAxes, ha="right", fontsize=9.0)
-    within_half_a_move(axes[0, 0], [result.simulation.trajectory for result in results])
+    within_half_a_move(panel, [result.simulation.trajectory for result in results])  # all share one scale
     for panel, name in zip(axes[0], columns, strict=True):
         title(panel, fill(name, 16))
     for panel, name in zip(axes[:, -1], rows, strict=True):

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
-from wristctl.report.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend, logarithmic, title
+from wristctl.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    darkened,
+    figure,
+    legend,
+    logarithmic,
+    title,
+)
 
 ANGLES, ERRORS = "PuOr", "cividis"
 """Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright."""
@@ -32,7 +42,7 @@ def coverage(samples: pd.DataFrame) -> Figure:
         1e3 * samples["x"],
         c=np.degrees(samples["theta"]),
         s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
-        cmap=_darkened(ANGLES),
+        cmap=darkened(ANGLES),
         vmin=-bend,
         vmax=bend,
         linewidths=0.0,
@@ -133,11 +143,3 @@ def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, 
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
     title(axes, heading)
     return made, axes
-
-
-def _darkened(name: str) -> Colormap:
-    """A diverging map whose middle is not lost on white paper."""
-    colours = mpl.colormaps[name](np.linspace(0.0, 1.0, 256))
-    middle = 1.0 - 0.45 * np.exp(-((np.linspace(-1.0, 1.0, 256) / 0.35) ** 2))
-    colours[:, :3] *= middle[:, None]
-    return ListedColormap(colours)

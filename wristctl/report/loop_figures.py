@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,9 +11,11 @@ from matplotlib.figure import Figure
 from wristctl.arrays import Array
 from wristctl.report.style import (
     BLACK,
+    DOTTED,
     GREY,
     ORANGE,
     PURPLE,
+    THIN,
     WANTED,
     figure,
     legend,
@@ -31,8 +32,6 @@ _LAST = 20
 """Samples in the close-up of tensions."""
 _COLUMNS = 500
 """Parts of a long course of which each is drawn by its least and its largest value."""
-_OTHER: Any = {"color": BLACK, "linewidth": 0.7}
-_DOTS: Any = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
 
 
 def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
@@ -45,7 +44,7 @@ def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     for course in trajectories:
         axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
         if (seen := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, np.degrees(seen), label=f"{course.label} as seen", **_OTHER)
+            axes.plot(course.time, np.degrees(seen), label=f"{course.label} as seen", **THIN)
     draw_desired(axes, trajectories)
     within_half_a_move(axes, trajectories)
     axes.set(xlabel="time [s]", ylabel="bending angle [deg]")
@@ -64,7 +63,7 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
         error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
         axes.plot(course.time, error, label=label(course), **line(course.label))
         if not log and (seen := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **_OTHER)
+            axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **THIN)
     if log:
         logarithmic(axes.yaxis)
     else:
@@ -93,7 +92,7 @@ def tensions(trajectory: Trajectory) -> Figure:
             drawn = _envelope(time[part], tension[part])
             each.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
         for each, tension in zip(column, () if acting is None else acting.T, strict=False):
-            each.plot(*_envelope(time[part], tension[part]), label="acting", **_OTHER)
+            each.plot(*_envelope(time[part], tension[part]), label="acting", **THIN)
         wanted = {"color": GREY, "label": "wanted by the law"}
         given = {"color": BLACK, "label": "of the commanded tensions"}
         for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
@@ -145,7 +144,7 @@ def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     for course in trajectories:
         if not any(np.allclose(course.theta_ref, other, atol=1e-6) for other in drawn):
             drawn.append(course.theta_ref)
-            axes.plot(course.time, np.degrees(course.theta_ref), label="reference", **_DOTS)
+            axes.plot(course.time, np.degrees(course.theta_ref), label="reference", **DOTTED)
 
 
 def within_half_a_move(axes: Axes, trajectories: Sequence[Trajectory]) -> None:

@@ -61,7 +61,7 @@ def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
     """Which columns stand beside each other: the first everywhere, the others as far as `width` reaches."""
     blocks, used = [[0]], widths[0]
     for at in range(1, len(widths)):
-        if width is not None and used + 2 + widths[at] > width and len(blocks[-1]) > 1:
+        if width is not None and at > 1 and used + 2 + widths[at] > width:
             blocks.append([0])
             used = widths[0]
         blocks[-1].append(at)

@@ -8,9 +8,11 @@ from __future__ import annotations
 import zlib
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
@@ -39,6 +41,12 @@ _CONTROLLERS = {
 _OTHERS = (OLIVE, FOREST, ROSE)
 WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
 """Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own."""
+THIN: dict[str, Any] = {"color": BLACK, "linewidth": 0.7}
+"""Line style of what differs a little from a line beside it: seen, not so; acting, not commanded."""
+DOTTED: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
+SIMULATED: dict[str, Any] = {"linewidth": 1.0, "linestyle": ":"}
+DISTORTED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
+STRAIGHT: dict[str, Any] = {"color": BLUE, "linewidth": 1.0}
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
@@ -128,3 +136,11 @@ def line(label: str) -> dict[str, Any]:
     """Line style of "controller/gains": colour by controller, dashes by gains."""
     controller, _, gains = label.partition("/")
     return {"color": colour(controller), "linestyle": _DASHES.get(gains or "default", _OTHER_DASHES)}
+
+
+def darkened(name: str) -> Colormap:
+    """A diverging map whose middle is not lost on white paper."""
+    colours = mpl.colormaps[name](np.linspace(0.0, 1.0, 256))
+    middle = 1.0 - 0.45 * np.exp(-((np.linspace(-1.0, 1.0, 256) / 0.35) ** 2))
+    colours[:, :3] *= middle[:, None]
+    return ListedColormap(colours)

@@ -17,6 +17,7 @@ from wristctl.report.style import (
     LIGHT,
     ORANGE,
     PURPLE,
+    SIMULATED,
     WANTED,
     figure,
     legend_below,
@@ -29,7 +30,6 @@ DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 """In the paper's order."""
 
 _SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
-_SIMULATED: Any = {"linewidth": 1.0, "linestyle": ":"}
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _draw_simulated(panel: Axes, course: LoggedTrial, which: Literal[1, 2]) -> N
     """Angle (1) or error (2) in simulation, beside the first repetition alone."""
     if course.simulated is not None and course.repetition == 0:
         own: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
-        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | _SIMULATED)
+        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | SIMULATED)
 
 
 def _panels(courses: Sequence[LoggedTrial], **shared: Any) -> tuple[Figure, dict[str, Axes]]:

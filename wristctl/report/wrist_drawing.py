@@ -122,7 +122,7 @@ def _line(axes: Axes, points: Planar, **style: Any) -> None:
 
 
 def _fill(axes: Axes, outline: Planar, **style: Any) -> None:
-    axes.add_patch(Polygon(1e3 * np.stack([outline.imag, outline.real], axis=-1), **style))
+    axes.add_patch(Polygon(1e3 * np.column_stack([outline.imag, outline.real]), **style))
 
 
 def _frame(axes: Axes) -> None:

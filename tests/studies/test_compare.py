@@ -1,0 +1,179 @@
+"""What a comparison says of its rows: tables beside the paper, metrics with intervals, which figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wristctl
+from tests.studies.conftest import repeated
+from wristctl.comparison import combinations, step_cost
+from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.statistics import spread
+from wristctl.comparison.step_cost import StepTime
+from wristctl.config.errors import UserError
+from wristctl.simulation.metrics import METRICS
+from wristctl.studies.compare import COMPARE, Compared
+from wristctl.studies.inputs import Inputs
+
+MOVE, STEP = "minimum jerk 1 s 30 deg", "step 30 deg"
+ROWS = "rows: [{controller: pid, gains: printed}, {controller: feedforward}]"
+Compare = Callable[..., Compared]
+
+
+def row(loop: str, reference: str, label: str, inverse: str = "exact", **how: Any) -> ComparedRow:
+    controller, gains = label.split("/")
+    return ComparedRow(loop, reference, inverse, controller, gains, repeated(label, **how))
+
+
+def both(loop: str, reference: str, **how: Any) -> list[ComparedRow]:
+    return [row(loop, reference, label, **how) for label in ("pid/printed", "feedforward/default")]
+
+
+@pytest.fixture
+def compare(monkeypatch: pytest.MonkeyPatch) -> Compare:
+    """A comparison that came out with these rows; a control step takes 1, 2, ... us, at worst ten times as long."""
+
+    def compared(rows: list[ComparedRow], loops: str = "{fast: {}}", inverses: str = "[exact]") -> Compared:
+        monkeypatch.setattr(combinations, "compare", lambda *_: rows)
+        times = iter(range(1, 10))
+        monkeypatch.setattr(step_cost, "step_time", lambda *_: StepTime((at := float(next(times))), 10.0 * at))
+        return wristctl.compare(wristctl.load_study(None, f"compare={{loops: {loops}, inverses: {inverses}, {ROWS}}}"))
+
+    return compared
+
+
+def test_each_loop_and_reference_has_a_table_with_a_row_for_each_controller(compare: Compare) -> None:
+    rows = [each for loop in ("fast", "slow") for reference in (STEP, MOVE) for each in both(loop, reference)]
+    done = compare(rows, "{fast: {}, slow: {}}")
+    titles = [f"Loop {loop}, {reference}" for loop in ("fast", "slow") for reference in (STEP, MOVE)]
+    assert [table.title for table in done.tables] == [*titles, "Control step of one wrist on this machine"]
+    assert [[line[:2] for line in table.rows] for table in done.tables[:-1]] == [
+        [("pid/printed", "exact"), ("feedforward/default", "exact")]
+    ] * 4
+    assert done.tables[-1].rows == [("pid/printed", 1.0, 10.0), ("feedforward/default", 2.0, 20.0)]
+    assert done.tables[-1].columns == ("controller", "median [us]", "p99 [us]")
+
+
+def test_a_row_shows_every_metric_that_has_a_heading_below_it_and_the_papers_numbers(compare: Compare) -> None:
+    known = {name: 0.1 * k for k, name in enumerate(METRICS) if name != "rmse"} | {"rmse": 1e-3}
+    others: dict[str, Any] = {name: value for name, value in known.items() if name != "rmse"}
+    (table, _) = compare([row("fast", STEP, "pid/printed", **others), row("fast", STEP, "feedforward/default")]).tables
+    first = dict(zip(table.columns, table.rows[0], strict=True))
+    headed = {metric.heading: name for name, metric in METRICS.items() if metric.heading}
+    assert list(table.columns[:4]) == ["controller", "inverse", METRICS["rmse"].heading, METRICS["settling"].heading]
+    assert set(headed) == set(table.columns) - {"controller", "inverse", "paper's", "verdict"}
+    for heading, name in headed.items():
+        assert first[heading] == known[name]
+    assert first["paper's"] == "0.0015 / 3 / 0.00248" and first["verdict"] == "not reproduced"
+    assert table.rows[1][-2:] == ("", ""), "the paper has none"
+
+
+def test_a_row_as_good_as_the_papers_is_reproduced(compare: Compare) -> None:
+    done = compare([row("fast", STEP, "pid/printed", rmse=[1.5e-3], settling=3.0, steady_state=2e-3)])
+    assert done.tables[0].rows[0][-1] == "reproduced"
+
+
+@pytest.mark.parametrize(("failed", "said"), [(0, "never"), (1, "diverged")])
+def test_what_never_settles_says_so_or_that_it_diverged(compare: Compare, failed: int, said: str) -> None:
+    (table, _) = compare([row("fast", STEP, "pid/printed", failed=failed, settling=np.nan)]).tables
+    assert dict(zip(table.columns, table.rows[0], strict=True))[METRICS["settling"].heading] == said
+
+
+def test_of_repetitions_medians_are_shown_with_the_interval_of_the_rmse(compare: Compare) -> None:
+    rmse = [float(k) for k in range(1, 10)]
+    done = compare(both("fast", STEP, rmse=rmse, settling=2.0))
+    table = done.tables[0]
+    assert table.title == f"Loop fast, {STEP}, medians of 9 repetitions"
+    at = list(table.columns).index("RMSE's 95 % low")
+    assert table.columns[at : at + 4] == ("RMSE's 95 % low", "high", "paper's", "verdict")
+    expected = spread(np.array(rmse))
+    assert table.rows[0][at : at + 2] == (expected.low, expected.high) and table.rows[0][2:4] == (5.0, 2.0)
+    metric = done.findings.metrics[f"rmse_fast_pid/printed_exact_{STEP.replace(' ', '-')}"]
+    assert (metric["value"], metric["n"], metric["interval"]) == (5.0, 9, (expected.low, expected.high))
+    assert (metric["unit"], metric["better"]) == ("rad", "lower")
+
+
+def test_one_loop_is_drawn_over_its_references(compare: Compare) -> None:
+    rows = [*both("fast", STEP), *both("fast", MOVE), *both("fast", MOVE, inverse="none")]
+    done = compare(rows, inverses="[exact, none]")
+    drawn = ["angles", "rmse", "chattering", "error-pid", "error-log-pid"]
+    assert list(done.figures) == [f"{name}-fast" for name in drawn]
+    angles = done.figures["angles-fast"]
+    assert angles.get_suptitle() == "loop fast" and len(angles.axes) == 2 * 2, "the first inverse alone"
+    names = [label.get_text() for label in done.figures["rmse-fast"].axes[0].get_yticklabels()]
+    assert names == [f"{label}, {way}" for way in ("exact", "none") for label in ("pid/printed", "feedforward/default")]
+    plain, log = (done.figures[name].axes[0] for name in ("error-pid-fast", "error-log-pid-fast"))
+    assert plain.get_title("left") == f"pid, loop fast, {MOVE}", "a move sooner than a step"
+    assert (plain.get_yscale(), log.get_yscale()) == ("linear", "log")
+    assert [line.get_label() for line in log.lines] == ["pid/printed"]
+
+
+def test_where_all_references_are_steps_the_first_of_them_is_drawn(compare: Compare) -> None:
+    done = compare([*both("fast", STEP), *both("fast", "step 5 deg")])
+    assert done.figures["error-pid-fast"].axes[0].get_title("left") == f"pid, loop fast, {STEP}"
+
+
+def test_several_loops_are_drawn_over_each_other_and_of_many_only_the_first_on_its_own(compare: Compare) -> None:
+    for count in (3, 4):
+        loops = [f"l{k}" for k in range(count)]
+        rows = [each for loop in loops for reference in (STEP, MOVE) for each in both(loop, reference)]
+        done = compare(rows, f"{{{', '.join(f'{loop}: {{}}' for loop in loops)}}}")
+        alone = [name.removeprefix("angles-") for name in done.figures if name.startswith("angles-")]
+        assert alone == (loops if count == 3 else ["l0"])
+        assert list(done.figures)[:3] == ["robustness-1", "robustness-2", "angles"]
+        columns = [label.get_text() for label in done.figures["robustness-1"].axes[0].get_xticklabels()]
+        assert columns == loops
+        assert done.figures["robustness-1"].axes[0].get_title("left") == STEP
+        assert done.figures["angles"].get_suptitle() == MOVE and len(done.figures["angles"].axes) == 2 * count
+
+
+def test_a_plan_counts_rollouts_and_names_the_row_that_cannot_be() -> None:
+    two = "horizon: 2.5, loops: {a: {}, b: {}}, inverses: [none]"
+    study = wristctl.load_study(None, f"compare={{{two}, {ROWS}}}")
+    references = len(study.compare.references)
+    assert COMPARE.plan(study, Inputs()) == f"{2 * 2 * references} rollouts of 2.5 s"
+    wrong = wristctl.load_study(None, "compare.rows=[{controller: feedforward}, {controller: pid, gains: tuned}]")
+    with pytest.raises(UserError) as caught:
+        COMPARE.plan(wrong, Inputs())
+    assert caught.value.what == "no tuned gains of pid" and "compare.rows.1.gains" in str(caught.value)
+
+
+def test_gains_that_a_search_of_the_comparison_itself_finds_are_not_asked_for() -> None:
+    tuning = (
+        "inverses: [none], tuning: {controllers: [pid], candidates: 4, iterations: 3, "
+        "loops: {slow: {plant_segments: 2}}, scenarios: [{loop: slow, reference: {kind: step, angle_deg: 7.0}}]}"
+    )
+    study, other = (
+        wristctl.load_study(None, f"compare={{rows: [{{controller: {name}, gains: tuned}}], {tuning}}}")
+        for name in ("pid", "smc")
+    )
+    planned = COMPARE.plan(study, Inputs()).splitlines()
+    assert planned[0].startswith("a search first: ") and planned[1].endswith("rollouts of 5 s")
+    with pytest.raises(UserError, match="no tuned gains of smc"):
+        COMPARE.plan(other, Inputs())
+
+
+def test_units_of_the_table_are_those_of_the_metrics(compare: Compare, tmp_path: Path) -> None:
+    rmse = [float(k) for k in range(1, 10)]
+    rows = [row("fast", STEP, "pid/printed", rmse=rmse)]
+    done = compare(rows)
+    with pytest.MonkeyPatch.context() as during:
+        during.setattr(combinations, "compare", lambda *_: rows)
+        during.setattr("wristctl.studies.compare._draw", lambda *_: None)
+        kept = wristctl.compare(done.study, out=tmp_path)
+    assert kept.run is not None
+    columns = {each["name"]: each for each in _columns(kept.run)}
+    assert columns["rmse"]["unit"] == columns["rmse_low"]["unit"] == columns["rmse_high"]["unit"] == "rad"
+    assert columns["paper_settling"]["unit"] == "s" and columns["paper_rmse"]["unit"] == "rad"
+    repetitions = kept.run.data("repetitions")
+    assert list(repetitions["rmse"]) == rmse
+
+
+def _columns(run: wristctl.Run) -> list[dict[str, Any]]:
+    found = next(each for each in run.manifest.outputs if each.path == "data/comparison.csv")
+    return [each.model_dump() for each in found.columns]
