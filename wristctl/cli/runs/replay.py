@@ -40,19 +40,19 @@ def replay(
     run = open_run(ref, out)
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
-    blocked = changed_inputs(run)
-    if any("gone" in cause or "hash" in cause or "missing" in cause for cause in blocked):
-        return _conclude(run, None, [], blocked, as_json)
+    changed = changed_inputs(run)
+    if changed:
+        return _conclude(run, None, [], changed, as_json)
     scratch = Path(tempfile.mkdtemp(prefix="wristctl-replay-"))
     code = _again(run, scratch, override or [])
     ended = list_runs(scratch)
     if code or not ended:
         why = causes(run, ended[0]) if ended else []
         said = f"the repetition ended with exit code {code} ({scratch})"
-        return _conclude(run, scratch, [], [said, *blocked, *why], as_json)
+        return _conclude(run, scratch, [], [said, *why], as_json)
     found = verdicts(run, ended[0])
     alike = all(each.verdict in _SAME for each in found)
-    _conclude(run, scratch, found, [] if alike else [*blocked, *causes(run, ended[0])], as_json)
+    _conclude(run, scratch, found, [] if alike else causes(run, ended[0]), as_json)
 
 
 def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
