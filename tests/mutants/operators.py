@@ -77,6 +77,9 @@ _PACES = (
 )
 """Beginnings of names of constants that only decide how fast something goes or how long it is kept."""
 
+_SIZES = ("_WIDTH", "_HEIGHT", "_GAP", "_ROW", "_LINE", "_SMOOTH")
+"""Beginnings of names of constants that are sizes in a picture, or how finely a curve is drawn."""
+
 _OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.FloorDiv: ("//", "%"),
     ast.Mod: ("%", "//"), ast.Pow: ("**", "*"), ast.BitAnd: ("&", "|"), ast.BitOr: ("|", "&"),
@@ -149,8 +152,8 @@ class _Finder:
             return called.startswith(("log.", "print", "warnings.", "session.log")) or called.endswith(".console")
         if isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names = [each.id for each in targets if isinstance(each, ast.Name)]
-            return any(name.startswith(_PACES) or name == "__all__" for name in names)
+            names = [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+            return any(name.startswith((*_PACES, *_SIZES)) or name == "__all__" for name in names)
         return isinstance(node, ast.Call) and ast.unparse(node.func) == "UserError"
 
     def _drawn(self, parent: ast.Call | ast.keyword) -> bool:
