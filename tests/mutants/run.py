@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 KNOWN = Path(__file__).with_name("known.yaml")
 LEAST = 0.9
 """Share of drawn changes that must be noticed."""
-LIMIT = 200
+LIMIT = 100
 """Seconds after which one test is taken to hang: that is noticed too."""
 
 NEIGHBOURS = {
