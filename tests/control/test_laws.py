@@ -179,3 +179,16 @@ def test_a_preset_that_leaves_a_gain_out_or_gives_values_without_names_is_refuse
     for wrong in ({"Kp": 1.0}, (1.0, 2.0, 3.0)):
         with pytest.raises(ValueError, match="preset default of pid must give Kp, Ki, Kd by name"):
             replace(controller("pid"), presets={"default": wrong})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_law_remembers_as_many_numbers_as_it_says(name: str) -> None:
+    """A few ticks off the reference change every one of them."""
+    law = controller(name)
+    if not law.memory:
+        return
+    gains = tuple(law.values(next(iter(law.presets.values()))))
+    memory = np.zeros(law.memory)
+    for tick in range(5):
+        torque(name, gains, memory, theta=0.3 - 0.01 * tick, rate=-0.2, theta_ref=0.1, rate_ref=0.4)
+    assert (memory != 0.0).all()

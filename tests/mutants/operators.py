@@ -133,6 +133,8 @@ class _Finder:
     def _exempt(self, parent: ast.AST, node: ast.AST) -> bool:
         if isinstance(node, ast.JoinedStr | ast.Raise | ast.Import | ast.ImportFrom | ast.Assert):
             return True
+        if isinstance(node, ast.BinOp) and isinstance(node.left, ast.Constant) and node.left.value == 0.0:
+            return isinstance(node.op, ast.Mult)  # 0.0 * x is a zero with x's lanes, whatever x is
         if isinstance(parent, ast.AnnAssign | ast.arg) and node is parent.annotation:
             return True
         if isinstance(parent, ast.FunctionDef) and (node is parent.returns or node in parent.decorator_list):

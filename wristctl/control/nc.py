@@ -22,7 +22,7 @@ _SCALES = np.array([0.5, 2.0, 0.5, 2.0, 10.0])
 def _first_layer() -> tuple[tuple[float, ...], tuple[float, ...]]:
     rng = np.random.default_rng(5)
     weights = rng.normal(0.0, 0.7, (UNITS, INPUTS)) / _SCALES
-    return tuple(map(float, weights.reshape(-1))), tuple(map(float, rng.uniform(-1.5, 1.5, UNITS)))
+    return tuple(map(float, weights.ravel())), tuple(map(float, rng.uniform(-1.5, 1.5, UNITS)))
 
 
 _FIRST, _OFFSETS = _first_layer()
