@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import wristctl
 from wristctl.config.study import Study
+from wristctl.records import LiveRun, Run
 from wristctl.simulation.closed_loop import Repeated, Simulation
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.studies.counting import watched
+from wristctl.studies.findings import Findings
+from wristctl.studies.inputs import Given, Inputs
+from wristctl.studies.session import Session
+from wristctl.studies.unattended import Unattended
 
 SMALL = (
     "seed=3", "gen-data.samples=40", "train={hidden: [4], activation: tanh, epochs: 3, workers: 1}",
@@ -56,3 +63,19 @@ def repeated(label: str, rmse: Sequence[float] = (1e-3,), failed: int = 0, **met
     one = course(label, bool(bad[0]))
     first = Simulation(one, {name: float(values[0]) for name, values in every.items()}, bool(bad[0]))
     return Repeated(first, every, bad, one.error[None])
+
+
+def session(study: Study, run: LiveRun | None = None, inputs: Mapping[str, Given] | None = None) -> Session:
+    """A session in which nobody watches."""
+    return Session(study, Inputs(inputs), Findings(study.seed, run), watched(None), Unattended())
+
+
+def columns_of(run: Run, file: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each column of a table, as the manifest has them."""
+    found = next(each for each in run.manifest.outputs if each.path == file)
+    return {each.name: (each.unit, each.meaning) for each in found.columns}
+
+
+def known_of(findings: Findings, *names: str) -> list[tuple[Any, ...]]:
+    """Unit, better direction and n of these metrics."""
+    return [tuple(findings.metrics[name][each] for each in ("unit", "better", "n")) for name in names]

@@ -1,0 +1,151 @@
+"""The claims with their verdicts, sorted into tables; which runs show them, and what a plan asks for."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+import wristctl
+from tests.studies.conftest import columns_of, known_of, session
+from wristctl.config.errors import UserError
+from wristctl.config.loop import LOOPS
+from wristctl.records import Run, list_runs, start_run
+from wristctl.studies import audit as module
+from wristctl.studies.audit import AUDIT, Audited
+from wristctl.studies.inputs import Inputs
+
+CLAIMS = (
+    "audit={horizon: 1.5, claims: ["
+    "{id: T, says: a sign is wrong, evidence: text, verdict: contradictory, reason: by hand}, "
+    "{id: S, says: a period, evidence: settings, value: 0.005, unit: s, reason: set}, "
+    "{id: H, says: a push, evidence: hardware, value: 2.5, reason: needs a rig}, "
+    "{id: C, says: an error, evidence: comparison, controller: smc, gains: printed, metric: rmse, value: 0.5}, "
+    "{id: U, says: another, evidence: comparison, controller: mpc, gains: printed, metric: rmse, value: 0.5}, "
+    "{id: R, says: a fit, evidence: table1, metric: r2, value: 0.5, unit: '1'}]}"
+)  # fmt: skip
+PLAIN = "audit.claims=[{id: T, says: a sign, evidence: text, verdict: contradictory, reason: by hand}]"
+
+
+class Comparison:
+    """On each loop the paper's controller has an RMSE from 0.4 to 0.6."""
+
+    kind = "compare"
+
+    def __init__(self, made: Any) -> None:
+        self.run = None if made.findings.run is None else Run(made.findings.run.path)
+
+    def frame(self) -> pd.DataFrame:
+        columns = {"controller": "smc", "gains": "printed", "reference": ["step", "1 s", "2 s"]}
+        return pd.DataFrame({**columns, "rmse": [9.0, 0.4, 0.6]})
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The sessions of the comparisons that were made."""
+    found: list[Any] = []
+
+    def compare(made: Any) -> Comparison:
+        found.append(made)
+        return Comparison(made)
+
+    monkeypatch.setattr(module, "compare", compare)
+    return found
+
+
+def training(tmp_path: Path, **metrics: float) -> Run:
+    with start_run("train", wristctl.load_study(None), "", tmp_path) as live:
+        for name, value in metrics.items():
+            live.metric(name, value, interval=(0.375, 0.625), n=5)
+    return Run(live.path)
+
+
+def audit(*settings: str, run: Any = None, **inputs: Any) -> Audited:
+    return AUDIT.perform(session(wristctl.load_study(None, "seed=9", *settings), run, inputs))
+
+
+def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: Path, asked: list[Any]) -> None:
+    table1 = training(tmp_path, r2=0.5)
+    done = audit(CLAIMS, table1=table1)
+    claims, why, still, verdicts, evidence = done.tables
+    assert claims.columns == ("claim", "the paper says", "paper", "ours", "unit", "verdict", "shown by")
+    loops = ", ".join(LOOPS)
+    assert claims.rows == [
+        ("T", "a sign is wrong", "", "", "", "contradictory", ""),
+        ("S", "a period", "0.005", "", "s", "taken over", ""),
+        ("H", "a push", "2.5", "", "", "open", ""),
+        ("C", "an error", "0.5", "0.4 to 0.6", "", "reproduced", loops),
+        ("U", "another", "0.5", "", "", "open", ""),
+        ("R", "a fit", "0.5", "0.38 to 0.62", "1", "reproduced", "table1"),
+    ]
+    assert (why.title, why.columns) == ("Why", ("claim", "verdict", "reason"))
+    assert [row[:2] for row in why.rows] == [("T", "contradictory"), ("C", "reproduced"), ("R", "reproduced")]
+    assert why.rows[0][2] == "by hand"
+    assert (still.title, still.columns) == ("Still open", ("claim", "what would decide it"))
+    assert still.rows == [("H", "needs a rig"), ("U", "no controller 'mpc' to run")]
+    assert (verdicts.title, verdicts.columns) == ("Verdicts", ("verdict", "claims"))
+    assert verdicts.rows == [("contradictory", 1), ("open", 2), ("reproduced", 2), ("taken over", 1)]
+    assert (evidence.title, evidence.columns) == ("Runs that show it", ("shown by", "run"))
+    assert evidence.rows == [*((loop, "in memory") for loop in LOOPS), ("table1", table1.id)]
+    assert list(done.metrics.items()) == [("contradictory", 1), ("open", 2), ("reproduced", 2), ("taken_over", 1)]
+    assert known_of(done.findings, "taken_over") == [("", "", 6)]
+    assert done.findings.metrics["taken_over"]["meaning"] == "claims that are taken over"
+    assert list(done.comparisons) == list(LOOPS)
+    frame = done.frame().set_index("claim")
+    assert (frame.loc["C", "ours_low"], frame.loc["C", "ours_high"]) == (0.4, 0.6)
+
+
+def test_each_loop_is_compared_once_with_what_claims_ask_for(asked: list[Any]) -> None:
+    audit(CLAIMS)
+    assert [list(each.study.compare.loops) for each in asked] == [[loop] for loop in LOOPS]
+    for each in asked:
+        assert [(row.controller, row.gains) for row in each.study.compare.rows] == [("smc", "printed")]
+        assert each.study.compare.horizon == 1.5 and each.findings.run is None and not each.inputs
+    first, second, *_ = asked
+    assert first.findings is not second.findings and first.findings.stream("a") == session(first.study).findings.stream(
+        "a"
+    )
+
+
+def test_where_no_claim_asks_for_a_comparison_none_is_made(asked: list[Any]) -> None:
+    done = audit(PLAIN)
+    assert not asked and done.comparisons == {} and math.isnan(done.frame()["ours_low"][0])
+
+
+def test_comparisons_of_a_recorded_audit_are_runs_beside_it(tmp_path: Path, asked: list[Any]) -> None:
+    with start_run("audit", wristctl.load_study(None), "", tmp_path) as live:
+        done = audit(CLAIMS, run=live)
+    run = Run(live.path)
+    beside = [each for each in list_runs(tmp_path) if each.kind == "compare"]
+    assert sorted(each.manifest.label for each in beside) == sorted(f"audit-{loop}" for loop in LOOPS)
+    assert {each.config.compare.horizon for each in beside} == {1.5}
+    shown = json.loads(run.file("evidence.json").read_text())
+    assert shown == {loop: each.run.id for loop, each in done.comparisons.items() if each.run is not None}
+    assert len(shown) == len(LOOPS)
+    hashed = {each.path: each.volatile for each in run.manifest.outputs}
+    assert hashed["evidence.json"] and not hashed["data/claims.csv"]
+    assert columns_of(run, "data/claims.csv")["ours_high"] == ("", "largest of ours")
+    assert columns_of(run, "data/claims.csv")["ours_low"][1] == "least of ours"
+
+
+def test_a_plan_says_which_trainings_are_there(tmp_path: Path) -> None:
+    study = wristctl.load_study(None, CLAIMS)
+    begin = f"6 claims; one comparison on each of the loops {', '.join(LOOPS)}"
+    assert AUDIT.plan(study, Inputs()) == f"{begin}\ntable1: open, for want of a run"
+    run = training(tmp_path, r2=0.5)
+    assert AUDIT.plan(study, Inputs({"table1": run})) == f"{begin}\ntable1: {run.id}"
+    with pytest.raises(UserError, match="no claims to audit"):
+        AUDIT.plan(wristctl.load_study(None), Inputs())
+    lacking = training(tmp_path, rmse=0.5)
+    with pytest.raises(UserError) as caught:
+        AUDIT.plan(study, Inputs({"table1": lacking}))
+    assert caught.value.what == "claim R needs the metric 'r2', which this run does not have"
+    assert caught.value.where == str(lacking.path)
+    assert caught.value.fix == "give --table1 a run of `wristctl train experiments/table1.yaml`"
+    assert [(need.leaf, need.kind, need.optional) for need in AUDIT.needs] == [
+        ("table1", "train", True), ("selection", "train", True),
+    ]  # fmt: skip
