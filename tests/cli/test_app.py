@@ -19,6 +19,7 @@ from tests.cli.conftest import Call, Command
 from wristctl.cli import app, command
 from wristctl.cli.hw_calibrate import COMMANDS as CALIBRATIONS
 from wristctl.records import Run
+from wristctl.studies.perform import perform
 
 
 def _commands() -> Iterator[tuple[str, Any]]:
@@ -93,7 +94,7 @@ def test_an_interruption_in_a_destructor_is_not_told_and_anything_else_is(
     monkeypatch.setattr(sys, "__unraisablehook__", told.append)
     call("--version")
     for kind in (KeyboardInterrupt, ValueError):
-        sys.unraisablehook(SimpleNamespace(exc_type=kind))  # type: ignore[arg-type]
+        sys.unraisablehook(SimpleNamespace(exc_type=kind))
     assert [each.exc_type for each in told] == [ValueError]
 
 
@@ -111,7 +112,7 @@ def test_a_run_is_labelled_by_the_last_study_file(
 
 
 def test_quiet_and_verbose_reach_the_messages_and_the_operator(probe: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen, perform = [], command.perform
+    seen: list[Any] = []
 
     def watched(prepared: Any, run: Any, show: Any, operator: Any) -> Any:
         seen.append((operator.quiet, operator.flags, operator.console.stderr))
