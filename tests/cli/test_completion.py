@@ -6,9 +6,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from wristctl.cli.completion import controllers, run_ids, study_files
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.study import Study
 from wristctl.records import start_run
 
@@ -62,3 +65,31 @@ def test_study_files_controllers_and_commands_are_completed(folder: Path) -> Non
     assert _completed(folder, "compare experiments/q") == ["experiments/quick.yaml"]
     assert _completed(folder, "simulate --controller sm") == ["smc", "smc-tracking"]
     assert _completed(folder, "runs rep") == ["replay", "report"]
+
+
+def test_runs_are_the_newest_first_and_kinds_in_order(folder: Path) -> None:
+    for name in ("20200101T000000Z-tune-x", "20990101T000000Z-train-x", "no-run-tune-"):
+        (folder / "results" / name).mkdir()
+        if "Z" in name:
+            (folder / "results" / name / "run.json").touch()
+    context = SimpleNamespace(params={"out": folder / "results"})
+    found = run_ids(context, "")  # type: ignore[arg-type]
+    assert [name[:4] for name in (found[0], found[2])] == ["2099", "2020"] and "-gen-data-a-" in found[1]
+    assert found[3:] == ["latest:gen-data", "latest:train", "latest:tune"]
+    context.params["out"] = folder / "absent"
+    assert run_ids(context, "") == []  # type: ignore[arg-type]
+
+
+def test_folders_and_files_below_what_is_typed_are_in_order(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    for name in ("z.yml", "a.yaml", "experiments/more/b.yaml", "exp.txt"):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).touch()
+    listed = [f"experiments/{name}" for name in ("more/", "paper.yaml", "quick.yaml")]
+    assert study_files("") == study_files("experiments/") == listed
+    assert study_files("ex") == ["experiments/"] and study_files("z") == ["z.yml"]
+    assert study_files("experiments/more") == ["experiments/more/"] and study_files("absent/") == []
+
+
+def test_controllers_are_in_order() -> None:
+    assert controllers("") == sorted(CONTROLLERS) and controllers("no such") == []

@@ -69,3 +69,11 @@ def test_a_run_is_drawn_again_until_it_has_ended(call: Call, asked: list[Any], m
     monkeypatch.setattr("wristctl.cli.hw_watch.time.sleep", waited.append)
     assert call("hw", "watch", str(run.path), "--every", "0.2")[0] == 0
     assert len(asked) == 3 and waited == [0.2, 0.2], "once more after its end, and then no pause"
+
+
+@pytest.mark.parametrize(("option", "least", "less"), [("--last", "0.5", "0.45"), ("--every", "0.1", "0.09")])
+def test_a_picture_shows_half_a_second_at_least_at_most_ten_times_a_second(
+    call: Call, asked: list[Any], option: str, least: str, less: str
+) -> None:
+    performed("a")
+    assert call("hw", "watch", option, least)[0] == 0 and call("hw", "watch", option, less)[0] == 2

@@ -109,3 +109,64 @@ def test_require_refuses_wrong_kind_bad_state_and_changed_files(make: Make, resu
     failed = list_runs(results)[-1]
     with pytest.raises(UserError, match="run is failed, not ok"):
         require(failed.id, "train", results)
+
+
+def _named(run: Run, stamp: str, kind: str = "gen-data", damaged: bool = False) -> str:
+    """Gives the run's directory another name and date; returns the name."""
+    name = f"{stamp}-{kind}-x"
+    run.path.rename(run.path.with_name(name))
+    if damaged:
+        file = run.path.with_name(name) / "run.json"
+        file.write_bytes(file.read_bytes()[:-9])
+    return name
+
+
+def test_a_damaged_run_is_the_latest_where_it_is_newer_and_of_that_kind(make: Make, results: Path) -> None:
+    good = _named(make(), "20260102T000000Z")
+    _named(make(), "20260101T000000Z", damaged=True)
+    _named(make(), "20260103T000000Z", "tune", damaged=True)
+    unsealed = _named(make(), "20260104T000000Z", damaged=True)
+    (results / unsealed / "SHA256SUMS").unlink()
+    assert open_run("latest:gen-data", results).id == good, "older, of another kind, or never sealed"
+    damaged = _named(make(), "20260105T000000Z", damaged=True)
+    assert open_run("latest:gen-data", results).id == damaged
+    with pytest.raises(UserError, match="hash does not match"):
+        require("latest:gen-data", "gen-data", results)
+
+
+def test_the_only_run_of_a_kind_is_the_latest_though_it_is_damaged(make: Make, results: Path) -> None:
+    damaged = _named(make(), "20260101T000000Z", damaged=True)
+    assert open_run("latest:gen-data", results).id == damaged
+
+
+def test_of_a_damaged_run_of_the_same_second_it_is_told(make: Make, results: Path) -> None:
+    good = make()
+    stamp = good.id.partition("-")[0]
+    good.path.rename(results / f"{stamp}-gen-data-y")
+    assert open_run("latest:gen-data", results).id == f"{stamp}-gen-data-y"
+    damaged = _named(make(), stamp, damaged=True)
+    assert open_run("latest:gen-data", results).id == damaged
+
+
+def test_in_an_empty_folder_nothing_is_meant_and_of_many_three_are_named(make: Make, results: Path) -> None:
+    with pytest.raises(UserError, match=r"no such run - x in .* - fix: name a path, or the results folder with"):
+        open_run("x", results)
+    ids = [_named(make(), f"2026010{day}T000000Z") for day in range(1, 5)]
+    with pytest.raises(UserError) as caught:
+        open_run("2026", results)
+    assert str(caught.value) == f"4 runs begin like this - 2026 - fix: write more of it: {', '.join(ids[:3])}"
+    with pytest.raises(UserError, match=f"no such run - .* - fix: did you mean '{ids[0]}'"):
+        open_run(f"{ids[0]}y", results)
+
+
+def test_what_has_no_latest_run_is_made_or_named_rightly(make: Make, results: Path) -> None:
+    with pytest.raises(UserError, match="fix: run `wristctl train` first"):
+        open_run("latest:train", results)
+    make()
+    with pytest.raises(UserError, match=r"no gen-dta run that ended ok - latest:gen-dta in .* mean 'gen-data'"):
+        open_run("latest:gen-dta", results)
+
+
+def test_any_kind_will_do_where_none_is_asked_for(make: Make, results: Path) -> None:
+    run = make()
+    assert require(run.id, None, results).id == run.id

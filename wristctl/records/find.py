@@ -34,17 +34,18 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     runs = {run.id: run for run in list_runs(results)}
     if path.name in runs:
         return _readable(runs[path.name].path)
-    matches = [run for run in runs.values() if run.id.startswith(path.name)]
-    if len(matches) == 1:
-        return _readable(matches[0].path)
-    if matches:
-        raise UserError(
-            f"{len(matches)} runs begin like this",
-            str(ref),
-            f"write more of it: {', '.join(run.id for run in matches[:3])}",
-        )
-    fix = meant(path.name, runs) if len(runs) > 0 else ("name a path, or the results folder with ", OUT)
-    raise UserError("no such run", f"{ref} in {results}", fix)
+    match [run for run in runs.values() if run.id.startswith(path.name)]:
+        case []:
+            fix = meant(path.name, runs) if runs else ("name a path, or the results folder with ", OUT)
+            raise UserError("no such run", f"{ref} in {results}", fix)
+        case [one]:
+            return _readable(one.path)
+        case several:
+            raise UserError(
+                f"{len(several)} runs begin like this",
+                str(ref),
+                f"write more of it: {', '.join(run.id for run in several[:3])}",
+            )
 
 
 def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:

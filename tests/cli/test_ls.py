@@ -1,0 +1,71 @@
+"""The listing of `wristctl runs ls`: its columns, and which runs it shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import Run, start_run
+from wristctl.records.tags import change_tags
+
+
+def _made(kind: str, label: str, **metrics: float) -> Run:
+    with start_run(kind, Study(), label) as live:
+        for name, value in metrics.items():
+            live.metric(name, value)
+    return Run(live.path)
+
+
+@pytest.fixture
+def runs(call: Call) -> list[Run]:
+    """Three runs in results/, oldest first."""
+    return [_made("tune", "a", rmse=2.0, bias=5.0), _made("train", "b", rmse=1.0), _made("tune", "c", rmse=3.0)]
+
+
+def _rows(out: str) -> list[list[str]]:
+    head, _, *rows = out.splitlines()
+    return [head.replace("wall [s]", "wall").split(), *(row.split() for row in rows)]
+
+
+def test_columns_are_those_that_hold_something_and_those_asked_for(call: Call, runs: list[Run]) -> None:
+    plain = ["id", "kind", "state", "wall"]
+    rows = _rows(call("runs", "ls")[1])
+    assert rows[0] == plain and [row[:3] for row in rows[1:]] == [[run.id, run.kind, "ok"] for run in runs]
+    assert "wall [s]" in call("runs", "ls")[1] and all(0.0 < float(row[3]) < 60.0 for row in rows[1:])
+    assert _rows(call("runs", "ls", "--where", "rmse<9", "--where", "bias>1")[1])[0] == [*plain, "bias", "rmse"]
+    rows = _rows(call("runs", "ls", "--sort", "rmse", "--reverse")[1])
+    assert rows[0] == [*plain, "rmse"] and [row[-1] for row in rows[1:]] == ["3", "2", "1"]
+    change_tags(Path("results"), runs[1].id, ["old", "best"])
+    rows = _rows(call("runs", "ls")[1])
+    assert rows[0] == [*plain, "tags"] and rows[2][4:] == ["best,", "old"]
+    with pytest.raises(UserError), start_run("tune", Study(), "d"):
+        raise UserError("buckled")
+    assert _rows(call("runs", "ls")[1])[0] == [*plain, "tags", "note"]
+    assert "buckled" in call("runs", "ls", "--state", "failed")[1]
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        (("--kind", "tune"), [0, 2]),
+        (("--label", "b"), [1]),
+        (("--kind", "tune", "--label", "c"), [2]),
+        (("--where", "rmse>=2"), [0, 2]),
+        (("--reverse",), [2, 1, 0]),
+        (("--newer", "1h", "--kind", "t*"), [0, 1, 2]),
+    ],
+)
+def test_runs_are_chosen_by_what_was_asked(
+    call: Call, runs: list[Run], asked: tuple[str, ...], shown: list[int]
+) -> None:
+    assert [row[0] for row in _rows(call("runs", "ls", *asked)[1])[1:]] == [runs[k].id for k in shown]
+
+
+def test_where_there_is_none_that_is_said(call: Call) -> None:
+    assert call("runs", "ls") == (0, "no runs in results\n", "")
+    for asked in (("--kind", "x"), ("--label", "x"), ("--state", "x"), ("--tag", "x"), ("--newer", "1h")):
+        assert call("runs", "ls", *asked, "--out", "other") == (0, "no runs in other that meet this\n", ""), asked

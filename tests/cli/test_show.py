@@ -1,0 +1,141 @@
+"""What `wristctl runs show`, `lineage`, `verify`, `tag`, `rm` and `report` print of runs, and leave of them."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import InputRun, Run, start_run
+from wristctl.records.manifest import Code
+from wristctl.records.tags import change_tags
+
+COMMIT, TREE = "0123456789abcdef0123", 64 * "a"
+
+
+@pytest.fixture
+def data(call: Call) -> Run:
+    """A run in results/, of a checkout with changes."""
+    with start_run("gen-data", Study(seed=5), "a", argv=["wristctl", "gen-data", "a b"]) as live:
+        live.file("data/x.txt").write_text("four")
+        live.metric("rmse", 0.25, "rad", "lower", 7)
+        live._manifest.code = Code(version="9.8", commit=COMMIT, dirty=True, tree_sha256=TREE)
+    return Run(live.path)
+
+
+@pytest.fixture
+def network(data: Run) -> Run:
+    """A run made from it."""
+    with start_run("train", Study(), "b", inputs=[InputRun("data", data)]) as live:
+        live._manifest.code = Code(version="9.8", tree_sha256=TREE)
+    return Run(live.path)
+
+
+def test_show_tells_each_fact_metric_and_file(call: Call, data: Run, network: Run) -> None:
+    code, out, _ = call("runs", "show", data.id)
+    lines = [re.split(r"\s{2,}", line.strip()) for line in out.splitlines()]
+    assert code == 0 and out.splitlines()[-1] == str(data.path)
+    for line in (
+        ["run", data.id],
+        ["state", "ok"],
+        ["command", "wristctl gen-data 'a b'"],
+        ["seed", "5"],
+        ["started", data.manifest.timing.started],
+        ["code", "9.8 0123456789ab with uncommitted changes"],
+        ["result hash", data.result_hash],
+        ["metric", "value", "unit", "better", "n"],
+        ["rmse", "0.25", "rad", "lower", "7"],
+        ["path", "bytes", "sha256"],
+    ):
+        assert line in lines
+    (file,) = [each for each in data.manifest.outputs if each.path == "data/x.txt"]
+    assert ["data/x.txt", "4", file.sha256[:12]] in lines
+    assert "tags" not in out and "error" not in out and out.index("Metrics") < out.index("Files")
+    change_tags(Path("results"), network.id, ["b", "a"])
+    out = call("runs", "show", network.id)[1]
+    assert re.search(r"^code +9\.8$", out, re.MULTILINE) and re.search(r"^tags +a, b$", out, re.MULTILINE)
+    assert re.search(rf"^input data +gen-data run {data.id}$", out, re.MULTILINE) and "Metrics" not in out
+
+
+def test_show_tells_why_a_run_failed(call: Call) -> None:
+    with pytest.raises(UserError), start_run("tune", Study()) as live:
+        raise UserError("the wrist buckles")
+    out = call("runs", "show", live.id)[1]
+    assert re.search(r"^error +the wrist buckles$", out, re.MULTILINE) and re.search(r"^state +failed$", out, re.M)
+
+
+def test_lineage_is_a_tree_and_its_users_as_lines_or_as_an_object(call: Call, data: Run, network: Run) -> None:
+    tree = [f"{network.id} (ok)", f"└─ data: {data.id} (ok)"]
+    assert call("runs", "lineage", network.id)[1].splitlines() == tree
+    assert call("runs", "lineage", data.id)[1].splitlines() == [f"{data.id} (ok)", f"used by {network.id}"]
+    told = json.loads(call("runs", "lineage", network.id, "--json")[1])
+    assert told["lineage"]["inputs"][0]["id"] == data.id and told["dependents"] == []
+
+
+def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run, network: Run) -> None:
+    with start_run("tune", Study(), "c") as live:
+        out = f"{data.id}  as sealed\n{network.id}  as sealed\n{live.id}  as sealed\n"
+        assert sorted(call("runs", "verify")[1].splitlines()) == sorted(out.splitlines()), (
+            "one that goes on is not wrong"
+        )
+    (data.path / "data" / "x.txt").write_text("five")
+    (network.path / "SHA256SUMS").unlink()
+    code, out, err = call("runs", "verify", data.id, network.id)
+    assert code == 3 and "2 of 2 runs are not as they were sealed" in err
+    assert out.splitlines() == [
+        f"{data.id}  changed",
+        "  data/x.txt: hash does not match what was sealed",
+        f"{network.id}  changed",
+        "  SHA256SUMS: missing: the run is crashed",
+    ]
+    code, out, err = call("runs", "verify", "--json")
+    told = json.loads(out)["runs"]
+    assert code == 3 and "2 of 3" in err and told[live.id] == []
+    assert told[data.id] == [{"file": "data/x.txt", "problem": "hash does not match what was sealed"}]
+
+
+def test_tag_says_what_tags_there_are_now(call: Call, data: Run) -> None:
+    assert call("runs", "tag", data.id, "b", "a")[1] == f"{data.id}  a, b\n"
+    assert call("runs", "tag", data.id)[1] == f"{data.id}  a, b\n"
+    assert call("runs", "tag", data.id, "--remove", "a", "--remove", "b")[1] == f"{data.id}  no tags\n"
+
+
+@pytest.mark.parametrize(("typed", "code"), [("y\n", 0), ("n\n", 2), ("", 130)])
+def test_rm_lists_the_runs_and_deletes_them_after_a_y(
+    call: Call, data: Run, network: Run, monkeypatch: pytest.MonkeyPatch, typed: str, code: int
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    ended, out, err = call("runs", "rm", data.id, network.id, data.id)
+    assert ended == code and err.startswith("Delete 2 runs? [y/N]:")
+    assert out.split() == [str(data.path), str(network.path)]
+    assert ("nothing was deleted" in err) == (code == 2)
+    assert data.path.exists() == network.path.exists() == (code != 0)
+
+
+def test_rm_with_force_breaks_a_lineage(call: Call, data: Run, network: Run) -> None:
+    assert call("runs", "rm", data.id, "--force", "-y")[:2] == (0, f"{data.path}\n")
+    assert not data.path.exists() and network.path.exists()
+
+
+def test_a_report_stands_beside_the_first_run_under_a_name_of_those_it_shows(
+    call: Call, data: Run, network: Run, tmp_path: Path
+) -> None:
+    assert call("runs", "report", data.id)[1] == f"{data.path.parent / f'report-{data.id}.html'}\n"
+    with start_run("tune", Study(), "c", Path("elsewhere")) as live:
+        pass
+    pages = [
+        Path(call("runs", "report", *refs)[1].strip())
+        for refs in ((str(live.path), network.id), (str(live.path), network.id), (network.id, str(live.path)))
+    ]
+    assert pages[0] == pages[1] != pages[2]
+    assert [page.parent.name for page in pages] == ["elsewhere", "elsewhere", "results"]
+    assert all(re.fullmatch(r"report-[0-9a-f]{6}\.html", page.name) for page in pages)
+    assert live.id in pages[2].read_text() and network.id in pages[2].read_text()
+    assert data.id in Path(f"results/report-{data.id}.html").read_text()

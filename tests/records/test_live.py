@@ -1,0 +1,129 @@
+"""What a run writes while it goes on, and how it ends."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import resource
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wristctl.config.study import Study
+from wristctl.records import Run, start_run, stream
+from wristctl.records.journal import jsonable
+from wristctl.records.manifest import Manifest
+
+
+def test_a_stream_is_the_seed_and_eight_bytes_of_the_names_hash() -> None:
+    digest = hashlib.sha256(b"weights").hexdigest()
+    assert stream(5, "weights") == (5, int(digest[:16], 16))
+
+
+def test_a_metric_is_one_number_unless_more_is_said(results: Path) -> None:
+    with start_run("tune", Study(), "", results) as live:
+        live.metric("plain", 2.0)
+        live.metric("full", 3.0, "rad", "lower", 9, (2.5, float("inf")), "tip")
+        live.metric("none", None)
+    nothing = {"unit": "", "better": "", "n": 1, "interval": None, "meaning": ""}
+    assert Run(live.path).metrics == {
+        "plain": {"value": 2.0, **nothing},
+        "full": {"value": 3.0, "unit": "rad", "better": "lower", "n": 9, "interval": [2.5, None], "meaning": "tip"},
+        "none": {"value": None, **nothing},
+    }
+
+
+def test_units_or_meaning_may_be_left_out(results: Path) -> None:
+    columns = {"x": np.array([1.0]), "y": np.array([2.0])}
+    with start_run("tune", Study(), "", results) as live:
+        live.table("data/a.csv", columns, units={"x": "m"})
+        live.table("data/b.csv", columns, meaning={"y": "angle"})
+        live.arrays("deep/er/c.npz", columns)
+    outputs = {each.path: each for each in Run(live.path).manifest.outputs}
+    noted = {name: [(c.name, c.unit, c.meaning) for c in each.columns] for name, each in outputs.items()}
+    assert noted["data/a.csv"] == [("x", "m", ""), ("y", "", "")]
+    assert noted["data/b.csv"] == [("x", "", ""), ("y", "", "angle")]
+    assert (
+        noted["deep/er/c.npz"] == [] and outputs["deep/er/c.npz"].bytes == (live.path / "deep/er/c.npz").stat().st_size
+    )
+
+
+@pytest.mark.parametrize(("platform", "megabytes"), [("linux", 3072.0), ("darwin", 3.0)])
+def test_times_begin_with_the_run_and_memory_is_in_the_systems_own_unit(
+    results: Path, monkeypatch: pytest.MonkeyPatch, platform: str, megabytes: float
+) -> None:
+    walls, processors = iter((10.0, 13.5)), iter((100.0, 101.25))
+    clock = SimpleNamespace(perf_counter=lambda: next(walls), process_time=lambda: next(processors))
+    monkeypatch.setattr("wristctl.records.live.time", clock)
+    monkeypatch.setattr(resource, "getrusage", lambda _: SimpleNamespace(ru_maxrss=3 * 2**20))
+    monkeypatch.setattr("wristctl.records.live.sys", SimpleNamespace(platform=platform))
+    with start_run("tune", Study(), "", results) as live:
+        pass
+    timing = Run(live.path).manifest.timing
+    assert (timing.wall_s, timing.cpu_s, timing.max_rss_mb) == (3.5, 1.25, megabytes)
+
+
+def test_a_page_is_made_of_the_ended_run_and_may_fail(results: Path) -> None:
+    def page(path: Path, manifest: Manifest) -> str:
+        return f"{path.name} {manifest.id} {manifest.state} {manifest.exit_code}"
+
+    with start_run("tune", Study(), "", results, page=page) as live:
+        pass
+    assert Run(live.path).file("report.html").read_text() == f"{live.id} {live.id} ok 0"
+
+    def broken(*_: object) -> str:
+        raise KeyError("colour")
+
+    with start_run("tune", Study(), "", results, page=broken) as live:
+        pass
+    run = Run(live.path)
+    assert run.state == "ok" and not (run.path / "report.html").exists() and run.problems() == []
+    said = "no report.html: KeyError: 'colour'"
+    assert f"warning: {said}\n" in run.file("console.log").read_text()
+    events = [json.loads(line) for line in run.file("events.jsonl").read_text().splitlines()]
+    assert [(each["event"], each.get("message")) for each in events[1:]] == [("end", None), ("warning", said)]
+
+
+def test_what_the_program_says_is_logged_and_from_warnings_on_an_event(results: Path) -> None:
+    log = logging.getLogger("wristctl.probe")
+    log.setLevel(logging.INFO)
+    with start_run("tune", Study(), "", results) as live:
+        log.info("as ever")
+        log.warning("too warm")
+        log.error("too hot")
+        live.console("two\nlines\n")
+    log.error("after the end")
+    run = Run(live.path)
+    assert run.file("console.log").read_text() == "as ever\nwarning: too warm\nerror: too hot\ntwo\nlines\n"
+    events = [json.loads(line) for line in run.file("events.jsonl").read_text().splitlines()]
+    assert [each["event"] for each in events] == ["start", "warning", "error", "end"]
+    assert (events[0]["kind"], events[1]["message"], events[1]["logger"]) == ("tune", "too warm", "wristctl.probe")
+    assert events[3]["state"] == "ok"
+
+
+def test_anything_becomes_what_json_can_say() -> None:
+    given = {1: np.float32(0.5), "a": [np.nan, (np.inf, -1)], "b": np.arange(2), "c": None, "d": True, "e": Path("x")}
+    assert jsonable(given) == {"1": 0.5, "a": [None, [None, -1]], "b": [0, 1], "c": None, "d": True, "e": "x"}
+    assert jsonable(np.array([0.5, np.nan])) == [0.5, None] and jsonable(np.int64(3)) == 3
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "code"),
+    [(KeyboardInterrupt(), "interrupted", 130), (ValueError("by hand"), "failed", 1), (None, "ok", 0)],
+)
+def test_the_end_decides_state_and_exit_code(results: Path, error: BaseException | None, state: str, code: int) -> None:
+    live = None
+    try:
+        with start_run("tune", Study(), "", results / "below" / "that") as live:
+            if error:
+                raise error
+    except (KeyboardInterrupt, ValueError) as raised:
+        assert raised is error
+    assert live is not None
+    manifest = Run(live.path).manifest
+    assert (manifest.state, manifest.exit_code, manifest.argv) == (state, code, sys.argv)
+    assert (manifest.error is None) == (state != "failed") and not list(live.path.glob(".*"))
