@@ -15,6 +15,7 @@ import pytest
 
 from wristctl.config.study import Study
 from wristctl.records import Run, start_run, stream
+from wristctl.records.files import sha256_of_list
 from wristctl.records.journal import jsonable
 from wristctl.records.lock import RunLock, is_locked
 from wristctl.records.manifest import Manifest
@@ -139,3 +140,10 @@ def test_a_lock_is_a_living_runs_and_its_user_may_write_it(tmp_path: Path) -> No
     assert not is_locked(tmp_path) and not list(tmp_path.iterdir())
     (tmp_path / ".lock").touch()
     assert not is_locked(tmp_path), "left behind by one that was killed"
+
+
+def test_the_result_hash_is_of_names_and_hashes_as_in_every_earlier_run(results: Path) -> None:
+    with start_run("tune", Study(), "", results) as live:
+        live.file("data/a.txt").write_text("a")
+        live.file("timing.json").write_text("{}")
+    assert Run(live.path).result_hash == sha256_of_list([("data/a.txt", hashlib.sha256(b"a").hexdigest())])
