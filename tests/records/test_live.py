@@ -15,7 +15,9 @@ import pytest
 
 from wristctl.config.study import Study
 from wristctl.records import Run, start_run, stream
+from wristctl.records.files import sha256_of_list
 from wristctl.records.journal import jsonable
+from wristctl.records.lock import RunLock, is_locked
 from wristctl.records.manifest import Manifest
 
 
@@ -127,3 +129,21 @@ def test_the_end_decides_state_and_exit_code(results: Path, error: BaseException
     manifest = Run(live.path).manifest
     assert (manifest.state, manifest.exit_code, manifest.argv) == (state, code, sys.argv)
     assert (manifest.error is None) == (state != "failed") and not list(live.path.glob(".*"))
+
+
+def test_a_lock_is_a_living_runs_and_its_user_may_write_it(tmp_path: Path) -> None:
+    assert not is_locked(tmp_path), "there is none"
+    lock = RunLock(tmp_path)
+    mode = (tmp_path / ".lock").stat().st_mode & 0o777
+    assert is_locked(tmp_path) and mode & 0o600 == 0o600 and mode & 0o133 == 0
+    lock.release()
+    assert not is_locked(tmp_path) and not list(tmp_path.iterdir())
+    (tmp_path / ".lock").touch()
+    assert not is_locked(tmp_path), "left behind by one that was killed"
+
+
+def test_the_result_hash_is_of_names_and_hashes_as_in_every_earlier_run(results: Path) -> None:
+    with start_run("tune", Study(), "", results) as live:
+        live.file("data/a.txt").write_text("a")
+        live.file("timing.json").write_text("{}")
+    assert Run(live.path).result_hash == sha256_of_list([("data/a.txt", hashlib.sha256(b"a").hexdigest())])

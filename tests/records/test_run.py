@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch
@@ -81,6 +82,9 @@ def test_arrays_hold_numbers_and_no_objects(tmp_path: Path) -> None:
     np.savez(file, x=np.array([{}], dtype=object))
     with pytest.raises(ValueError, match="Object arrays"):
         read_arrays(file)
+    write_arrays(file, {"x": np.arange(2)})
+    with zipfile.ZipFile(file) as archive:
+        assert [each.date_time for each in archive.infolist()] == [(1980, 1, 1, 0, 0, 0)], "the first date there is"
 
 
 def test_a_package_that_a_repository_holds_but_does_not_track_has_no_commit(
