@@ -18,7 +18,7 @@ run: .venv/run
 	printf '\nRuns:\n%s\n%s\n%s\n%s\n' "$$data" "$$network" "$$tuned" "$$made"
 
 test: lint
-	$(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
+	$(BIN)/pytest -n auto --maxprocesses 4
 
 lint: .venv/dev
 	$(BIN)/ruff check .

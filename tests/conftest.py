@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
@@ -17,6 +18,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # How long an example takes depends on what else the machine does.
 settings.register_profile("wristctl", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("wristctl")
+
+
+@pytest.fixture(autouse=True)
+def _log_level() -> None:
+    """A command that was called in this process has set how much is logged; the next test begins anew."""
+    logging.getLogger("wristctl").setLevel(logging.NOTSET)
 
 
 @pytest.fixture
