@@ -67,7 +67,7 @@ test-trust: .venv/dev
 
 # Small wrong changes to a copy of the package: does a test notice each? The listed ones, or `make mutants SEED=7`.
 mutants: .venv/dev
-	$(BIN)/python tests/mutants/run.py $(if $(SEED),--seed $(SEED))
+	$(BIN)/python -m tests.mutants.run $(if $(SEED),--seed $(SEED))
 
 coverage: .venv/dev
 	$(BIN)/pytest -n auto --maxprocesses 4 --cov=wristctl --cov-report=term --cov-report=html:build/coverage

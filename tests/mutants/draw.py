@@ -1,4 +1,4 @@
-"""Draw changes from a seed: `python tests/mutants/draw.py SEED [COUNT]` prints them as they stand in known.yaml.
+"""Draw changes from a seed: `python -m tests.mutants.draw SEED [COUNT]` prints them as they stand in known.yaml.
 
 Two of each package at least, then any; within a package every kind of change is as likely as any other.
 """
@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from operators import Change, changes
+
+from tests.mutants.operators import Change, changes
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "wristctl"

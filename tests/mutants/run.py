@@ -1,4 +1,4 @@
-"""Are small wrong changes noticed? `make mutants`, or `python tests/mutants/run.py [--seed K] [--count N]`.
+"""Are small wrong changes noticed? `make mutants`, or `python -m tests.mutants.run [--seed K] [--count N]`.
 
 One change at a time is made to a copy of the package, and the tests run that should notice it, the nearest first,
 until one fails. Without a seed the changes are those of known.yaml, with one they are drawn. The table says which test
@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
-from draw import COUNT, drawn, entry
+
+from tests.mutants.draw import COUNT, drawn, entry
 
 ROOT = Path(__file__).parents[2]
 KNOWN = Path(__file__).with_name("known.yaml")
@@ -109,8 +110,17 @@ def stages(mutant: Mutant) -> list[list[str]]:
     return [each for each in found if each]
 
 
+def changed(mutant: Mutant) -> str:
+    """Its file with the change. ValueError where the old text is not there."""
+    lines = (ROOT / "wristctl" / mutant.file).read_text(encoding="utf-8").splitlines(keepends=True)
+    before, after = "".join(lines[: mutant.near - 1]), "".join(lines[mutant.near - 1 :])
+    if mutant.old not in after:
+        raise ValueError(f"{mutant.name}: {mutant.file} has no {mutant.old!r} from line {mutant.near} on")
+    return before + after.replace(mutant.old, mutant.new, 1)
+
+
 def mutate(mutant: Mutant, folder: Path) -> None:
-    """Copy the project and change one place. ValueError where the old text is not there."""
+    """Copy the project and change one place."""
     for name in ("wristctl", "tests", "experiments", "docs", "benchmarks"):
         ignored = shutil.ignore_patterns("__pycache__", "results", "*.avi")
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
@@ -118,12 +128,7 @@ def mutate(mutant: Mutant, folder: Path) -> None:
         shutil.copy(ROOT / name, folder / name)
     if (ROOT / "build").is_dir():
         os.symlink(ROOT / "build", folder / "build")
-    file = folder / "wristctl" / mutant.file
-    lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
-    before, after = "".join(lines[: mutant.near - 1]), "".join(lines[mutant.near - 1 :])
-    if mutant.old not in after:
-        raise ValueError(f"{mutant.name}: {mutant.file} has no {mutant.old!r} from line {mutant.near} on")
-    file.write_text(before + after.replace(mutant.old, mutant.new, 1), encoding="utf-8")
+    (folder / "wristctl" / mutant.file).write_text(changed(mutant), encoding="utf-8")
 
 
 def try_out(mutant: Mutant) -> Result:
