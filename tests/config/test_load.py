@@ -89,6 +89,8 @@ def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) ->
             "'rows' is a list, and given as a whole: '0' is no key of it - --set hw-run.rows.0.gain=x: hw-run.rows - "
             "fix: hw-run.rows=[{controller: ..., gains: ...}]; for 'gain' did you mean 'gains'?",
         ),
+        ("compare.references=3", "3 should be a valid list - --set compare.references=3: compare.references"),
+        ("epochs={a: 1}", "{'a': 1} should be a valid integer - --set epochs={a: 1}: train.epochs"),
         ("wrist.gravity.0=1", "--set wrist.gravity.0=1: wrist.gravity - fix: wrist.gravity=[...]"),
     ],
 )
