@@ -91,6 +91,9 @@ def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) ->
         ),
         ("compare.references=3", "3 should be a valid list - --set compare.references=3: compare.references"),
         ("epochs={a: 1}", "{'a': 1} should be a valid integer - --set epochs={a: 1}: train.epochs"),
+        ("rows=[{name: a}, {name: b}, {name: a}]", "each row needs a name of its own"),
+        ("rows=[{name: a}, {}]", "each row needs a name of its own"),
+        ("train={rows: [{name: a}, {name: b}], search: true}", "give rows or search, not both"),
         ("wrist.gravity.0=1", "--set wrist.gravity.0=1: wrist.gravity - fix: wrist.gravity=[...]"),
     ],
 )

@@ -51,8 +51,9 @@ _LOOKS = {
     "dpi", "indent", "refresh_per_second", "padding", "aspect", "markevery", "thickness", "stacklevel", "timeout",
     "maxsize", "max_workers", "min_length", "bbox_to_anchor", "rasterized", "clip_on", "capsize", "s", "marker",
     "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate", "frozen",
+    "align", "fused",
 }  # fmt: skip
-"""Keywords that say how something looks, how long somebody is waited for, or what to check that is never so."""
+"""Keywords that say how something looks, how long somebody is waited for, how fast it is, or what to check that is never so."""
 
 _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",

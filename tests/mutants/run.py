@@ -40,6 +40,7 @@ NEIGHBOURS = {
         "tests/config",
         "tests/cli/test_help.py",
         "tests/cli/test_wrapper.py",
+        "tests/simulation/test_reference.py",
         "tests/cli/test_loop_commands.py",
     ],
     "control": ["tests/control", "tests/simulation", "tests/lanes"],
