@@ -88,7 +88,9 @@ def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_ar
 
 
 def _decorated(node: ast.FunctionDef) -> bool:
-    return any(isinstance(each, ast.Name) and each.id in ("compiled", "kernel") for each in node.decorator_list)
+    return any(
+        isinstance(each, ast.Name) and each.id in ("compiled", "spelled_out", "kernel") for each in node.decorator_list
+    )
 
 
 def _is_kernel(argument: ast.expr, call: ast.Call) -> TypeGuard[ast.Name]:

@@ -110,6 +110,14 @@ def compiled(function: F) -> F:
     return cast(F, numba.njit(**_OPTIONS)(function))
 
 
+def spelled_out(function: F) -> F:
+    """Like `compiled`, its body copied to where it is called before any compiling.
+
+    For what is called once and holds almost all of its caller: that is then compiled one time less.
+    """
+    return cast(F, numba.njit(inline="always", **_OPTIONS)(function))
+
+
 def kernel(function: F, *others: Path) -> F:
     """Compile for Python, which calls it, and keep it in the cache.
 

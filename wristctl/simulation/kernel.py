@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from wristctl.control.law import now_of
 from wristctl.control.response import Controlled, respond
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
@@ -112,7 +112,7 @@ def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sp
         _run_block(setup, course, block_of(world, block), block_of(state, block), scratch, span.first, span.last)
 
 
-@compiled
+@spelled_out
 def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, first: int, last: int) -> None:
     cut, period, ticks = setup.coordinates, setup.period, setup.ticks
     undisturbed = parameters_of(setup.plant, rows_of(world.plant))

@@ -24,11 +24,6 @@ _load = replacing("stiffness", "force_y")
 
 
 @compiled
-def _advance(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any) -> None:
-    step(plant, q, rate, plus, minus, h)
-
-
-@compiled
 def _tip_angle(plant: Any, q: Any, rate: Any) -> Any:
     zero = 0.0 * plant.length
     angle, turning = zero, zero
@@ -94,7 +89,7 @@ PCC = PlantModel(
     parameters=Segments,
     coordinates=lambda n: n,
     values=segments,
-    advance=_advance,
+    advance=step,
     tip_angle=_tip_angle,
     stretch=_stretch,
     within=_within,

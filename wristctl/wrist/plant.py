@@ -25,7 +25,7 @@ from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.compiled import kernel, spelled_out
 from wristctl.lanes.lane import dot, planar, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
@@ -168,7 +168,7 @@ for _function in (advance, tip_angle, stretch, within, disturbed, tip_pose, tip_
     _by_plant(_function)
 
 
-@compiled
+@spelled_out
 def advance_or_stop(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any, alive: Any) -> Any:
     """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
     before = lanes_like(q)
