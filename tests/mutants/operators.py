@@ -53,7 +53,7 @@ _LOOKS = {
     "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate", "frozen",
     "align", "fused",
 }  # fmt: skip
-"""Keywords that say how something looks, how long somebody is waited for, how fast it is, or what to check that is never so."""
+"""Keywords that say how something looks, how long somebody is waited for, how fast it is, or what is never so."""
 
 _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",
