@@ -6,11 +6,20 @@ import os
 import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-NARROW = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx,+avx2,+fma"}
-"""Registers of four numbers, and few of them."""
+THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
+
+NARROW = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx,+avx2,+fma", "OPENBLAS_CORETYPE": "Prescott"}
+"""Registers of four numbers, and few of them; and matrices multiplied as on a processor of 2004."""
+OTHERS = {
+    "narrow": NARROW,
+    "generic": {"NUMBA_CPU_NAME": "generic", "OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3"},
+    "wide": {"NUMBA_CPU_NAME": "skylake-avx512", "OPENBLAS_CORETYPE": "SkylakeX"},
+}
+"""Processors by what they can; a wide one only where this one is."""
 
 ROLLOUTS = """
 import hashlib
@@ -27,6 +36,9 @@ gains = np.array(gains_of(law, "initial")) * np.linspace(1.0, 3.0, 17)[:, None]
 for chosen in gains, gains[:1]:
     done = rollout(law, chosen, followed, np.zeros(len(chosen), np.int64), loop, wrist, record=True, threads=1)
     print(hashlib.sha256(done.samples.tobytes()).hexdigest())
+for each in (followed[0], motion(Reference(kind="sine"), wrist, 0.3, 1e-3)):
+    held = (each.theta_ref, each.rate_ref, each.acceleration_ref, each.tip_desired)
+    print(hashlib.sha256(b"".join(part.tobytes() for part in held)).hexdigest())
 """
 
 
@@ -36,8 +48,11 @@ def bits(**environment: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the other one is of this family")
-def test_rollouts_have_the_same_bits_whatever_the_processors_registers() -> None:
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the others are of this family")
+def test_rollouts_and_references_have_the_same_bits_whatever_the_processor() -> None:
     here = bits()
-    assert len(set(here)) == 2
-    assert bits(**NARROW) == here
+    assert len(set(here)) == 4
+    wide = "avx512f" in Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else False
+    chosen = [name for name in OTHERS if name != "wide" or wide] if THOROUGH else ["narrow"]
+    for name in chosen:
+        assert bits(**OTHERS[name]) == here, name

@@ -131,7 +131,7 @@ def test_an_input_with_another_result_says_so_in_the_lineage(results: Path) -> N
     shutil.rmtree(data.path)
     other.path.rename(data.path)
     assert [each.state for each in ancestry(network).inputs] == ["another result than was read"]
-    assert changed_inputs(network) == [f"input: data: another result than was read ({data.path})"]
+    assert f"input: data: another result than was read ({data.path})" in changed_inputs(network)
 
 
 def test_a_tree_of_lineage_is_drawn(results: Path) -> None:

@@ -70,7 +70,7 @@ def test_a_run_that_cannot_be_read_is_dated_by_its_name(results: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(("metrics", "note"), [('{"a": 1}', "metrics.json is no table"), ("{", "not valid JSON")])
+@pytest.mark.parametrize(("metrics", "note"), [('{"a": 1}', "no table of metrics"), ("{", "not valid JSON")])
 def test_a_run_with_damaged_metrics_is_broken_and_says_so(make: Make, results: Path, metrics: str, note: str) -> None:
     (make().path / "metrics.json").write_text(metrics)
     (entry,) = indexed(results)

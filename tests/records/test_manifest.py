@@ -67,11 +67,22 @@ def test_limits_on_threads_are_noted(results: Path, monkeypatch: pytest.MonkeyPa
     assert Run(live.path).manifest.environment.threads == {"OMP_NUM_THREADS": "3"}
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO])
-def test_a_disk_that_takes_no_more_is_an_error_of_the_user(results: Path, number: int) -> None:
-    said = f"cannot write: {os.strerror(number)} - there - fix: free space"
-    with pytest.raises(UserError, match=said), start_run("tune", Study(), "", results):
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        (errno.ENOSPC, "cannot write: No space left on device - there - fix: free space or choose another --out"),
+        (errno.EDQUOT, "cannot write: Disk quota exceeded - there - fix: free space or choose another --out"),
+        (errno.EROFS, "cannot write: Read-only file system - there - fix: choose a folder you can write to with --out"),
+        (errno.EFBIG, "cannot write: File too large - there - fix: raise the limit on files"),
+        (errno.EIO, "the system refuses: Input/output error - there - fix: check the disk"),
+        (errno.EMFILE, "the system refuses: Too many open files - there - fix: raise the limit on open files"),
+        (errno.ENOLCK, "the system refuses: No locks available - there - fix: choose a folder"),
+    ],
+)
+def test_what_the_disk_or_the_system_refuses_is_an_error_of_the_user(results: Path, number: int, said: str) -> None:
+    with pytest.raises(UserError, match=re.escape(said)), start_run("tune", Study(), "", results) as live:
         raise OSError(number, os.strerror(number), "there")
+    assert Run(live.path).state == "failed"
 
 
 def test_any_other_error_of_a_file_is_no_matter_of_the_disk(results: Path) -> None:
@@ -81,13 +92,13 @@ def test_any_other_error_of_a_file_is_no_matter_of_the_disk(results: Path) -> No
     assert error is not None and error.type == "FileNotFoundError"
 
 
-def test_hidden_files_are_no_part_of_a_run(make: Make) -> None:
+def test_hidden_files_are_no_part_of_a_run_and_told_of(make: Make) -> None:
     run = make()
     for name in (".lock", "data/.x.part", ".cache/file"):
         (run.path / name).parent.mkdir(exist_ok=True)
         (run.path / name).write_text("left")
     assert not any(part.startswith(".") for name in files_below(run.path) for part in name.split("/"))
-    assert run.problems() == []
+    assert run.problems() == [(name, "file was added after sealing") for name in (".cache/file", "data/.x.part")]
 
 
 def test_an_added_file_is_no_reason_to_refuse_a_run(make: Make) -> None:

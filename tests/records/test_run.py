@@ -80,7 +80,13 @@ def test_arrays_hold_numbers_and_no_objects(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="Object arrays"):
         write_arrays(file, {"x": np.array([{}], dtype=object)})
     np.savez(file, x=np.array([{}], dtype=object))
-    with pytest.raises(ValueError, match="Object arrays"):
+    with pytest.raises(UserError, match="Object arrays"):
+        read_arrays(file)
+    file.write_bytes(b"")
+    with pytest.raises(UserError, match="no file of arrays"):
+        read_arrays(file)
+    np.savez_compressed(file, x=np.zeros(1_000_000))
+    with pytest.raises(UserError, match="far larger than the file"):
         read_arrays(file)
     write_arrays(file, {"x": np.arange(2)})
     with zipfile.ZipFile(file) as archive:

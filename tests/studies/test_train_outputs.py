@@ -162,7 +162,12 @@ def test_time_is_taken_of_each_inverse_on_its_own_inputs(tmp_path: Path, monkeyp
 
 def test_the_networks_file_says_how_it_was_trained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     saved: list[Any] = []
-    monkeypatch.setattr(network_file, "save_network", lambda *given: saved.append(given))
+
+    def save(*given: Any) -> None:
+        saved.append(given)
+        given[1].write_bytes(b"network")
+
+    monkeypatch.setattr(network_file, "save_network", save)
     network: Any = "network"
     row = "train.rows=[{name: tan, activation: tanh}]"
     digest = {}

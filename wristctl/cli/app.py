@@ -13,6 +13,8 @@ from typer.main import get_command
 from wristctl import __version__
 from wristctl.cli.lazy_commands import lazy_group
 from wristctl.config.errors import UserError
+from wristctl.config.printable import printable
+from wristctl.config.system_errors import error_of_the_system
 from wristctl.interrupt import interrupts
 
 _REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
@@ -81,9 +83,11 @@ def main() -> NoReturn:
         except (KeyboardInterrupt, typer.Abort):
             code = 130
         except Exception as error:
+            refused = error_of_the_system(error)
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
             what = f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}"
-            code = 130 if seen.asked else _failed(what, error, 1)
+            known = (str(refused), refused.exit_code) if refused else (what, 1)
+            code = 130 if seen.asked else _failed(known[0], error, known[1])
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
 
@@ -91,5 +95,5 @@ def main() -> NoReturn:
 def _failed(message: str, error: BaseException, code: int) -> int:
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"error: {printable(' '.join(message.split()))}", file=sys.stderr)
     return code

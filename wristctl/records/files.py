@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.config.wording import OUT
+from wristctl.config.system_errors import fix_of
+
+PART = ".part"
+"""End of the hidden name of a file that is being written."""
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path to write to, which takes the place of `path` at once when the block ends well.
 
-    Raises UserError where the file system refuses (no space, no permission).
+    Raises UserError where the file system refuses (no space, no permission). The folder must be there: one that was
+    removed meanwhile does not come back.
     """
-    temporary = path.with_name(f".{path.name}.part")
+    temporary = path.with_name(f".{path.name}{PART}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         sync(temporary)
         temporary.replace(path)
         sync(path.parent)
     except OSError as error:
-        raise UserError(
-            f"cannot write: {error.strerror or error}", str(path), ("free space or choose another ", OUT)
-        ) from error
+        raise UserError(f"cannot write: {error.strerror or error}", str(path), fix_of(error)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # read-only, or gone: what is told is why it could not be written
+            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -40,10 +43,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def sync(path: Path) -> None:
-    """Wait until a file or directory is on the disk."""
+    """Wait until a file or directory is on the disk, where its file system can tell."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP):
+            raise
     finally:
         os.close(descriptor)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from contextlib import suppress
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant
@@ -9,6 +11,8 @@ from wristctl.config.wording import OUT, Call
 from wristctl.records.index import RESULTS, indexed, run_names
 from wristctl.records.manifest import MANIFEST, command_of
 from wristctl.records.run import NAME_A_RUN, Run
+
+_log = logging.getLogger(__name__)
 
 
 def list_runs(results: Path = RESULTS) -> list[Run]:
@@ -65,6 +69,9 @@ def _readable(path: Path) -> Run:
     run = Run(path)
     if not run.sealed:
         run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+    with suppress(UserError):
+        if run.manifest.newer:
+            _log.warning("%s was made by a newer wristctl: what this one does not know of it is passed over", run.id)
     return run
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wristctl.config.errors import UserError
 from wristctl.records.files import replacing
 
 if TYPE_CHECKING:
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     Columns = pd.DataFrame | Mapping[str, np.ndarray]
+
+
+_LARGEST_SHARE = 100
+"""How many times its size an archive may hold: ours are stored as they are."""
 
 
 def write_table(path: Path, columns: Columns) -> None:
@@ -48,11 +53,18 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of an npz file by name."""
+    """All arrays of an npz file by name; UserError where it holds anything else, or far more than its size."""
     import numpy as np
 
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+    try:
+        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            if sum(each.file_size for each in archive.infolist()) > _LARGEST_SHARE * path.stat().st_size:
+                raise ValueError("what it holds is far larger than the file")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
+    except (ValueError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError, SyntaxError) as error:
+        raise UserError(f"no file of arrays: {error}", str(path), "bring back the file that was sealed") from error
 
 
 def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 import tempfile
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -17,7 +18,7 @@ from wristctl.records.manifest import MANIFEST, SUMS
 from wristctl.records.run import Run
 
 RESULTS = Path("results")
-INDEX = ".index.json"
+INDEX, TEMPORARY = ".index.json", ".index-"
 _SCHEMA = "wristctl.index/1"
 
 
@@ -66,8 +67,9 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
     found = []
     for name in run_names(results):
         stamp, old = _stamp(f"{results}/{name}"), known.get(name)
-        if stamp and old and old[0] == stamp:
-            entry, current[name] = IndexEntry(**old[1]), old
+        entry = _remembered(old, name) if stamp and isinstance(old, list) and old[:1] == [stamp] else None
+        if entry:
+            current[name] = old
         else:
             entry = _entry(Run(results / name))
             if stamp and entry.state not in ("running", "broken", "crashed"):
@@ -78,21 +80,26 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
     return found
 
 
+def _remembered(old: list[Any], name: str) -> IndexEntry | None:
+    """What the index says of a run, None where that cannot be."""
+    try:
+        entry = IndexEntry(**old[1])
+        texts = (entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note)
+        lists = [*entry.inputs, *entry.tags, *entry.metrics]
+        numbers = [each for each in (entry.wall_s, *entry.metrics.values()) if each is not None]
+        fits = all(isinstance(each, str) for each in (*texts, *lists)) and entry.id == name
+        return entry if fits and all(isinstance(each, int | float) for each in numbers) else None
+    except (TypeError, AttributeError, IndexError):
+        return None
+
+
 def _entry(run: Run) -> IndexEntry:
     state = run.state
     try:
         manifest = run.manifest
         metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
-    except (UserError, AttributeError) as error:
-        return IndexEntry(
-            run.id,
-            "-",
-            "",
-            "broken",
-            _dated(run.id),
-            None,
-            getattr(error, "what", "metrics.json is no table of metrics"),
-        )
+    except UserError as error:
+        return IndexEntry(run.id, "-", "", "broken", _dated(run.id), None, error.what)
     note = manifest.error.what if manifest.error else ""
     timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
     return IndexEntry(
@@ -132,10 +139,11 @@ def _write_index(results: Path, runs: dict[str, Any]) -> None:
     """Replace the index; a folder that cannot be written does without. Several may list at once: each its own file."""
     text = json.dumps({"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": runs})
     with suppress(OSError):
-        descriptor, temporary = tempfile.mkstemp(prefix=".index", dir=results)
+        descriptor, temporary = tempfile.mkstemp(prefix=TEMPORARY, dir=results)
         try:
             with open(descriptor, "w", encoding="utf-8") as file:
                 file.write(text)
+            os.chmod(temporary, stat.S_IMODE(os.stat(results).st_mode) & 0o666)  # whoever may read the folder
             os.replace(temporary, results / INDEX)
         except OSError:
             os.unlink(temporary)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+import os
 import threading
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -67,9 +68,11 @@ class Journal(logging.Handler):
             self.event(record.levelname.lower(), message=message, logger=record.name)
 
     def close(self) -> None:
-        """Stop listening and close the files."""
+        """Stop listening and close the files, which are on the disk then."""
         logging.getLogger("wristctl").removeHandler(self)
         for file in (self._events, self._console):
+            with suppress(OSError, ValueError):  # ValueError: closed
+                os.fsync(file.fileno())
             with suppress(OSError):
                 file.close()
         super().close()

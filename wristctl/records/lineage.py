@@ -31,14 +31,21 @@ class Ancestor:
             yield from each.lines(indent + ("└─ " if last else "├─ "), indent + ("   " if last else "│  "))
 
 
-def ancestry(run: Run, role: str = "", state: str = "") -> Ancestor:
-    """The tree of runs behind a run; inputs that are gone, broken or not what was read say so as their state."""
+def ancestry(run: Run, role: str = "", state: str = "", users: tuple[Path, ...] = ()) -> Ancestor:
+    """The tree of runs behind a run; inputs that are gone, broken or not what was read say so as their state.
+
+    `users` are the runs on the way here: one that is its own ancestor, which only a damaged manifest says, ends there.
+    """
     inputs = []
     for each in run.manifest.inputs:
         try:
             found = input_run(run, each)
+            if found.path in (run.path, *users):
+                inputs.append(Ancestor(each.run, each.kind, "its own ancestor: that cannot be", each.role))
+                continue
             changed = found.result_hash != each.result_sha256
-            inputs.append(ancestry(found, each.role, "another result than was read" if changed else ""))
+            state_then = "another result than was read" if changed else ""
+            inputs.append(ancestry(found, each.role, state_then, (run.path, *users)))
         except UserError:
             state_now = "broken" if _path_of(run, each) else "gone"
             inputs.append(Ancestor(each.run, each.kind, state_now, each.role))
@@ -60,7 +67,8 @@ def input_run(run: Run, record: Input) -> Run:
 
 def _path_of(run: Run, record: Input) -> Path | None:
     """The folder of an input, None where it is gone."""
-    return next((path for path in (run.path.parent / record.run, Path(record.path)) if path.is_dir()), None)
+    beside = [run.path.parent / record.run] if record.run == Path(record.run).name else []
+    return next((path for path in (*beside, Path(record.path)) if path.is_dir()), None)
 
 
 def dependents(run: Run, results: Path) -> list[str]:

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
+from wristctl.config.errors import UserError
 from wristctl.records import formats
-from wristctl.records.files import files_below, replacing, sha256_of, sha256_of_list, sync, write_text
+from wristctl.records.files import files_below, replacing, sha256_of, sync, write_text
 from wristctl.records.journal import Journal, jsonable, now
 from wristctl.records.manifest import (
     CONFIG,
@@ -33,6 +34,7 @@ from wristctl.records.manifest import (
     Output,
 )
 from wristctl.records.readme import readme
+from wristctl.records.seal import result_hash, write_seal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,9 +43,10 @@ if TYPE_CHECKING:
 Page = Callable[[Path, Manifest], str]
 """Makes report.html of a run directory and its finished manifest."""
 
-_RESERVE, _RESERVED = ".reserve", 512 * 1024
+RESERVE, _RESERVED = ".reserve", 512 * 1024
 """Space kept from the start, so that a run on a full disk can still say that it failed."""
 _RESULTS = ("data", "models", "figures")
+_PROVENANCE = (CONFIG, PACKAGES, PATCH, SOURCES)
 _RECORDS = {MANIFEST, SUMS, CONFIG, EVENTS, CONSOLE, PACKAGES, PATCH, SOURCES, README, REPORT}
 
 
@@ -57,7 +60,10 @@ class LiveRun:
 
     def __init__(self, path: Path, manifest: Manifest, page: Page | None = None) -> None:
         self.path, self.id, self._page = path, manifest.id, page
-        with (path / _RESERVE).open("wb") as file:
+        self._home = path.stat()
+        self._provenance = {name: sha256_of(path / name) for name in _PROVENANCE if (path / name).is_file()}
+        self._handed: set[str] = set()
+        with (path / RESERVE).open("wb") as file:
             file.write(bytes(_RESERVED))
         self._manifest = manifest
         self._metrics: dict[str, dict[str, Any]] = {}
@@ -102,13 +108,17 @@ class LiveRun:
         relative = PurePosixPath(name)
         if relative.is_absolute() or ".." in relative.parts or name in _RECORDS:
             raise ValueError(f"{name!r} is no name for an output of a run")
-        path = self.path / relative
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path
+        self._still_there()
+        for folder in reversed(relative.parents[:-1]):
+            (self.path / folder).mkdir(exist_ok=True)
+        self._handed.add(name)
+        return self.path / relative
 
     def figure(self, name: str, figure: Figure) -> None:
         """Write figures/<name>.png and .svg."""
-        formats.write_figure(self.file(f"figures/{name}"), figure)
+        stem = self.file(f"figures/{name}")
+        self._handed = self._handed - {f"figures/{name}"} | {f"figures/{name}.png", f"figures/{name}.svg"}
+        formats.write_figure(stem, figure)
 
     def metric(
         self,
@@ -139,7 +149,8 @@ class LiveRun:
 
     def end(self, state: EndState, exit_code: int = 0, error: Error | None = None) -> Manifest:
         """Seal the run: hashes of all outputs, README, report, manifest, SHA256SUMS last. Called by `start_run`."""
-        reserve = self.path / _RESERVE
+        self._still_there()
+        reserve = self.path / RESERVE
         if state != "ok":
             reserve.unlink(missing_ok=True)
         self.event("end", state=state)
@@ -148,9 +159,9 @@ class LiveRun:
         manifest = self._manifest
         manifest.state, manifest.exit_code, manifest.error = state, exit_code, error
         manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in _RECORDS]
-        manifest.result_sha256 = sha256_of_list(
-            [(each.path, each.sha256) for each in manifest.outputs if not each.volatile]
-        )
+        if state == "ok":
+            self._nothing_lost({each.path for each in manifest.outputs})
+        manifest.result_sha256 = result_hash(manifest)
         wall, cpu = self._began
         manifest.timing.ended = now()
         manifest.timing.wall_s, manifest.timing.cpu_s = time.perf_counter() - wall, time.process_time() - cpu
@@ -161,10 +172,35 @@ class LiveRun:
         write_text(self.path / README, readme(manifest, "\n\n".join(self._summary)))
         self._write_manifest()
         reserve.unlink(missing_ok=True)
-        known = {each.path: each.sha256 for each in manifest.outputs}
-        sums = {name: known.get(name) or sha256_of(self.path / name) for name in files_below(self.path)}
-        write_text(self.path / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sums.items()))
+        self._still_there()
+        for folder in sorted(each for each in self.path.rglob("*") if each.is_dir())[::-1]:
+            if not any(folder.iterdir()):
+                folder.rmdir()
+        write_seal(self.path, {each.path: each.sha256 for each in manifest.outputs})
         return manifest
+
+    def _still_there(self) -> None:
+        """UserError where the folder is no longer the one that the run began with."""
+        try:
+            there = self.path.stat()
+        except OSError:
+            there = None
+        if there is None or (there.st_dev, there.st_ino) != (self._home.st_dev, self._home.st_ino):
+            what = "the run's folder was removed, moved or replaced while it ran"
+            raise UserError(what, str(self.path), "leave it where it is, and run again")
+
+    def _nothing_lost(self, outputs: set[str]) -> None:
+        """UserError where something that the run has written is gone, or its provenance is another."""
+        lost = sorted(self._handed - outputs)
+        lost += [name for name, digest in self._provenance.items() if not self._is(name, digest)]
+        if lost:
+            raise UserError(
+                "a file of the run was removed or changed while it ran", str(self.path / lost[0]), "run again"
+            )
+
+    def _is(self, name: str, digest: str) -> bool:
+        path = self.path / name
+        return path.is_file() and sha256_of(path) == digest
 
     def _write_report(self, manifest: Manifest) -> None:
         """report.html, a picture of results that stand: whatever is wrong with it must not cost the run."""

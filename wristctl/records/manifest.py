@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
+SIGNATURE = "SHA256SUMS.sig"
 README, EVENTS, CONSOLE = "README.md", "events.jsonl", "console.log"
 SOURCES, PATCH, PACKAGES = "code.txt", "code.patch", "environment.txt"
 TABLES = "tables.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
+
+KINDS = (
+    "gen-data", "train", "tune", "compare", "simulate", "audit", "hw-run", "identify", "track", "calibrate-camera",
+    "calibrate-wrist",
+)  # fmt: skip
+"""What commands make runs."""
 
 EndState = Literal["running", "ok", "failed", "interrupted"]
 
@@ -21,9 +29,9 @@ def command_of(kind: str) -> str:
 
 
 class ManifestPart(BaseModel):
-    """A part of the manifest."""
+    """A part of the manifest. What a later version adds is passed over: see docs/runs.md on compatibility."""
 
-    model_config = ConfigDict(extra="forbid", validate_by_alias=True, validate_by_name=True)
+    model_config = ConfigDict(extra="ignore", validate_by_alias=True, validate_by_name=True)
 
 
 class Column(ManifestPart):
@@ -66,13 +74,19 @@ class Code(ManifestPart):
 
 
 class Environment(ManifestPart):
-    """The machine and the packages that computed; `threads` are the environment's limits on threads."""
+    """The machine and the packages that computed.
+
+    `features` are the processor's vector instructions, `settings` the environment's that choose among ways of computing
+    which may differ in the last bit, `threads` its limits on threads.
+    """
 
     python: str
     os: str
     machine: str
     cpu: str
     cores: int
+    features: list[str] = []
+    settings: dict[str, str] = {}
     threads: dict[str, str]
     packages: dict[str, str]
     packages_sha256: str
@@ -97,10 +111,14 @@ class Error(ManifestPart):
     fix: str = ""
 
 
+SCHEMA = "wristctl.run/1"
+"""Of the manifests that are written. Its number grows where an older wristctl could not understand a newer run."""
+
+
 class Manifest(ManifestPart):
     """Everything about one run but its results."""
 
-    schema_: Literal["wristctl.run/1"] = Field(default="wristctl.run/1", alias="schema")
+    schema_: str = Field(default=SCHEMA, alias="schema", pattern=r"^wristctl\.run/[0-9]{1,6}$")
     id: str
     kind: str
     label: str
@@ -119,3 +137,14 @@ class Manifest(ManifestPart):
     timing: Timing
     result_sha256: str | None = None
     fingerprint: str
+
+    @property
+    def newer(self) -> bool:
+        """Whether a later wristctl made it, which may mean things that this one does not know."""
+        return int(self.schema_.rpartition("/")[2]) > int(SCHEMA.rpartition("/")[2])
+
+
+def is_newer(content: bytes) -> bool:
+    """Whether what cannot be read as a manifest is one of a later wristctl."""
+    found = re.search(rb'"schema": *"wristctl\.run/([0-9]{1,6})"', content)
+    return found is not None and int(found[1]) > int(SCHEMA.rpartition("/")[2])

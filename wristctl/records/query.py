@@ -14,7 +14,7 @@ from typing import Any
 from wristctl.config.errors import UserError, meant
 from wristctl.config.wording import Argument, Phrase
 from wristctl.records.index import RESULTS, IndexEntry, indexed
-from wristctl.records.tags import read_tags
+from wristctl.records.tags import known_tags
 
 _COMPARISONS = {"<=": le, ">=": ge, "!=": ne, "==": eq, "<": lt, ">": gt, "=": eq}
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
@@ -22,7 +22,7 @@ _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
 
 def entries(results: Path = RESULTS) -> list[IndexEntry]:
     """All runs of a results folder, oldest first, with their tags."""
-    tags = read_tags(results)
+    tags = known_tags(results)
     return [replace(each, tags=tags[each.id]) if each.id in tags else each for each in indexed(results)]
 
 

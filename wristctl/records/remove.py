@@ -4,30 +4,65 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from pathlib import Path
 
 from wristctl.config.errors import UserError
 from wristctl.records.lineage import dependents
 from wristctl.records.run import Run
-from wristctl.records.tags import change_tags, read_tags
+from wristctl.records.seal import ADDED, ADDED_FOLDER
+from wristctl.records.tags import change_tags, known_tags
+
+REMOVED = ".removed"
+"""End of the hidden name under which a run is deleted."""
 
 
 def removable(runs: Sequence[Run], force: bool = False) -> list[Run]:
-    """The runs, each once; UserError for one that is running or, without `force`, that a run not among them read."""
-    chosen = {run.id: run for run in runs}
+    """The runs, each once; UserError for one that is gone, running or, without `force`, that a run not among them read.
+
+    Ask again after the user has answered: meanwhile another may have begun to use it.
+    """
+    chosen = {run.path: run for run in runs}
+    names = {run.id for run in chosen.values()}
     for run in chosen.values():
+        if not run.path.is_dir():
+            raise UserError("run is gone meanwhile", str(run.path), "there is nothing left to delete")
         if run.state == "running":
             raise UserError("run is still going on", str(run.path), "end it first")
-        users = [name for name in dependents(run, run.path.parent) if name not in chosen]
+        users = [name for name in dependents(run, run.path.parent) if name not in names]
         if users and not force:
             fix = "delete those too, or break the lineage with --force"
             raise UserError(f"{len(users)} runs were made from it: {', '.join(users[:3])}", run.id, fix)
     return list(chosen.values())
 
 
+def foreign(run: Run) -> list[str]:
+    """Files in a run's folder that are not the run's: somebody put them there after it was sealed."""
+    if run.path.is_symlink():
+        return []
+    try:
+        return [name for name, what in run.problems() if what in (ADDED, ADDED_FOLDER)]
+    except UserError:
+        return []
+
+
 def remove(run: Run) -> None:
-    """Delete a run and its tags. It is first renamed, so that no half-deleted run is ever listed."""
-    hidden = run.path.with_name(f".{run.id}.removed")
+    """Delete a run's tags, then the run; of a link that stands for a run, the link.
+
+    It is first renamed, so that no half-deleted run is ever listed; `leftovers` finds what a kill leaves of that.
+    """
+    if tags := known_tags(run.path.parent).get(run.id):
+        change_tags(run.path.parent, run.id, remove=tags)
+    if run.path.is_symlink():
+        run.path.unlink()
+        return
+    hidden = _free(run.path.with_name(f".{run.id}{REMOVED}"))
     run.path.rename(hidden)
     shutil.rmtree(hidden)
-    if tags := read_tags(run.path.parent).get(run.id):
-        change_tags(run.path.parent, run.id, remove=tags)
+
+
+def _free(path: Path) -> Path:
+    """The path, or one like it, where an earlier deletion left something."""
+    number = 2
+    while path.exists():
+        path, number = path.with_name(f"{path.name.removesuffix(REMOVED)}-{number}{REMOVED}"), number + 1
+    return path

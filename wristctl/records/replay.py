@@ -8,8 +8,9 @@ from wristctl.config.errors import UserError
 from wristctl.records.difference import Change, difference
 from wristctl.records.file_comparison import compare_files
 from wristctl.records.lineage import input_run
-from wristctl.records.manifest import CONFIG
+from wristctl.records.manifest import CONFIG, MANIFEST
 from wristctl.records.run import Run
+from wristctl.records.seal import CHANGED
 
 
 class ReplayVerdict(NamedTuple):
@@ -47,9 +48,10 @@ def changed_inputs(run: Run) -> list[str]:
         except UserError as error:
             found.append(f"input: {each.role}: {error.what} ({error.where})")
             continue
-        found += [f"input: {each.role}: {what} ({now.path / path})" for path, what in problems]
-        if not problems and now.result_hash != each.result_sha256:
+        readable = (MANIFEST, CHANGED) not in problems
+        if readable and now.result_hash != each.result_sha256:
             found.append(f"input: {each.role}: another result than was read ({now.path})")
+        found += [f"input: {each.role}: {what} ({now.path / path})" for path, what in problems]
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,10 +15,11 @@ from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.config.wording import Call
-from wristctl.records.files import files_below, sha256_of
+from wristctl.records.files import files_below
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
-from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
+from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of, is_newer
+from wristctl.records.seal import ADDED, ADDED_FOLDER, CHANGED, MISSING, faults_of_files, faults_of_manifest, read_seal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
 NAME_A_RUN = ("name a run that `", Call("runs ls"), "` shows")
 """What to do where there is no run."""
 _RESTORE = "restore it or name another run"
-_CHANGED, _MISSING = "hash does not match what was sealed", "sealed file is missing"
-_ADDED = "file was added after sealing"
 
 RunState = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
 
@@ -36,7 +36,8 @@ class Run:
     """An existing run directory, read when asked; every error is a UserError that names the file."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path.resolve()
+        whole = Path(os.path.abspath(path))
+        self.path = whole.parent.resolve() / whole.name  # a link stays one: what is deleted is the link
 
     @property
     def id(self) -> str:
@@ -48,18 +49,20 @@ class Run:
         """run.json; UserError where it is not as it was sealed: no word of it is then believed."""
         file = self.path / MANIFEST
         # the sum first: a run that ends meanwhile writes run.json, and then its sums
-        sealed = (self._sums() or {}).get(MANIFEST)
+        sealed = (read_seal(self.path) or {}).get(MANIFEST)
         try:
             content = file.read_bytes()
         except OSError as error:
             if sealed:
-                raise UserError(_MISSING, str(file), _RESTORE) from error
+                raise UserError(MISSING, str(file), _RESTORE) from error
             raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), NAME_A_RUN) from error
         if sealed and hashlib.sha256(content).hexdigest() != sealed:
-            raise UserError(_CHANGED, str(file), _RESTORE)
+            raise UserError(CHANGED, str(file), _RESTORE)
         try:
             return Manifest.model_validate_json(content)
-        except ValidationError as error:
+        except (ValidationError, RecursionError) as error:
+            if is_newer(content):
+                raise UserError("made by a newer wristctl than this one", str(file), "upgrade wristctl") from error
             raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
 
     @property
@@ -70,7 +73,7 @@ class Run:
     @property
     def sealed(self) -> bool:
         """Whether its manifest was sealed, which makes it a run whatever has become of the manifest."""
-        return MANIFEST in (self._sums() or ())
+        return MANIFEST in (read_seal(self.path) or ())
 
     @property
     def state(self) -> RunState:
@@ -93,10 +96,13 @@ class Run:
     def metrics(self) -> dict[str, dict[str, Any]]:
         """metrics.json: value, unit, better, n, interval and meaning by name; empty without one."""
         file = self.path / METRICS
+        again = ("run `", Call(command_of(self.kind)), "` again")
         try:
-            found: dict[str, dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else {}
-        except ValueError as error:
-            raise UserError("not valid JSON", str(file), ("run `", Call(command_of(self.kind)), "` again")) from error
+            found = json.loads(file.read_bytes()) if file.is_file() else {}
+        except (ValueError, RecursionError) as error:
+            raise UserError("not valid JSON", str(file), again) from error
+        if not isinstance(found, dict) or not all(map(_is_metric, found.values())):
+            raise UserError("no table of metrics", str(file), again)
         return found
 
     @property
@@ -124,27 +130,35 @@ class Run:
         self.__dict__.pop("manifest", None)
         again = ("restore it or run `", Call(command_of(self.kind)), "` again")
         for path, what in self.problems():
-            if what != _ADDED:
+            if what not in (ADDED, ADDED_FOLDER):
                 raise UserError(what, str(self.path / path), again)
 
     def problems(self) -> list[tuple[str, str]]:
-        """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed."""
-        sums = self._sums()
+        """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed.
+
+        Where all files are, it is also asked whether manifest and seal are of one mind.
+        """
+        sums = read_seal(self.path)
         if sums is None:
             raise UserError("run is not sealed", str(self.path), "use a run that has ended")
-        found = [(name, _MISSING) for name in sums if not (self.path / name).is_file()]
-        for name in files_below(self.path):
-            if name != SUMS and name not in sums:
-                found.append((name, _ADDED))
-            elif name != SUMS and sha256_of(self.path / name) != sums[name]:
-                found.append((name, _CHANGED))
-        return sorted(found)
-
-    def _sums(self) -> dict[str, str] | None:
-        """SHA256SUMS: the hash of each sealed file by name; None where the run is not sealed."""
+        found = faults_of_files(self.path, sums)
+        if any(name == MANIFEST for name, _ in found):
+            return found
+        self.__dict__.pop("manifest", None)
         try:
-            text = (self.path / SUMS).read_text(encoding="utf-8", errors="replace")
-        except OSError:
-            return None
-        lines = (line.partition("  ") for line in text.split("\n") if line)
-        return {name: digest for digest, _, name in lines}
+            return sorted(found + faults_of_manifest(self.path, sums, self.manifest))
+        except UserError as error:
+            return sorted([*found, (MANIFEST, error.what)])
+
+
+def _is_metric(found: object) -> bool:
+    """Whether this is an entry of metrics.json, as far as others rely on it."""
+    if not isinstance(found, dict) or not _is_number(found.get("value")):
+        return False
+    interval = found.get("interval")
+    pair = interval is None or (isinstance(interval, list) and len(interval) == 2 and all(map(_is_number, interval)))
+    return pair and all(isinstance(found.get(name) or "", str) for name in ("unit", "better", "meaning"))
+
+
+def _is_number(found: object) -> bool:
+    return found is None or isinstance(found, int | float)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,11 +16,12 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
+from wristctl.config.system_errors import error_of_the_system
 from wristctl.config.wording import OUT, Argument
 from wristctl.interrupt import interrupts, undisturbed
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
-from wristctl.records.files import replacing, sha256_of, write_text
+from wristctl.records.files import replacing, sha256_of, sync, write_text
 from wristctl.records.journal import now
 from wristctl.records.live import LiveRun, Page
 from wristctl.records.lock import RunLock
@@ -66,20 +66,24 @@ def start_run(
     """
     digest = config_hash(study, kind)
     path = _new_directory(out, kind, label, digest)
-    lock = RunLock(path)
+    try:
+        lock = RunLock(path)
+    except OSError as error:
+        shutil.rmtree(path, ignore_errors=True)
+        raise _refused(error, path) from error
     try:
         with interrupts() as seen:
             try:
                 run = _begin(path, kind, study, label, argv, inputs, digest, page)
             except BaseException as error:
-                shutil.rmtree(path)  # no manifest yet: nothing that could be read
-                raise _disk_error_of(error, path) from error
+                shutil.rmtree(path, ignore_errors=True)  # no manifest yet: nothing that could be read
+                raise _refused(error, path) from error
             try:
                 yield run
                 with undisturbed():
                     run.end("ok")
             except BaseException as error:
-                outcome = KeyboardInterrupt() if seen.asked else _disk_error_of(error, path)
+                outcome = KeyboardInterrupt() if seen.asked else _refused(error, path)
                 with undisturbed():
                     _end_failed(run, outcome)
                 if outcome is not error:
@@ -103,6 +107,7 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         path = out / (name if attempt == 1 else f"{name}-{attempt}")
         try:
             path.mkdir(parents=True)
+            sync(out)
             return path
         except FileExistsError:
             if not path.is_dir():
@@ -165,27 +170,28 @@ def _begin(
 
 def fingerprint(config: str, code: Code, environment: Environment, inputs: Mapping[str, str]) -> str:
     """One hash over what decides a result: configuration, code, inputs by their results, machine and packages."""
-    machine = (environment.python, environment.machine, environment.cpu, environment.threads, environment.packages)
+    machine = [environment.python, environment.machine, environment.cpu, environment.threads, environment.packages]
+    if environment.features or environment.settings:  # of version 0.1.0 neither is known
+        machine += [environment.features, environment.settings]
     decisive = (config, code.tree_sha256, sorted(inputs.items()), machine)
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
-def _disk_error_of(error: BaseException, path: Path) -> BaseException:
-    """The user's error behind a full or read-only disk, wherever it was met; any other error as it is."""
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
-        fix = ("free space or choose another ", OUT)
-        return UserError(f"cannot write: {error.strerror}", str(error.filename or path), fix)
-    return error
+def _refused(error: BaseException, path: Path) -> BaseException:
+    """The user's error behind one of the disk or the system, wherever it was met; any other error as it is."""
+    known = None if isinstance(error, FileNotFoundError) else error_of_the_system(error, path)
+    return known or error
 
 
 def _end_failed(run: LiveRun, error: BaseException) -> None:
     if isinstance(error, KeyboardInterrupt):
-        run.end("interrupted", 130)
+        with suppress(UserError):  # the folder is gone, or the disk full: the user wants an end all the same
+            run.end("interrupted", 130)
     elif isinstance(error, UserError):
         run.end(
             "failed",
             error.exit_code,
-            Error(type="UserError", what=error.what, where=error.where, fix=error.fix),
+            Error(type="UserError", what=error.what, where=str(error.where), fix=str(error.fix)),
         )
     else:
         run.end("failed", 1, Error(type=type(error).__name__, what=str(error)))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
+import logging
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from wristctl.config.errors import UserError
 from wristctl.records.files import write_text
+from wristctl.records.lock import lock
 
 TAGS = "tags.json"
+
+_log = logging.getLogger(__name__)
 
 
 def read_tags(results: Path) -> dict[str, list[str]]:
@@ -20,11 +23,20 @@ def read_tags(results: Path) -> dict[str, list[str]]:
         found = json.loads((results / TAGS).read_bytes())
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"cannot read the tags: {error}", str(results / TAGS), "mend or delete it") from error
-    if isinstance(found, dict) and all(isinstance(tags, list) for tags in found.values()):
+    if isinstance(found, dict) and all(_is_list_of_tags(tags) for tags in found.values()):
         return found
     raise UserError("the tags are no lists by run id", str(results / TAGS), "mend or delete it")
+
+
+def known_tags(results: Path) -> dict[str, list[str]]:
+    """Tags by run id, for whoever can do without: where they cannot be read there are none, and a warning."""
+    try:
+        return read_tags(results)
+    except UserError as error:
+        _log.warning("runs are shown without their tags: %s", error)
+        return {}
 
 
 def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterable[str] = ()) -> list[str]:
@@ -33,11 +45,15 @@ def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterab
     for tag in add:
         if not re.fullmatch(r"[A-Za-z0-9_.:/-]{1,60}", tag):
             raise UserError("a tag holds letters, digits and _ . : / -", repr(tag), "respell it")
-    with (results / ".tags.lock").open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with (results / ".tags.lock").open("a") as held:
+        lock(held.fileno())
         tags = read_tags(results)
         remaining = sorted((set(tags.pop(run, ())) | set(add)) - set(remove))
         if remaining:
             tags[run] = remaining
         write_text(results / TAGS, json.dumps(tags, indent=2, sort_keys=True) + "\n")
     return remaining
+
+
+def _is_list_of_tags(tags: object) -> bool:
+    return isinstance(tags, list) and all(isinstance(tag, str) for tag in tags)

@@ -51,7 +51,7 @@ def _differences(runs: list[Run]) -> list[dict[str, Any]]:
 def _pictures(runs: list[Run]) -> list[tuple[str, list[tuple[str, str]]]]:
     """The figures by name, each with one picture per run that has it."""
     found: dict[str, list[tuple[str, str]]] = {}
-    for number, run in enumerate(runs):
-        for name, markup in figures(run, f"r{number}"):
-            found.setdefault(name, []).append((run.id, markup))
+    for run in runs:
+        for name, picture in figures(run):
+            found.setdefault(name, []).append((run.id, picture))
     return list(found.items())

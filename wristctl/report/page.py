@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
 import shlex
@@ -14,7 +16,7 @@ from wristctl.records.lineage import ancestry
 from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of
 from wristctl.records.run import Run
 from wristctl.report.animation import animation
-from wristctl.report.inline_svg import inline_figure
+from wristctl.report.inline_figure import inline_figure
 from wristctl.report.lineage_picture import lineage_picture
 
 if TYPE_CHECKING:
@@ -57,13 +59,16 @@ def _templates() -> Environment:
     folder = Path(__file__).parent / "templates"
     made = Environment(loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True)
     made.filters["cell"] = _cell
+    scripts = [made.get_template(each.name).render().encode() for each in sorted(folder.glob("*.js"))]
+    hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
+    made.globals["allowed"] = " ".join(f"'sha256-{each}'" for each in hashes)  # no other script runs in a page
     return made
 
 
-def figures(run: Run, prefix: str = "") -> Figures:
-    """Name and markup of each figure of a run, in alphabetical order."""
+def figures(run: Run) -> Figures:
+    """Name and data URL of each figure of a run, in alphabetical order."""
     files = sorted((run.path / "figures").glob("*.svg"))
-    return [(file.stem.replace("-", " "), inline_figure(file, f"{prefix}f{k}-")) for k, file in enumerate(files)]
+    return [(file.stem.replace("-", " "), inline_figure(file)) for file in files if not file.is_symlink()]
 
 
 def _cell(value: Any) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from wristctl.config.printable import printable
+
 
 @dataclass(frozen=True)
 class Table:
@@ -18,9 +20,10 @@ class Table:
 
     def text(self, width: int | None = None) -> str:
         """Aligned columns, numbers to four digits; columns beyond `width` go below, the first repeated."""
+        heads = [printable(each) for each in self.columns]
         rows = [[_plain(value) for value in row] for row in self.rows]
         cells = [[_cell(value) for value in row] for row in rows]
-        widths = [max(map(len, column)) for column in zip(self.columns, *cells, strict=True)]
+        widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
         right = [_numeric([row[at] for row in rows]) for at in range(len(self.columns))]
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
@@ -30,7 +33,7 @@ class Table:
         blocks = []
         for chosen in _blocks(widths, width):
             rule = "  ".join("-" * widths[at] for at in chosen)
-            blocks.append("\n".join([line(self.columns, chosen), rule, *(line(row, chosen) for row in cells)]))
+            blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
         return "\n".join([self.title, ""] * bool(self.title) + ["\n\n".join(blocks)])
 
 
@@ -49,7 +52,7 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str | int):
-        return str(value)
+        return printable(value)
     return number(float(value))
 
 

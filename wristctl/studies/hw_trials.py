@@ -95,7 +95,7 @@ def perform_trials(
 def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
     courses = pd.read_csv(run.file("data/log.csv"))
-    file = run.file("data/truth.csv")
+    file = run.path / "data/truth.csv"
     truths = pd.read_csv(file) if file.is_file() else None
     rows = []
     for trial in trials:

@@ -100,6 +100,10 @@ def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     s, w = 0.5 * (nodes + 1.0), 0.5 * weights
-    wave = np.exp(1j * theta[:, None] * s)
-    f, df, ddf = (wave @ (w * (1j * s) ** k) for k in range(3))
-    return tuple(np.stack([v.real, v.imag], axis=-1) for v in (f, df, ddf))  # type: ignore[return-value]
+    found = np.zeros((3, len(theta)), complex)
+    for node, weight in zip(s, w, strict=True):  # a matrix product sums in an order of the processor's own
+        wave = weight * np.exp(1j * theta * node)
+        for k in range(3):
+            found[k] += wave
+            wave = wave * (1j * node)
+    return tuple(np.stack([v.real, v.imag], axis=-1) for v in found)  # type: ignore[return-value]

@@ -11,6 +11,7 @@ import typer
 from wristctl.cli.completion import run_ids
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
 from wristctl.records import open_run
 from wristctl.records.difference import Difference, difference
 from wristctl.records.journal import jsonable
@@ -36,7 +37,9 @@ def diff(
         }
         print(json.dumps(jsonable({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
         return
-    print(f"before  {a.id}\nafter   {b.id}\n")
+    say(f"before  {a.id}")
+    say(f"after   {b.id}")
+    print()
     print("\n\n".join(table.text() for table in _tables(found)) or "nothing differs")
 
 

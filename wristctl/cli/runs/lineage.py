@@ -7,6 +7,7 @@ from dataclasses import asdict
 
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
 from wristctl.records import open_run
 from wristctl.records.lineage import ancestry, dependents
 
@@ -20,6 +21,6 @@ def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = 
         print(json.dumps(shown, indent=2))
         return
     for line in tree.lines():
-        print(line)
+        say(line)
     for user in users:
-        print(f"used by {user}")
+        say(f"used by {user}")

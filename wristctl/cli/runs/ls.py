@@ -10,6 +10,7 @@ import typer
 
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS
+from wristctl.cli.say import say
 from wristctl.records.index import IndexEntry
 from wristctl.records.journal import jsonable
 from wristctl.records.query import entries, in_order, select
@@ -43,7 +44,7 @@ def ls(
     elif found:
         print(_table(found, [sort, *where]).text())
     else:
-        print(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
+        say(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
 
 
 def _table(found: list[IndexEntry], asked: list[str]) -> Table:

@@ -12,13 +12,16 @@ from typing import Annotated, Any
 
 import typer
 
+from wristctl.cli.child import end_with_parent
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.lineage import input_run
-from wristctl.records.manifest import CONFIG, command_of
+from wristctl.records.manifest import CONFIG, KINDS, command_of
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
+from wristctl.records.run import NAME_A_RUN
 from wristctl.report.printed_table import Table
 
 _SAME = ("identical", "within tolerance", "volatile")
@@ -40,6 +43,8 @@ def replay(
     run = open_run(ref, out)
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
+    if run.kind not in KINDS:  # it becomes a part of a command
+        raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
     changed = changed_inputs(run)
     if changed:
         return _conclude(run, None, [], changed, as_json)
@@ -62,7 +67,8 @@ def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
     options = [part for text in [*named, *overrides] for part in ("--set", text)]
     again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
     command = [sys.executable, "-P", "-m", "wristctl", *again]
-    return subprocess.run([*command, *options, "--label", "replay"], stdout=subprocess.DEVNULL).returncode
+    whole = [*command, *options, "--label", "replay"]
+    return subprocess.run(whole, stdout=subprocess.DEVNULL, preexec_fn=end_with_parent).returncode
 
 
 def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
@@ -76,7 +82,7 @@ def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: l
         if found:
             print(Table("", ("file", "verdict", "where"), found).text(), end="\n\n")
         for cause in why:
-            print(f"cause: {cause}")
+            say(f"cause: {cause}")
     if why:
         kept = f"the repetition is in {scratch}" if scratch else "mend the input, or run its command again"
         raise UserError("the repetition differs" if found else "the run was not repeated", run.id, kept, exit_code=3)
@@ -84,4 +90,4 @@ def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: l
         shutil.rmtree(scratch)
     if not as_json:
         exact = all(each.verdict in ("identical", "volatile") for each in found)
-        print(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")
+        say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

@@ -10,6 +10,7 @@ import typer
 
 from wristctl.cli.options import Debug, Out
 from wristctl.cli.runs.run_options import RESULTS, Refs
+from wristctl.cli.say import say
 from wristctl.records import open_run
 from wristctl.records.files import write_text
 
@@ -28,4 +29,4 @@ def report(
     name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
     file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
     write_text(file, page(runs[0], runs[0].manifest) if len(runs) == 1 else several_page(runs))
-    print(file)
+    say(file)

@@ -7,23 +7,24 @@ import shlex
 
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
 from wristctl.records import Run, open_run
 from wristctl.records.journal import jsonable
-from wristctl.records.tags import read_tags
+from wristctl.records.tags import known_tags
 from wristctl.report.printed_table import Table
 
 
 def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
     """Show one run: command, state, inputs, metrics and files."""
     run = open_run(ref, out)
-    tags = read_tags(run.path.parent).get(run.id, [])
+    tags = known_tags(run.path.parent).get(run.id, [])
     if as_json:
         manifest = json.loads(run.manifest.model_dump_json(by_alias=True))
         shown = {**manifest, "state": run.state, "tags": tags, "metrics": run.metrics, "run": str(run.path)}
         print(json.dumps(jsonable(shown), indent=2))
         return
     print("\n\n".join(table.text() for table in _tables(run, tags)), end="\n\n")
-    print(run.path)
+    say(run.path)
 
 
 def _tables(run: Run, tags: list[str]) -> list[Table]:

@@ -8,6 +8,7 @@ import typer
 
 from wristctl.cli.options import Debug, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
 from wristctl.records import open_run
 from wristctl.records.tags import change_tags
 
@@ -21,4 +22,4 @@ def tag(
 ) -> None:
     """Add tags to a run, or take them away; they stand in tags.json beside the runs."""
     run = open_run(ref, out)
-    print(f"{run.id}  {', '.join(change_tags(run.path.parent, run.id, tags or (), remove or ())) or 'no tags'}")
+    say(f"{run.id}  {', '.join(change_tags(run.path.parent, run.id, tags or (), remove or ())) or 'no tags'}")

@@ -10,6 +10,7 @@ import typer
 from wristctl.cli.completion import run_ids
 from wristctl.cli.options import Debug, Json, Out
 from wristctl.cli.runs.run_options import RESULTS
+from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 
@@ -31,9 +32,9 @@ def verify(
         print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
     else:
         for name, problems in found.items():
-            print(f"{name}  {'changed' if problems else 'as sealed'}")
+            say(f"{name}  {'changed' if problems else 'as sealed'}")
             for file, what in problems:
-                print(f"  {file}: {what}")
+                say(f"  {file}: {what}")
     changed = sum(bool(problems) for problems in found.values())
     if changed:
         fix = "restore the files named, or run the command again"

@@ -1,0 +1,59 @@
+"""What the disk or the system refuses is the user's to mend, and no bug."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+from wristctl.config.errors import UserError
+from wristctl.config.wording import OUT, Phrase
+
+_SPACE: Phrase = ("free space or choose another ", OUT)
+_ELSEWHERE: Phrase = ("choose a folder you can write to with ", OUT)
+_FIXES: dict[int, Phrase] = {
+    errno.ENOSPC: _SPACE,
+    errno.EDQUOT: _SPACE,
+    errno.EIO: ("check the disk, or choose another ", OUT),
+    errno.EFBIG: ("raise the limit on files (ulimit -f), or choose another ", OUT),
+    errno.EROFS: _ELSEWHERE,
+    errno.EACCES: _ELSEWHERE,
+    errno.EPERM: _ELSEWHERE,
+    errno.ESTALE: _ELSEWHERE,
+    errno.ENXIO: _ELSEWHERE,
+    errno.ENOTCONN: _ELSEWHERE,
+    errno.ETIMEDOUT: _ELSEWHERE,
+    errno.EREMOTEIO: _ELSEWHERE,
+    errno.ENOLCK: _ELSEWHERE,
+    errno.EMFILE: "raise the limit on open files (ulimit -n)",
+    errno.ENFILE: "close other programs: the system has no more open files to give",
+    errno.ENOMEM: "close other programs, or ask for less at once",
+    errno.EAGAIN: "close other programs: the system has no more processes to give",
+    errno.ENAMETOOLONG: "shorten the name",
+    errno.ELOOP: "mend the links on the way to it",
+    errno.ENOENT: "leave the files of a run where they are while it is used",
+    errno.ENOTDIR: "name a folder",
+    errno.EISDIR: "name a file",
+    errno.ENOTEMPTY: "leave the folder alone meanwhile, and try again",
+    errno.EBUSY: "leave the folder alone meanwhile, and try again",
+    errno.EXDEV: _ELSEWHERE,
+}
+"""What helps where the system refuses, by errno."""
+
+
+_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+
+
+def error_of_the_system(error: BaseException, place: Path | str = "") -> UserError | None:
+    """The user's error where the disk or the system has refused; None of an error that is ours."""
+    if isinstance(error, MemoryError):
+        return UserError(f"not enough memory: {error}".rstrip(": "), str(place), _FIXES[errno.ENOMEM])
+    if isinstance(error, OSError) and error.errno in _FIXES:
+        where = error.filename if isinstance(error.filename, str) else place
+        what = "cannot write" if error.errno in _WRITING else "the system refuses"
+        return UserError(f"{what}: {error.strerror}", str(where), _FIXES[error.errno])
+    return None
+
+
+def fix_of(error: OSError) -> Phrase:
+    """What helps where something could not be written."""
+    return _FIXES.get(error.errno or 0, _SPACE)

@@ -1,0 +1,80 @@
+"""What processes that were killed have left in a results folder, and nobody needs."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from wristctl.records.files import PART
+from wristctl.records.index import TEMPORARY, run_names
+from wristctl.records.live import RESERVE
+from wristctl.records.lock import LOCK, is_locked
+from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, MANIFEST, PACKAGES, PATCH, SOURCES, SUMS
+from wristctl.records.remove import REMOVED
+from wristctl.records.run import Run
+from wristctl.records.tags import TAGS, change_tags, known_tags
+
+_BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK}
+"""All that a run may have written before its manifest."""
+
+
+class Leftover(NamedTuple):
+    """Something to delete, and what it was; `size` in bytes."""
+
+    path: Path
+    what: str
+    size: int
+
+
+def leftovers(results: Path) -> Iterator[Leftover]:
+    """Half-deleted runs, half-written files, the reserves of crashed runs, and folders in which no run began."""
+    for path in sorted(results.glob(".*")):
+        if path.name.endswith(REMOVED) and path.is_dir():
+            yield Leftover(path, "a run that was being deleted", _size(path))
+        elif path.name.startswith(TEMPORARY) or path.name == f".{TAGS}{PART}":
+            yield Leftover(path, "a file that was being written", _size(path))
+    for name in run_names(results):
+        run = Run(results / name)
+        if run.path.is_symlink() or is_locked(run.path) or (run.path / SUMS).exists():
+            continue
+        if not (run.path / MANIFEST).exists():
+            if _began_no_run(run.path):
+                yield Leftover(run.path, "a run that was killed before it began", _size(run.path))
+            continue
+        for path in sorted(run.path.rglob(".*")):
+            if path.name in (RESERVE, LOCK) or path.name.endswith(PART):
+                yield Leftover(path, "left by a run that was killed", _size(path))
+
+
+def lost_tags(results: Path) -> dict[str, list[str]]:
+    """Tags of runs that are gone."""
+    there = set(run_names(results))
+    return {run: tags for run, tags in known_tags(results).items() if run not in there}
+
+
+def clear(found: Leftover) -> None:
+    """Delete it."""
+    if found.path.is_dir() and not found.path.is_symlink():
+        shutil.rmtree(found.path)
+    else:
+        found.path.unlink(missing_ok=True)
+
+
+def clear_tags(results: Path, lost: dict[str, list[str]]) -> None:
+    """Take off tags of runs that are gone."""
+    for run, tags in lost.items():
+        change_tags(results, run, remove=tags)
+
+
+def _began_no_run(folder: Path) -> bool:
+    """Whether a folder holds only what a run writes before its manifest: anything else is somebody's."""
+    names = {each.name for each in folder.iterdir()}
+    begun = {name for name in names if name in _BEGINNING or (name.startswith(".") and name.endswith(PART))}
+    return names == begun and folder.name[:8].isdigit() and not any(each.is_dir() for each in folder.iterdir())
+
+
+def _size(path: Path) -> int:
+    files = [path] if not path.is_dir() or path.is_symlink() else path.rglob("*")
+    return sum(each.lstat().st_size for each in files if each.is_symlink() or each.is_file())
