@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from wristctl.config.errors import UserError
@@ -36,7 +37,7 @@ Make = Callable[..., Run]
 def removed_while_running(results: Path, what: Callable[[Path], object], exist: bool = True) -> UserError:
     with pytest.raises(UserError) as caught, start_run("tune", Study(), "", results) as live:
         live.metric("rmse", 1.0)
-        live.table("data/samples.csv", {"x": [1.0]})
+        live.table("data/samples.csv", {"x": np.ones(1)})
         what(live.path)
         live.arrays("data/after.npz", {}) if exist else None
     return caught.value
