@@ -63,7 +63,8 @@ bench-all: .venv/run
 
 # Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
 test-trust: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_kill.py tests/cli/test_replay.py tests/records/test_query.py
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/faults tests/cli/test_kill.py tests/cli/test_replay.py tests/records/test_query.py \
+	  tests/lanes/test_processors.py
 
 # Small wrong changes to a copy of the package: does a test notice each? The listed ones, or `make mutants SEED=7`.
 mutants: .venv/dev

@@ -11,10 +11,10 @@ from wristctl.records.files import PART
 from wristctl.records.index import TEMPORARY, run_names
 from wristctl.records.live import RESERVE
 from wristctl.records.lock import LOCK, is_locked
-from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, MANIFEST, PACKAGES, PATCH, SOURCES, SUMS
+from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, SUMS
 from wristctl.records.remove import REMOVED
 from wristctl.records.run import Run
-from wristctl.records.tags import TAGS, change_tags, known_tags
+from wristctl.records.tags import change_tags, known_tags
 
 _BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK}
 """All that a run may have written before its manifest."""
@@ -33,18 +33,19 @@ def leftovers(results: Path) -> Iterator[Leftover]:
     for path in sorted(results.glob(".*")):
         if path.name.endswith(REMOVED) and path.is_dir():
             yield Leftover(path, "a run that was being deleted", _size(path))
-        elif path.name.startswith(TEMPORARY) or path.name == f".{TAGS}{PART}":
+        elif path.name.startswith(TEMPORARY) or path.name.endswith(PART):
             yield Leftover(path, "a file that was being written", _size(path))
     for name in run_names(results):
         run = Run(results / name)
-        if run.path.is_symlink() or is_locked(run.path) or (run.path / SUMS).exists():
+        if run.path.is_symlink() or is_locked(run.path):
             continue
-        if not (run.path / MANIFEST).exists():
-            if _began_no_run(run.path):
-                yield Leftover(run.path, "a run that was killed before it began", _size(run.path))
+        if _began_no_run(run.path):
+            yield Leftover(run.path, "a run that was killed before it began", _size(run.path))
             continue
+        sealed = (run.path / SUMS).exists()
         for path in sorted(run.path.rglob(".*")):
-            if path.name in (RESERVE, LOCK) or path.name.endswith(PART):
+            unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
+            if unfinished or path == run.path / LOCK:
                 yield Leftover(path, "left by a run that was killed", _size(path))
 
 
