@@ -44,7 +44,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "compare", *FAST, "--horizon", "0.1", "--set", "inverses=[none]", "--set", f"references=[{MOVE}]",
         "--set", "rows=[{controller: smc, gains: initial}]",
     ),
-    "simulate": ("simulate", "--horizon", "0.1"),
+    "simulate": ("simulate", "--set", "horizon=0.1"),
     "audit": ("audit", "--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),
     "tag": ("runs", "tag", "DATA", "new"),
     "rm": ("runs", "rm", "DATA", "--yes"),

@@ -1,0 +1,87 @@
+"""Who sealed a run: an SSH signature over its SHA256SUMS, by OpenSSH's `ssh-keygen -Y` (8.2 or later).
+
+The seal finds accidents; a signature finds people. It says that the holder of a key has vouched for every file of the
+run as it is, and needs somebody who says whose key that is: an allowed signers file, as git and ssh-keygen have it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import NamedTuple
+
+from wristctl.config.errors import UserError
+from wristctl.config.system_errors import error_of_the_system
+from wristctl.records.manifest import SIGNATURE, SUMS
+from wristctl.records.run import Run
+
+NAMESPACE = "wristctl-run"
+"""A signature made for another purpose does not count."""
+
+
+class RunSignature(NamedTuple):
+    """What is known of the signature of a run: `signer` is empty where the key is nobody's that is known."""
+
+    signer: str
+    key: str
+    fault: str = ""
+
+
+def sign(run: Run, key: Path) -> RunSignature:
+    """Sign a run whose files are all as they were sealed, with a private key, or the public one where an agent has it.
+
+    UserError where that is not so, or ssh-keygen refuses.
+    """
+    run.check()
+    (run.path / SIGNATURE).unlink(missing_ok=True)
+    done = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, str(run.path / SUMS))
+    if done.returncode != 0 or not (run.path / SIGNATURE).is_file():
+        raise UserError(
+            f"cannot sign: {_told(done)}", str(key), "name a private SSH key: ssh-keygen -t ed25519 makes one"
+        )
+    return signature(run, None)
+
+
+def signature(run: Run, signers: Path | None) -> RunSignature:
+    """Whose signature a run has. UserError where it has none, or the allowed signers cannot be read."""
+    file = run.path / SIGNATURE
+    if not file.is_file() or file.is_symlink():
+        raise UserError("run is not signed", str(run.path), "ask whoever made it to run `wristctl runs sign`")
+    content = _content(run.path / SUMS)
+    valid = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(file), content=content)
+    found = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))
+    if valid.returncode != 0 or not found:
+        return RunSignature("", "", f"the signature is not of this {SUMS}: {_told(valid)}")
+    key = found[1]
+    if signers is None:
+        return RunSignature("", key)
+    _content(signers)
+    names = _ssh_keygen("find-principals", "-s", str(file), "-f", str(signers))
+    for name in names.stdout.decode(errors="replace").splitlines():
+        options = ("-f", str(signers), "-I", name, "-n", NAMESPACE, "-s", str(file))
+        if _ssh_keygen("verify", *options, content=content).returncode == 0:
+            return RunSignature(name, key)
+    return RunSignature("", key, f"the key {key} is nobody's in {signers}")
+
+
+def _ssh_keygen(what: str, *options: str, content: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    program = shutil.which("ssh-keygen")
+    if program is None:
+        raise UserError("signatures need OpenSSH", "ssh-keygen", "install openssh-client")
+    plain = {**os.environ, "LC_ALL": "C"}
+    return subprocess.run([program, "-Y", what, *options], input=content, capture_output=True, env=plain)
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise (error_of_the_system(error, file) or error) from error
+
+
+def _told(done: subprocess.CompletedProcess[bytes]) -> str:
+    lines = done.stderr.decode(errors="replace").split("\n")
+    return next((line.strip() for line in lines if line.strip()), f"ssh-keygen ended with {done.returncode}")
