@@ -14,9 +14,9 @@ from PIL import Image
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.records import Run, start_run
+from wristctl.records import Run, formats, start_run
 from wristctl.records.code import code_state
-from wristctl.records.formats import read_arrays, write_arrays, write_figure
+from wristctl.records.formats import read_arrays, write_arrays, write_figure, write_table
 
 Make = Callable[..., Run]
 
@@ -111,3 +111,17 @@ def test_a_package_that_a_repository_holds_but_does_not_track_has_no_commit(
     subprocess.run([*git, "commit", "-q", "-m", "all"], check=True)
     code, changes, _ = code_state()
     assert (code.branch, code.dirty, changes) == ("trunk", False, b"") and len(code.commit or "") == 40
+
+
+def test_a_table_is_the_same_however_many_lines_are_made_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns = {"x": np.array([0.1, np.nan, -1e300, 3.0, 5e-324]), "name": np.array(list("abcde"))}
+    written = []
+    for lines in (1, 2, 5, 50):
+        monkeypatch.setattr(formats, "_LINES", lines)
+        write_table(tmp_path / "t.csv", columns)
+        written.append((tmp_path / "t.csv").read_text())
+    assert written == 4 * ["x,name\n0.1,a\n,b\n-1e+300,c\n3.0,d\n5e-324,e\n"]
+    with pytest.raises(ValueError, match="zip"):
+        write_table(tmp_path / "t.csv", {"x": np.ones(3), "y": np.ones(60)})

@@ -165,3 +165,17 @@ def test_a_run_and_its_source_belong_together() -> None:
         plan("source: run")
     (need,) = GEN_DATA.needs
     assert need.optional and need.kind is None
+
+
+def test_of_more_samples_than_anybody_reads_the_arrays_alone_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wristctl.studies.gen_data.READABLE", 100)
+    for count, csv, shown in ((100, True, "100"), (250, False, "84 of 250")):
+        study = wristctl.load_study(None, f"gen-data.samples={count}")
+        with start_run("gen-data", study, "", tmp_path) as live:
+            GEN_DATA.perform(session(study, live))
+        run = Run(live.path)
+        assert (run.path / "data" / "samples.csv").exists() == csv
+        assert len(run.array("samples")["theta"]) == count == run.metrics["samples"]["value"]
+        assert f"<!-- {shown} samples of the tip -->" in run.file("figures/coverage.svg").read_text()

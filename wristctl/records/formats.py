@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     Columns = pd.DataFrame | Mapping[str, np.ndarray]
 
 
+_LINES = 50_000
+"""Of a table, made at a time: as Python's numbers they take ten times the memory."""
 _LARGEST_SHARE = 100
 """How many times its size an archive may hold: ours are stored as they are."""
 
@@ -27,11 +29,14 @@ def write_table(path: Path, columns: Columns) -> None:
     """Columns as CSV under their names; floats are written so that they read back exactly, nan as nothing."""
     import numpy as np
 
-    values = [[None if cell != cell else cell for cell in np.asarray(each).tolist()] for _, each in columns.items()]
+    arrays = [np.asarray(each) for _, each in columns.items()]
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns.keys())
-        writer.writerows(zip(*values, strict=True))
+        for begin in range(0, max(map(len, arrays), default=0), _LINES):
+            parts = (each[begin : begin + _LINES].tolist() for each in arrays)
+            cells = ([None if cell != cell else cell for cell in part] for part in parts)
+            writer.writerows(zip(*cells, strict=True))
 
 
 def read_table(path: Path) -> pd.DataFrame:

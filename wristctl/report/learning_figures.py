@@ -33,9 +33,13 @@ MOST_PATHS = 5000
 """More dots than this are drawn as pixels, or an SVG would hold a path for each."""
 
 
-def coverage(samples: pd.DataFrame) -> Figure:
-    """Tip positions of a data set, coloured by bending angle; a table with x, y [m] and theta [rad]."""
-    made, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{len(samples)} samples of the tip")
+def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
+    """Tip positions of a data set, coloured by bending angle; a table with x, y [m] and theta [rad].
+
+    It may be a part of the data set, which has `count` samples.
+    """
+    shown = f"{len(samples)} of {count}" if count not in (None, len(samples)) else f"{len(samples)}"
+    made, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
     bend = float(np.degrees(samples["theta"].abs().max()))
     dots = axes.scatter(
         1e3 * samples["y"],

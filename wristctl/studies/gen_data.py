@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from wristctl.learning.dataset import Samples
 
 
+READABLE = 200_000
+"""Samples beyond which there is no samples.csv, which nobody would read, and the figure shows some of them."""
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Generated(StudyResult):
     """Samples of tip positions [m] and bending angles [rad]."""
@@ -74,11 +78,12 @@ def gen_data(session: Session) -> Generated:
     table = samples_table(samples)
     exact = angle_errors(exact_angle(samples.tip), samples.theta)
 
-    findings.table("data/samples.csv", table, UNITS, MEANING)
-    findings.arrays("data/samples.npz", samples.arrays())
-    findings.figure("coverage", coverage, table)
-
     count = len(samples.theta)
+    if count <= READABLE:
+        findings.table("data/samples.csv", table, UNITS, MEANING)
+    findings.arrays("data/samples.npz", samples.arrays())
+    findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
+
     findings.metric("samples", count, meaning="number of samples")
     for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
         share = float(np.mean(samples.held_out == code))
