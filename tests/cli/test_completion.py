@@ -7,10 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from wristctl.cli.completion import controllers, run_ids, study_files
+from wristctl.cli.completion import MOST, controllers, run_ids, study_files
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.study import Study
 from wristctl.records import start_run
@@ -93,3 +94,15 @@ def test_folders_and_files_below_what_is_typed_are_in_order(folder: Path, monkey
 
 def test_controllers_are_in_order() -> None:
     assert controllers("") == sorted(CONTROLLERS) and controllers("no such") == []
+
+
+def test_of_very_many_runs_the_newest_are_offered(tmp_path: Path) -> None:
+    for number in range(MOST + 50):
+        folder = tmp_path / f"20260101T{number:06}Z-tune-abcdef"
+        folder.mkdir()
+        (folder / "run.json").touch()
+    context: Any = SimpleNamespace(params={"out": str(tmp_path)})
+    offered = run_ids(context, "2026")
+    assert len(offered) == MOST and offered[0] == f"20260101T{MOST + 49:06}Z-tune-abcdef"
+    assert run_ids(context, "20260101T000007Z") == ["20260101T000007Z-tune-abcdef"]
+    assert run_ids(context, "lat") == ["latest:tune"]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.cli.app import main
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, list_runs, open_run, require, start_run
@@ -345,3 +346,29 @@ def _lives(pid: str) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_of_a_run_in_a_read_only_archive_the_report_is_written_here(
+    make: Make, small_disk: Callable[[int], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    archive = small_disk(5)
+    run = make()
+    shutil.copytree(run.path, archive / run.id)
+    subprocess.run(["mount", "-o", "remount,ro", str(archive)], check=True)
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> tuple[object, str, str]:
+        monkeypatch.setattr(sys, "argv", ["wristctl", "runs", *arguments, "--out", str(archive)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, *capsys.readouterr()
+
+    code, out, _ = call("report", run.id)
+    assert code == 0 and out.strip() == f"report-{run.id}.html" and Path(out.strip()).is_file()
+    for verb in (["tag", run.id, "a"], ["rm", run.id, "--yes"], ["report", run.id, "--to", str(archive / "page.html")]):
+        code, _, err = call(*verb)
+        assert code == 2 and "Read-only file system" in err and err.count("\n") == 1, verb
+    for verb in (["ls"], ["show", run.id], ["verify"], ["lineage", run.id], ["gc"]):
+        assert call(*verb)[0] == 0, verb
+    assert Run(archive / run.id).problems() == []

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import os
+from itertools import islice
 from pathlib import Path
 
 import typer
 
 from wristctl.config.choices import CONTROLLERS
 
+MOST = 200
+"""Runs offered: of many thousands nobody reads the list, and a shell asks at every key."""
+
 
 def run_ids(context: typer.Context, incomplete: str) -> list[str]:
-    """Run directories of the folder given with --out, newest first, and latest:KIND."""
+    """Run directories of the folder given with --out, the newest first, and latest:KIND."""
     out = Path(context.params.get("out") or "results")
     try:
-        names = sorted((path.name for path in out.iterdir() if (path / "run.json").is_file()), reverse=True)
+        names = sorted((name for name in os.listdir(out) if not name.startswith(".")), reverse=True)
     except OSError:
         return []
     kinds = {f"latest:{kind}" for kind in _commands() if any(f"-{kind}-" in name for name in names)}
-    return [name for name in [*names, *sorted(kinds)] if name.startswith(incomplete)]
+    fitting = (name for name in names if name.startswith(incomplete) and (out / name / "run.json").is_file())
+    return [*islice(fitting, MOST), *(name for name in sorted(kinds) if name.startswith(incomplete))]
 
 
 def study_files(incomplete: str) -> list[str]:
