@@ -71,7 +71,7 @@ def train_one(
                 raise
             interrupted = True
         model, loss = course.kept()
-        norm = problem.gradient_norm(model)
+        norm = math.nan if interrupted else problem.gradient_norm(model)
         return TrainingResult(job, problem.export(model), tuple(course.epochs), loss, norm, interrupted)
 
 

@@ -51,7 +51,7 @@ class TrainingResult:
     validation_loss: float
     """of the network [rad^2]; not finite where the training diverged"""
     gradient_norm: float
-    """norm of the training loss's gradient at these weights: of the scaled angle, without weight decay"""
+    """norm of the training loss's gradient (scaled angle, no weight decay) at these weights; nan if interrupted"""
     interrupted: bool
     """whether Ctrl-C ended it early; the network is then that of the last whole epoch"""
 

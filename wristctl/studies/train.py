@@ -19,6 +19,7 @@ from wristctl.studies.train_outputs import (
     best_row,
     error_table,
     grid_tables,
+    keep_curves,
     keep_network,
     timing_table,
     trial_table,
@@ -124,15 +125,17 @@ def train(session: Session) -> Trained:
     seconds = time.perf_counter() - began
 
     name, own = best_row(trials)
-    kept, where = best_of(own), places(samples, split)
+    kept = best_of(own)
     keep_network(session, kept.network, name, choice.reason if choice else "")
+    if any(trial.interrupted for each in trials.values() for trial in each):
+        keep_curves(findings, own)
+        raise KeyboardInterrupt  # at once: to judge a network on very many samples takes longer than anybody waits
+    where = places(samples, split)
     tables.append(trial_table(findings, own, kept))
     measures = trials_frame(trials, where)
     tables += ranking_tables(findings, settings, trials, measures)
     tables.append(error_table(findings, kept, samples, split, where))
     tables.append(timing_table(findings, kept, samples, split, seconds))
-    if any(trial.interrupted for each in trials.values() for trial in each):
-        raise KeyboardInterrupt
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)
     return Trained(session.study, findings, tables, kept.network, trials, samples, split, choice, measures)

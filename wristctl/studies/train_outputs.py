@@ -66,15 +66,22 @@ def keep_network(session: Session, network: Network, name: str, reason: str) -> 
     save_network(network, run.file(NETWORK), record)
 
 
+def keep_curves(findings: Findings, trials: list[TrainingResult]) -> pd.DataFrame:
+    """curves.csv: the errors of every training over its epochs."""
+    from wristctl.report.learning_tables import MEANING, UNITS, curves_table
+
+    curves: pd.DataFrame = curves_table([epoch for trial in trials for epoch in trial.epochs])
+    findings.table("data/curves.csv", curves, UNITS, MEANING)
+    return curves
+
+
 def trial_table(findings: Findings, trials: list[TrainingResult], kept: TrainingResult) -> Table:
     """The course of every training of the kept network."""
     import numpy as np
 
     from wristctl.report.learning_figures import learning_curves
-    from wristctl.report.learning_tables import MEANING, UNITS, curves_table
 
-    curves: pd.DataFrame = curves_table([epoch for trial in trials for epoch in trial.epochs])
-    findings.table("data/curves.csv", curves, UNITS, MEANING)
+    curves = keep_curves(findings, trials)
     findings.figure("learning-curves", learning_curves, curves, kept.job.trial)
     findings.metric(
         "gradient_norm",
