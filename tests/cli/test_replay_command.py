@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Call
+from wristctl.cli.child import end_with_parent
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
 
@@ -33,7 +34,7 @@ def again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., list
         called: list[list[str]] = []
 
         def run(command: list[str], **given: Any) -> SimpleNamespace:
-            assert given == {"stdout": subprocess.DEVNULL}
+            assert given == {"stdout": subprocess.DEVNULL, "preexec_fn": end_with_parent}
             called.append(command)
             if value is not None:
                 _made("train", value, Path(command[command.index("--out") + 1]))
