@@ -92,7 +92,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="wristctl-faults-") as scratch:
         base = Path(scratch) / "base"
         base.mkdir()
-        _call(base, COMMANDS["gen-data"])
+        _call(base, (*COMMANDS["gen-data"], "--label", "base"))  # else a run of the same second needs another name
         for name in given.only.split(","):
             for mode in given.modes.split(","):
                 began = time.monotonic()

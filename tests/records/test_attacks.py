@@ -331,7 +331,7 @@ def test_a_killed_replay_takes_its_repetition_with_it(tmp_path: Path) -> None:
     replay = [*wristctl, "runs", "replay", "latest:gen-data", "--out", str(results)]
     child = subprocess.Popen(replay, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     below = Path(f"/proc/{child.pid}/task/{child.pid}/children")
-    while not (found := below.read_text().split()):
+    while not (found := [each for each in below.read_text().split() if _repeats(each)]):
         time.sleep(0.01)
     child.kill()
     child.wait()
@@ -339,6 +339,12 @@ def test_a_killed_replay_takes_its_repetition_with_it(tmp_path: Path) -> None:
     while any(Path(f"/proc/{each}/environ").exists() and _lives(each) for each in found):
         assert time.monotonic() < until
         time.sleep(0.02)
+    assert "ok" not in [run.state for each in scratch.glob("wristctl-replay-*") for run in list_runs(each)]
+
+
+def _repeats(pid: str) -> bool:
+    """Whether a child is the repetition already, and no longer a copy of its parent."""
+    return b"--label\0replay" in Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
 def _lives(pid: str) -> bool:

@@ -83,11 +83,13 @@ def main() -> NoReturn:
         except (KeyboardInterrupt, typer.Abort):
             code = 130
         except Exception as error:
-            refused = error_of_the_system(error)
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
-            what = f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}"
-            known = (str(refused), refused.exit_code) if refused else (what, 1)
-            code = 130 if seen.asked else _failed(known[0], error, known[1])
+            if seen.asked:
+                code = 130
+            elif refused := error_of_the_system(error):
+                code = _failed(str(refused), error, refused.exit_code)
+            else:
+                code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
 

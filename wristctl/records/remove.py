@@ -9,7 +9,7 @@ from pathlib import Path
 from wristctl.config.errors import UserError
 from wristctl.records.lineage import dependents
 from wristctl.records.run import Run
-from wristctl.records.seal import ADDED, ADDED_FOLDER
+from wristctl.records.seal import added, read_seal
 from wristctl.records.tags import change_tags, known_tags
 
 REMOVED = ".removed"
@@ -37,12 +37,8 @@ def removable(runs: Sequence[Run], force: bool = False) -> list[Run]:
 
 def foreign(run: Run) -> list[str]:
     """Files in a run's folder that are not the run's: somebody put them there after it was sealed."""
-    if run.path.is_symlink():
-        return []
-    try:
-        return [name for name, what in run.problems() if what in (ADDED, ADDED_FOLDER)]
-    except UserError:
-        return []
+    sums = None if run.path.is_symlink() else read_seal(run.path)
+    return [] if sums is None else added(run.path, sums)
 
 
 def remove(run: Run) -> None:

@@ -12,7 +12,7 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from wristctl.records.files import sha256_of, sha256_of_list, sync, write_text
+from wristctl.records.files import files_below, sha256_of, sha256_of_list, sync, write_text
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, SIGNATURE, SOURCES, SUMS, Manifest
 
@@ -43,8 +43,8 @@ def read_seal(folder: Path) -> dict[str, str] | None:
 def write_seal(folder: Path, known: dict[str, str]) -> None:
     """Seal a directory as it is, each file on the disk before; `known` are hashes of files that are there already."""
     found = {}
-    for name, kind in entries(folder):
-        if kind == "file" and name not in _BESIDE and not any(part.startswith(".") for part in name.split("/")):
+    for name in files_below(folder):
+        if name not in _BESIDE and not (folder / name).is_symlink():
             if name not in known:
                 sync(folder / name)
             found[name] = known.get(name) or sha256_of(folder / name)
@@ -67,6 +67,11 @@ def entries(folder: Path) -> Iterator[tuple[str, str]]:
                 waiting.append(name)
             else:
                 yield name, "link" if stat.S_ISLNK(mode) else "file" if stat.S_ISREG(mode) else "odd"
+
+
+def added(folder: Path, sums: dict[str, str]) -> list[str]:
+    """Whatever stands in a sealed run and is not the run's, by name; nothing is hashed."""
+    return sorted(name for name, _ in entries(folder) if name not in sums and name not in _BESIDE)
 
 
 def faults_of_files(folder: Path, sums: dict[str, str]) -> list[Fault]:

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 from wristctl.config.errors import UserError
 from wristctl.config.system_errors import error_of_the_system
+from wristctl.config.wording import Call
+from wristctl.records.files import write_text
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
 
@@ -36,20 +38,26 @@ def sign(run: Run, key: Path) -> RunSignature:
     UserError where that is not so, or ssh-keygen refuses.
     """
     run.check()
-    (run.path / SIGNATURE).unlink(missing_ok=True)
-    done = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, str(run.path / SUMS))
-    if done.returncode != 0 or not (run.path / SIGNATURE).is_file():
+    done = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=_content(run.path / SUMS))
+    if done.returncode != 0:
         raise UserError(
             f"cannot sign: {_told(done)}", str(key), "name a private SSH key: ssh-keygen -t ed25519 makes one"
         )
+    write_text(run.path / SIGNATURE, done.stdout.decode())
     return signature(run, None)
+
+
+def is_signed(run: Run) -> bool:
+    """Whether a run has a signature, be it worth something or not."""
+    file = run.path / SIGNATURE
+    return file.is_file() and not file.is_symlink()
 
 
 def signature(run: Run, signers: Path | None) -> RunSignature:
     """Whose signature a run has. UserError where it has none, or the allowed signers cannot be read."""
     file = run.path / SIGNATURE
-    if not file.is_file() or file.is_symlink():
-        raise UserError("run is not signed", str(run.path), "ask whoever made it to run `wristctl runs sign`")
+    if not is_signed(run):
+        raise UserError("run is not signed", str(run.path), ("ask whoever made it to run `", Call("runs sign"), "`"))
     content = _content(run.path / SUMS)
     valid = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(file), content=content)
     found = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))

@@ -17,6 +17,6 @@ def inline_figure(svg: Path) -> str:
     text = svg.read_text(encoding="utf-8", errors="replace")
     text = _PATH.sub(lambda path: _DIGITS.sub(lambda digits: digits[0][:3], path[0]).replace("\n", " "), text)
     picture = svg.with_suffix(".png")
-    if len(text) > LARGEST and picture.is_file():
+    if len(text) > LARGEST and picture.is_file() and not picture.is_symlink():
         return f"data:image/png;base64,{base64.b64encode(picture.read_bytes()).decode()}"
     return f"data:image/svg+xml;base64,{base64.b64encode(text.encode()).decode()}"

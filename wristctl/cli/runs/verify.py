@@ -15,7 +15,9 @@ from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.manifest import SIGNATURE
-from wristctl.records.signature import RunSignature, signature
+from wristctl.records.signature import RunSignature, is_signed, signature
+
+_UNSIGNED = RunSignature("", "", "run is not signed")
 
 
 def verify(
@@ -38,7 +40,9 @@ def verify(
     """
     runs = [open_run(ref, out) for ref in refs] if refs else list_runs(out)
     found = {run.id: _problems(run) for run in runs}
-    vouched = {run.id: _signature(run, signers) for run in runs} if signed or signers else {}
+    vouched = (
+        {run.id: signature(run, signers) if is_signed(run) else _UNSIGNED for run in runs} if signed or signers else {}
+    )
     for name, each in vouched.items():
         found[name] += [(SIGNATURE, each.fault)] if each.fault else []
     if as_json:
@@ -53,15 +57,6 @@ def verify(
     if changed:
         fix = "restore the files named, or run the command again"
         raise UserError(f"{changed} of {len(found)} runs are not as they were sealed", str(out), fix, exit_code=3)
-
-
-def _signature(run: Run, signers: Path | None) -> RunSignature:
-    try:
-        return signature(run, signers)
-    except UserError as error:
-        if str(signers) in error.where:
-            raise
-        return RunSignature("", "", error.what)
 
 
 def _by(found: RunSignature | None) -> str:
