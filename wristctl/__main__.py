@@ -1,5 +1,38 @@
-"""`python -m wristctl`: the command line under a chosen interpreter."""
+"""The command line as a process: Ctrl-C ends it in silence from here on, before all that it needs is imported."""
 
-from wristctl.cli.app import main
+from __future__ import annotations
 
-main()
+import os
+import signal
+import sys
+from contextlib import suppress
+
+
+def main() -> None:
+    """Run the command line; once it has ended nothing is left that Ctrl-C could end."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+    from wristctl.cli.app import main as command_line
+
+    try:
+        command_line()
+    except KeyboardInterrupt:  # in the very moment of its ending
+        _leave(130)
+    except SystemExit as ended:
+        if ended.code == 130:
+            _leave(130)
+        raise
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _leave(code: int) -> None:
+    """End without the interpreter's own clearing up, which need not bear what an interruption has left half done."""
+    with suppress(OSError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
+
+_SOON = 0.01
+"""Seconds in which a destructor or callback has ended."""
 
 
 @contextmanager
@@ -33,20 +37,42 @@ class Interrupts:
 
 @contextmanager
 def interrupts() -> Iterator[Interrupts]:
-    """Within the block (main thread only) Ctrl-C, where it is not ignored, and SIGTERM raise KeyboardInterrupt."""
+    """Within the block (main thread only) Ctrl-C, where it is not ignored, and SIGTERM raise KeyboardInterrupt.
+
+    One that falls into a destructor or a callback is swallowed by the interpreter, which tells only
+    `sys.unraisablehook`: with `again` for that hook it comes once more.
+    """
     seen = Interrupts()
 
     def raised(number: int, frame: FrameType | None) -> None:
         seen.asked = True
         raise KeyboardInterrupt
 
-    handlers: dict[signal.Signals, Any] = {signal.SIGTERM: raised}
+    handlers: dict[signal.Signals, Any] = {signal.SIGTERM: raised, signal.SIGALRM: raised}
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         handlers[signal.SIGINT] = raised
     with _handled(handlers):
         yield seen
 
 
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Within the block, which must be short, Ctrl-C and SIGTERM wait; they come at its end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def undisturbed() -> Any:
     """Within the block (main thread only) Ctrl-C and SIGTERM are ignored."""
-    return _handled({signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_IGN})
+    return _handled(dict.fromkeys((signal.SIGINT, signal.SIGTERM, signal.SIGALRM), signal.SIG_IGN))
+
+
+def again(told: sys.UnraisableHookArgs) -> None:
+    """What `sys.unraisablehook` does within `interrupts`."""
+    if told.exc_type is KeyboardInterrupt:
+        signal.setitimer(signal.ITIMER_REAL, _SOON)
+    else:
+        sys.__unraisablehook__(told)

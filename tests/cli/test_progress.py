@@ -9,6 +9,7 @@ import pytest
 from rich.console import Console
 
 from wristctl.cli import progress as module
+from wristctl.studies.counting import Count
 
 
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
@@ -33,6 +34,18 @@ def test_a_line_tells_count_and_figures(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(module, "_LINE_EVERY", 0.0)
     lines, _ = _shown(1000)
     assert lines[-1] == "tuning: 1000 of 1000 steps, best 0.001"
+
+
+def test_a_line_tells_the_time_that_is_left_at_the_pace_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    count = Count("drawing", 1000, "samples", 250, began=0.0)
+    monkeypatch.setattr("time.monotonic", lambda: 20.0)
+    assert count.seconds_left() == 60.0
+    assert count.line() == "drawing: 250 of 1000 samples, about 60 s left"
+    monkeypatch.setattr("time.monotonic", lambda: 2400.0)
+    assert count.line().endswith("about 2 h left")
+    assert Count("drawing", 1000, "samples", 1000).seconds_left() is None
+    assert Count("drawing", 1000, "samples").line() == "drawing"
+    assert Count("drawing", None, "samples", 3).line() == "drawing: 3 samples"
 
 
 def test_a_length_that_is_unknown_is_announced_and_quiet_is_quiet() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -13,7 +15,8 @@ import pytest
 from tests.cli.conftest import Call
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.records import InputRun, Run, start_run
+from wristctl.records import InputRun, Run, seal, start_run
+from wristctl.records.files import sha256_of
 from wristctl.records.manifest import Code
 from wristctl.records.tags import change_tags
 
@@ -99,6 +102,31 @@ def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run,
     told = json.loads(out)["runs"]
     assert code == 3 and "2 of 3" in err and told[live.id] == []
     assert told[data.id] == [{"file": "data/x.txt", "problem": "hash does not match what was sealed"}]
+
+
+def test_copies_of_a_run_and_one_that_cannot_be_read_are_each_verified(
+    call: Call, data: Run, network: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = tmp_path / "copy" / data.id
+    shutil.copytree(data.path, copy)
+    (copy / "data" / "x.txt").write_text("five")
+    code, out, _ = call("runs", "verify", data.id, str(copy))
+    assert code == 3 and out.splitlines()[:2] == [f"{data.id}  as sealed", f"{copy}  changed"]
+
+    honest = sha256_of
+
+    def refuse(path: Path) -> str:
+        if path == data.path / "config.yaml":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return honest(path)
+
+    monkeypatch.setattr(seal, "sha256_of", refuse)
+    code, out, _ = call("runs", "verify", data.id, network.id)
+    assert code == 3 and out.splitlines() == [
+        f"{data.id}  could not be checked",
+        "  config.yaml: cannot be read: Permission denied",
+        f"{network.id}  as sealed",
+    ]
 
 
 def test_tag_says_what_tags_there_are_now(call: Call, data: Run) -> None:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import logging
 import resource
+import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import Run, start_run, stream
 from wristctl.records.files import sha256_of_list
@@ -147,3 +149,9 @@ def test_the_result_hash_is_of_names_and_hashes_as_in_every_earlier_run(results:
         live.file("data/a.txt").write_text("a")
         live.file("timing.json").write_text("{}")
     assert Run(live.path).result_hash == sha256_of_list([("data/a.txt", hashlib.sha256(b"a").hexdigest())])
+
+
+def test_a_run_whose_folder_is_gone_listens_no_longer(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="removed, moved or replaced"), start_run("tune", Study(), out=tmp_path) as run:
+        shutil.rmtree(run.path)
+    assert not logging.getLogger("wristctl").handlers

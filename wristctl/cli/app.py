@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 import traceback
 from typing import NoReturn
@@ -15,7 +16,7 @@ from wristctl.cli.lazy_commands import lazy_group
 from wristctl.config.errors import UserError
 from wristctl.config.printable import printable
 from wristctl.config.system_errors import error_of_the_system
-from wristctl.interrupt import interrupts
+from wristctl.interrupt import again, interrupts
 
 _REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
 
@@ -71,7 +72,7 @@ def _wristctl(
 def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
     gc.set_threshold(100_000, 50, 100)  # imports make many objects and no cycles: looking for them costs 0.15 s
-    sys.unraisablehook = lambda told: None if told.exc_type is KeyboardInterrupt else sys.__unraisablehook__(told)
+    sys.unraisablehook = again
     with interrupts() as seen:
         try:
             code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
@@ -90,6 +91,7 @@ def main() -> NoReturn:
                 code = _failed(str(refused), error, refused.exit_code)
             else:
                 code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)  # what has ended need not be interrupted again
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
 

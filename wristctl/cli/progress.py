@@ -93,12 +93,12 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
     """
     live, lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
     bar = Progress(*_columns(), console=console, transient=True, disable=not live)
-    task = bar.add_task(what, total=total, figures="")
+    task = bar.add_task(what, total=total, figures="", left="")
     last_line = time.monotonic()
 
     def show(count: Count) -> None:
         nonlocal last_line
-        bar.update(task, completed=count.count, figures=count.beside())
+        bar.update(task, completed=count.count, figures=count.beside(), left=count.remaining())
         instant = time.monotonic()
         if lines and instant - last_line >= _LINE_EVERY:
             last_line = instant
@@ -112,4 +112,5 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
 
 def _columns() -> tuple[ProgressColumn, ...]:
     text, figures = TextColumn("{task.description}"), TextColumn("{task.fields[figures]}")
-    return SpinnerColumn(), text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), figures
+    passed, left = TimeElapsedColumn(), TextColumn("{task.fields[left]}")
+    return SpinnerColumn(), text, BarColumn(), MofNCompleteColumn(), passed, left, figures

@@ -39,7 +39,6 @@ _FIXES: dict[int, Phrase] = {
 }
 """What helps where the system refuses, by errno."""
 
-
 _WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import pickle
 from pathlib import Path
 from typing import Any
@@ -29,8 +30,10 @@ def fingerprint(samples: Samples, job: Job) -> str:
 def write_checkpoint(file: Path, mark: str, state: dict[str, object]) -> None:
     """Put away the state of the training with this fingerprint, in one piece."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(file) as temporary:
-        torch.save({"training": mark, "state": state}, temporary)
+    content = io.BytesIO()
+    torch.save({"training": mark, "state": state}, content)
+    with replacing(file) as temporary:  # by Python: where the disk refuses, torch says RuntimeError and no errno
+        temporary.write_bytes(content.getvalue())
 
 
 def read_checkpoint(file: Path, mark: str) -> dict[str, Any]:

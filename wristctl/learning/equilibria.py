@@ -7,6 +7,7 @@ that angle: the same tip belongs to another angle where the load is another.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,8 +25,14 @@ GRAVITY = 9.81
 """[m/s^2]"""
 
 
-def draw_equilibria(settings: DataSettings, wrist: WristParameters, rng: np.random.Generator) -> Samples:
-    """Stable equilibria with the angle in +-range_deg, poses in turn, payloads in their range.
+BLOCK = 20_000
+"""Equilibria that are searched together: a bound on memory."""
+
+
+def draw_equilibria(
+    settings: DataSettings, wrist: WristParameters, rng: np.random.Generator, done: Callable[[int], object] = int
+) -> Samples:
+    """Stable equilibria with the angle in +-range_deg, poses in turn, payloads in their range; `done` gets their count.
 
     What the tendons cannot hold within their limit, or what buckles, is left out. Raises UserError where that is
     more than half.
@@ -39,12 +46,17 @@ def draw_equilibria(settings: DataSettings, wrist: WristParameters, rng: np.rand
     which = np.arange(count) % len(tilts)
     pose, hand = tilts[which], wrist.hand_mass * (1.0 + payload)
 
-    parameters = np.tile(segments(wrist, n), (count, 1))
-    parameters[:, Segments._fields.index("hand_mass")] = hand
-    parameters[:, Segments._fields.index("gravity_x")] = -GRAVITY * np.cos(pose)
-    parameters[:, Segments._fields.index("gravity_y")] = GRAVITY * np.sin(pose)
-    found = equilibria_at(parameters, n, theta, TENDONS_PER_SIDE * wrist.pretension)
-    held = found.stable & (found.pulls.max(axis=1) <= TENDONS_PER_SIDE * wrist.tension_limit)
+    found = []
+    for begin in range(0, count, BLOCK):
+        some = slice(begin, begin + BLOCK)
+        parameters = np.tile(segments(wrist, n), (len(theta[some]), 1))
+        parameters[:, Segments._fields.index("hand_mass")] = hand[some]
+        parameters[:, Segments._fields.index("gravity_x")] = -GRAVITY * np.cos(pose[some])
+        parameters[:, Segments._fields.index("gravity_y")] = GRAVITY * np.sin(pose[some])
+        found.append(equilibria_at(parameters, n, theta[some], TENDONS_PER_SIDE * wrist.pretension))
+        done(begin + len(parameters))
+    bent, pulls, stable = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    held = stable & (pulls.max(axis=1) <= TENDONS_PER_SIDE * wrist.tension_limit)
     if 2 * held.sum() < count:
         raise UserError(
             f"{count - held.sum()} of {count} equilibria buckle or need more than {wrist.tension_limit:g} N",
@@ -54,7 +66,7 @@ def draw_equilibria(settings: DataSettings, wrist: WristParameters, rng: np.rand
     first, last = settings.held_out_payload
     code = np.where((payload >= first) & (payload <= last), HELD_PAYLOAD, 0)
     code = np.where(which >= len(settings.poses), HELD_POSE, code)[held]
-    tip = chain_tip(found.theta[held], wrist.length)
+    tip = chain_tip(bent[held], wrist.length)
     others = np.column_stack([pose, hand])[held]
     inside = code != HELD_POSE
     domain = Domain.around(tip[inside], others[inside])

@@ -99,7 +99,7 @@ def _entry(run: Run) -> IndexEntry:
         manifest = run.manifest
         metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
     except UserError as error:
-        return IndexEntry(run.id, "-", "", "broken", _dated(run.id), None, error.what)
+        return IndexEntry(run.id, "-", "", "broken", dated(run.id), None, error.what)
     note = manifest.error.what if manifest.error else ""
     timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
     return IndexEntry(
@@ -107,7 +107,7 @@ def _entry(run: Run) -> IndexEntry:
     )
 
 
-def _dated(name: str) -> str:
+def dated(name: str) -> str:
     """When a run whose manifest cannot be read began, by its name; nothing where that has no date."""
     try:
         return datetime.strptime(name[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC).isoformat()

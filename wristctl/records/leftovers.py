@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.records.files import PART
-from wristctl.records.index import TEMPORARY, run_names
+from wristctl.records.index import TEMPORARY, dated, run_names
 from wristctl.records.live import RESERVE
 from wristctl.records.lock import LOCK, is_locked
 from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, SUMS
@@ -37,7 +38,7 @@ def leftovers(results: Path) -> Iterator[Leftover]:
             yield Leftover(path, "a file that was being written", _size(path))
     for name in run_names(results):
         run = Run(results / name)
-        if run.path.is_symlink() or is_locked(run.path):
+        if run.path.is_symlink() or is_locked(run.path) or not os.access(run.path, os.R_OK | os.X_OK):
             continue
         if _began_no_run(run.path):
             yield Leftover(run.path, "a run that was killed before it began", _size(run.path))
@@ -73,7 +74,7 @@ def _began_no_run(folder: Path) -> bool:
     """Whether a folder holds only what a run writes before its manifest: anything else is somebody's."""
     names = {each.name for each in folder.iterdir()}
     begun = {name for name in names if name in _BEGINNING or (name.startswith(".") and name.endswith(PART))}
-    return names == begun and folder.name[:8].isdigit() and not any(each.is_dir() for each in folder.iterdir())
+    return names == begun and dated(folder.name) != "" and not any(each.is_dir() for each in folder.iterdir())
 
 
 def _size(path: Path) -> int:

@@ -179,6 +179,10 @@ class LiveRun:
         write_seal(self.path, {each.path: each.sha256 for each in manifest.outputs})
         return manifest
 
+    def close(self) -> None:
+        """Listen no longer, however the run has ended. Called by `start_run`."""
+        self._journal.close()
+
     def _still_there(self) -> None:
         """UserError where the folder is no longer the one that the run began with."""
         try:

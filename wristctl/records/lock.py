@@ -10,11 +10,12 @@ import errno
 import fcntl
 import os
 import platform
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 LOCK = ".lock"
-_NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
+_NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
 
 
 class RunLock:
@@ -36,6 +37,20 @@ class RunLock:
             if os.fstat(self._descriptor).st_ino == os.stat(self._path).st_ino:
                 self._path.unlink()
         os.close(self._descriptor)
+
+
+@contextmanager
+def locked(file: Path) -> Iterator[None]:
+    """Within the block no other process has the lock of this file, which is made where it is not there."""
+    try:
+        descriptor = os.open(file, os.O_CREAT | os.O_RDWR, 0o666)
+    except PermissionError:  # another user's: to hold its lock it need not be written
+        descriptor = os.open(file, os.O_RDONLY)
+    try:
+        lock(descriptor)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def lock(descriptor: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ def removable(runs: Sequence[Run], force: bool = False) -> list[Run]:
             raise UserError("run is gone meanwhile", str(run.path), "there is nothing left to delete")
         if run.state == "running":
             raise UserError("run is still going on", str(run.path), "end it first")
+        if alien := _held_by_others(run.path):
+            raise UserError("you may not delete this run", str(alien), "ask its owner, or an administrator")
         users = [name for name in dependents(run, run.path.parent) if name not in names]
         if users and not force:
             fix = "delete those too, or break the lineage with --force"
@@ -46,14 +49,28 @@ def remove(run: Run) -> None:
 
     It is first renamed, so that no half-deleted run is ever listed; `leftovers` finds what a kill leaves of that.
     """
-    if tags := known_tags(run.path.parent).get(run.id):
+    tags = known_tags(run.path.parent).get(run.id, [])
+    if tags:
         change_tags(run.path.parent, run.id, remove=tags)
-    if run.path.is_symlink():
-        run.path.unlink()
-        return
     hidden = _free(run.path.with_name(f".{run.id}{REMOVED}"))
-    run.path.rename(hidden)
+    try:
+        if run.path.is_symlink():
+            run.path.unlink()
+            return
+        run.path.rename(hidden)
+    except OSError:
+        if tags:
+            change_tags(run.path.parent, run.id, add=tags)
+        raise
     shutil.rmtree(hidden)
+
+
+def _held_by_others(folder: Path) -> Path | None:
+    """A folder of the run out of which nothing can be deleted: found before a run is torn to pieces."""
+    if folder.is_symlink() or os.statvfs(folder).f_flag & os.ST_RDONLY:  # that is told in other words
+        return None
+    folders = [folder, *(each for each in folder.rglob("*") if each.is_dir() and not each.is_symlink())]
+    return next((each for each in folders if not os.access(each, os.W_OK | os.X_OK)), None)
 
 
 def _free(path: Path) -> Path:

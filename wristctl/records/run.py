@@ -19,7 +19,16 @@ from wristctl.records.files import files_below
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
 from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of, is_newer
-from wristctl.records.seal import ADDED, ADDED_FOLDER, CHANGED, MISSING, faults_of_files, faults_of_manifest, read_seal
+from wristctl.records.seal import (
+    ADDED,
+    ADDED_FOLDER,
+    CHANGED,
+    MISSING,
+    faults_of_files,
+    faults_of_manifest,
+    read_seal,
+    unreadable,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,6 +62,8 @@ class Run:
         try:
             content = file.read_bytes()
         except OSError as error:
+            if not isinstance(error, FileNotFoundError | NotADirectoryError | IsADirectoryError):
+                raise unreadable(error, file) from error
             if sealed:
                 raise UserError(MISSING, str(file), _RESTORE) from error
             raise UserError(f"not a run directory: it has no {MANIFEST}", str(self.path), NAME_A_RUN) from error

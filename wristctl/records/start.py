@@ -18,7 +18,7 @@ from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
 from wristctl.config.system_errors import error_of_the_system
 from wristctl.config.wording import OUT, Argument
-from wristctl.interrupt import interrupts, undisturbed
+from wristctl.interrupt import deferred, interrupts, undisturbed
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
 from wristctl.records.files import replacing, sha256_of, sync, write_text
@@ -65,32 +65,36 @@ def start_run(
     UserError where the directory cannot be created or the disk is full.
     """
     digest = config_hash(study, kind)
-    path = _new_directory(out, kind, label, digest)
-    try:
-        lock = RunLock(path)
-    except OSError as error:
-        shutil.rmtree(path, ignore_errors=True)
-        raise _refused(error, path) from error
-    try:
-        with interrupts() as seen:
-            try:
-                run = _begin(path, kind, study, label, argv, inputs, digest, page)
-            except BaseException as error:
-                shutil.rmtree(path, ignore_errors=True)  # no manifest yet: nothing that could be read
-                raise _refused(error, path) from error
-            try:
-                yield run
-                with undisturbed():
-                    run.end("ok")
-            except BaseException as error:
-                outcome = KeyboardInterrupt() if seen.asked else _refused(error, path)
-                with undisturbed():
-                    _end_failed(run, outcome)
-                if outcome is not error:
-                    raise outcome from error
+    path, lock = None, None
+    with interrupts() as seen:
+        try:
+            with deferred():
+                path = _new_directory(out, kind, label, digest)
+                lock = RunLock(path)
+            run = _begin(path, kind, study, label, argv, inputs, digest, page)
+        except BaseException as error:
+            with undisturbed():  # no manifest yet: nothing that could be read
+                if path is not None:
+                    shutil.rmtree(path, ignore_errors=True)
+                if lock is not None:
+                    lock.release()
+            if path is None:
                 raise
-    finally:
-        lock.release()
+            raise _refused(error, path) from error
+        try:
+            yield run
+            with undisturbed():
+                run.end("ok")
+        except BaseException as error:
+            outcome = KeyboardInterrupt() if seen.asked else _refused(error, path)
+            with undisturbed():
+                _end_failed(run, outcome)
+            if outcome is not error:
+                raise outcome from error
+            raise
+        finally:
+            run.close()
+            lock.release()
 
 
 def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
@@ -107,7 +111,7 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         path = out / (name if attempt == 1 else f"{name}-{attempt}")
         try:
             path.mkdir(parents=True)
-            sync(out)
+            _keep(path)
             return path
         except FileExistsError:
             if not path.is_dir():
@@ -118,6 +122,15 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
         except OSError as error:
             what = f"cannot create a run directory: {error.strerror}"
             raise UserError(what, str(out), ("choose a folder you can write to with ", OUT)) from error
+
+
+def _keep(path: Path) -> None:
+    """Wait until a new folder is on the disk; where the disk refuses there is none."""
+    try:
+        sync(path.parent)
+    except OSError:
+        path.rmdir()
+        raise
 
 
 def _begin(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from wristctl.config.errors import UserError
 from wristctl.records.files import write_text
-from wristctl.records.lock import lock
+from wristctl.records.lock import locked
 
 TAGS = "tags.json"
 
@@ -45,8 +45,7 @@ def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterab
     for tag in add:
         if not re.fullmatch(r"[A-Za-z0-9_.:/-]{1,60}", tag):
             raise UserError("a tag holds letters, digits and _ . : / -", repr(tag), "respell it")
-    with (results / ".tags.lock").open("a") as held:
-        lock(held.fileno())
+    with locked(results / ".tags.lock"):
         tags = read_tags(results)
         remaining = sorted((set(tags.pop(run, ())) | set(add)) - set(remove))
         if remaining:

@@ -30,6 +30,18 @@ class Count:
     unit: str
     count: int = 0
     figures: dict[str, float] = field(default_factory=dict)
+    began: float = field(default_factory=time.monotonic)
+
+    def seconds_left(self) -> float | None:
+        """What is left at the pace so far [s]; None where nothing is known of it, or all is done."""
+        if self.total is None or not 0 < self.count < self.total:
+            return None
+        return (time.monotonic() - self.began) * (self.total - self.count) / self.count
+
+    def remaining(self) -> str:
+        """The same in words; empty where it is not known."""
+        left = self.seconds_left()
+        return "" if left is None else f"about {duration(left)} left"
 
     def beside(self) -> str:
         """The figures as text."""
@@ -39,7 +51,7 @@ class Count:
         """All of it as text."""
         of = "" if self.total is None else f" of {self.total}"
         counted = f"{self.count}{of} {self.unit}".rstrip() if self.count else ""
-        shown = ", ".join(part for part in (counted, self.beside()) if part)
+        shown = ", ".join(part for part in (counted, self.beside(), self.remaining()) if part)
         return f"{self.what}: {shown}" if shown else self.what
 
     def fields(self) -> dict[str, Any]:
@@ -51,8 +63,7 @@ class Count:
 def counting(event: Event, what: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
     """Count while a block works: each call is shown, at most one a second is an event; the end is one and a message."""
     state = Count(what, total, unit)
-    began = time.monotonic()
-    last_event = began - _EVENT_EVERY
+    last_event = state.began - _EVENT_EVERY
 
     def done(count: int = 0, **figures: float) -> None:
         nonlocal last_event
@@ -66,7 +77,15 @@ def counting(event: Event, what: str, total: int | None, unit: str, show: Callab
 
     yield done
     event("progress", **state.fields())
-    log.info("%s, %.1f s", state.line(), time.monotonic() - began)
+    log.info("%s, %.1f s", state.line(), time.monotonic() - state.began)
+
+
+def duration(seconds: float) -> str:
+    """A time as a person says it: 12 s, 4 min, 3 h."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def watched(watch: Watch | None) -> ShowProgress:

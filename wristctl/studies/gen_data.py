@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -74,15 +74,19 @@ def gen_data(session: Session) -> Generated:
     from wristctl.wrist.kinematics import exact_angle
 
     findings = session.findings
-    samples = drawn(session.study, findings.stream("samples"), session.inputs)
+    entropy = findings.stream("samples")
+    with session.progress("drawing", session.study.gen_data.samples, "samples") as done:
+        samples = drawn(session.study, entropy, session.inputs, done)
+        done(len(samples.theta))
     table = samples_table(samples)
     exact = angle_errors(exact_angle(samples.tip), samples.theta)
 
     count = len(samples.theta)
-    if count <= READABLE:
-        findings.table("data/samples.csv", table, UNITS, MEANING)
-    findings.arrays("data/samples.npz", samples.arrays())
-    findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
+    with session.progress("writing"):
+        if count <= READABLE:
+            findings.table("data/samples.csv", table, UNITS, MEANING)
+        findings.arrays("data/samples.npz", samples.arrays())
+        findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
 
     findings.metric("samples", count, meaning="number of samples")
     for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
@@ -104,8 +108,8 @@ def gen_data(session: Session) -> Generated:
     return Generated(session.study, findings, tables, samples)
 
 
-def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs) -> Samples:
-    """The samples that the study's gen-data section asks for."""
+def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, done: Callable[[int], object] = int) -> Samples:
+    """The samples that the study's gen-data section asks for; `done` is told how many there are by now."""
     import numpy as np
 
     from wristctl.learning.dataset import draw_samples, samples_of_courses
@@ -116,7 +120,7 @@ def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs) -> Samples:
     if settings.source == "plant":
         from wristctl.learning.equilibria import draw_equilibria
 
-        return draw_equilibria(settings, study.wrist, rng)
+        return draw_equilibria(settings, study.wrist, rng, done)
     return draw_samples(settings, study.wrist, rng)
 
 

@@ -30,7 +30,14 @@ def gc(
     if not yes and not typer.confirm(f"Delete {len(found) + len(tags)} leftovers?", err=True):
         raise UserError("nothing was deleted", str(out), "answer y, or give --yes")
     still = set(leftovers(out))
+    refused = []
     for each in found:
         if each in still:  # not meanwhile the beginning of a run
-            clear(each)
+            try:
+                clear(each)
+            except PermissionError as error:  # another user's; the others can still go
+                refused.append(error.filename or str(each.path))
     clear_tags(out, tags)
+    if refused:
+        what = f"{len(refused)} of {len(found)} leftovers are not yours to delete"
+        raise UserError(what, refused[0], "ask their owner, or an administrator")

@@ -4,20 +4,38 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from wristctl.cli.completion import run_ids
 from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
-from wristctl.records.manifest import SIGNATURE
+from wristctl.records.manifest import SIGNATURE, SUMS
+from wristctl.records.seal import UNREADABLE, unreadable
 from wristctl.records.signature import RunSignature, is_signed, signature
+from wristctl.studies.counting import no_event
 
-_UNSIGNED = RunSignature("", "", "run is not signed")
+_SHOWN = 50
+"""Runs from which on it is shown how far it has come."""
+
+
+class Verified(NamedTuple):
+    """What is wrong with a run, and whose signature it has, where that was asked."""
+
+    problems: list[tuple[str, str]]
+    signed: str = ""
+
+    @property
+    def said(self) -> str:
+        """The run in words."""
+        if all(file == SIGNATURE for file, _ in self.problems):
+            return f"as sealed{', but nobody vouches for it' if self.problems else self.signed}"
+        return "could not be checked" if any(what.startswith(UNREADABLE) for _, what in self.problems) else "changed"
 
 
 def verify(
@@ -38,43 +56,59 @@ def verify(
 
     With --signed each must have a signature over those hashes, and with --signers one by somebody named there.
     """
-    runs = [open_run(ref, out) for ref in refs] if refs else list_runs(out)
-    found = {run.id: _problems(run) for run in runs}
-    vouched = (
-        {run.id: signature(run, signers) if is_signed(run) else _UNSIGNED for run in runs} if signed or signers else {}
-    )
-    for name, each in vouched.items():
-        found[name] += [(SIGNATURE, each.fault)] if each.fault else []
+    paths = [run.path for run in ([open_run(ref, out) for ref in refs] if refs else list_runs(out))]
+    found: dict[str, Verified] = {}
+    quiet = len(paths) < _SHOWN
+    with (
+        listening(quiet, False) as console,
+        progress(console, no_event, "verifying", len(paths), "runs", quiet) as done,
+    ):
+        for count, path in enumerate(paths, start=1):
+            run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
+            found[str(path) if run.id in found else run.id] = _verified(run, signed or signers is not None, signers)
+            done(count, changed=sum(bool(each.problems) for each in found.values()))
     if as_json:
-        shown = {name: [{"file": file, "problem": what} for file, what in each] for name, each in found.items()}
+        shown = {
+            name: [{"file": file, "problem": what} for file, what in each.problems] for name, each in found.items()
+        }
         print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
     else:
-        for name, problems in found.items():
-            say(f"{name}  {'changed' if problems else 'as sealed'}{_by(vouched.get(name))}")
-            for file, what in problems:
+        for name, each in found.items():
+            say(f"{name}  {each.said}")
+            for file, what in each.problems:
                 say(f"  {file}: {what}")
-    changed = sum(bool(problems) for problems in found.values())
+    changed = sum(bool(each.problems) for each in found.values())
     if changed:
         fix = "restore the files named, or run the command again"
-        raise UserError(f"{changed} of {len(found)} runs are not as they were sealed", str(out), fix, exit_code=3)
+        asked = " and signed" if signed or signers is not None else ""
+        raise UserError(
+            f"{changed} of {len(found)} runs are not as they were sealed{asked}", str(out), fix, exit_code=3
+        )
 
 
-def _by(found: RunSignature | None) -> str:
-    """Who signed a run, as far as that is known."""
-    if found is None or not found.key:
-        return ""
-    return (
-        f", signed by {found.signer} with {found.key}"
-        if found.signer
-        else f", signed with {found.key}; --signers says whose it is"
-    )
-
-
-def _problems(run: Run) -> list[tuple[str, str]]:
-    """What is wrong with a run; one that is still running has nothing to be checked."""
+def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
+    """One run; one that is still running has nothing to be checked."""
     if run.state == "running":
-        return []
-    try:
-        return run.problems()
-    except UserError:
-        return [("SHA256SUMS", f"missing: the run is {run.state}")]
+        problems = []
+    else:
+        try:
+            problems = run.problems()
+        except UserError as error:
+            problems = [(SUMS, error.what if error.what.startswith(UNREADABLE) else f"missing: the run is {run.state}")]
+        except OSError as error:  # another user's, perhaps: the others are still checked
+            problems = [(Path(error.filename or run.path).name, unreadable(error, run.path).what)]
+    if not signed:
+        return Verified(problems)
+    if not is_signed(run):
+        return Verified([*problems, (SIGNATURE, "run is not signed")])
+    by = signature(run, signers)
+    return Verified([*problems, (SIGNATURE, by.fault)] if by.fault else problems, _by(by))
+
+
+def _by(found: RunSignature) -> str:
+    """Who signed a run, as far as that is known."""
+    if not found.key:
+        return ""
+    if found.signer:
+        return f", signed by {found.signer} with {found.key}"
+    return f", signed with {found.key}; --signers says whose it is"

@@ -1,0 +1,107 @@
+"""Runs made by strangers: cycles, ways out of the folder, newer versions, repetitions that are killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import InputRun, Run, list_runs, open_run, start_run
+from wristctl.records.lineage import ancestry
+from wristctl.records.seal import write_seal
+
+Make = Callable[..., Run]
+
+
+def test_a_run_that_names_itself_as_its_input_is_told_of(make: Make) -> None:
+    run = make()
+    with start_run("train", Study(), "", run.path.parent, inputs=[InputRun("data", run)]) as live:
+        pass
+    manifest = live.path / "run.json"
+    text = manifest.read_text().replace(run.id, live.id).replace(f'"kind": "{run.kind}"', '"kind": "train"')
+    manifest.write_text(text)
+    write_seal(live.path, {})
+    (itself,) = ancestry(Run(live.path)).inputs
+    assert itself.state == "its own ancestor: that cannot be"
+
+
+def test_an_input_that_leads_out_of_the_results_is_not_followed_by_name(make: Make, tmp_path: Path) -> None:
+    run = make()
+    outside = tmp_path / "outside"
+    shutil.copytree(run.path, outside)
+    with start_run("train", Study(), "", run.path.parent, inputs=[InputRun("data", run)]) as live:
+        pass
+    manifest = json.loads((live.path / "run.json").read_text())
+    manifest["inputs"][0].update(run="../../outside", path="/nowhere")
+    (live.path / "run.json").write_text(json.dumps(manifest))
+    write_seal(live.path, {})
+    assert [each.state for each in ancestry(Run(live.path)).inputs] == ["gone"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"schema": "wristctl.run/2"}, None),
+        ({"mood": "good"}, None),
+        ({"schema": "wristctl.run/2", "kind": 3}, "newer"),
+    ],
+    ids=["a later schema", "a key more", "a later schema that this one cannot read"],
+)
+def test_runs_of_a_newer_wristctl_are_read_as_far_as_they_can_be(
+    make: Make, change: dict[str, Any], said: str | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    run = make()
+    content = json.loads((run.path / "run.json").read_text())
+    (run.path / "run.json").write_text(json.dumps({**content, **change}, indent=2))
+    write_seal(run.path, {})
+    found = open_run(run.path)
+    if said:
+        with pytest.raises(UserError, match=said):
+            found.manifest  # noqa: B018
+    else:
+        assert found.manifest.kind == "gen-data" and found.state == "ok"
+        assert ("newer wristctl" in caplog.text) == ("schema" in change)
+    assert all(said in what for _, what in found.problems()) if said else found.problems() == []
+
+
+def test_a_killed_replay_takes_its_repetition_with_it(tmp_path: Path) -> None:
+    results, scratch = tmp_path / "results", tmp_path / "tmp"
+    scratch.mkdir()
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "TMPDIR": str(scratch)}
+    wristctl = [sys.executable, "-P", "-m", "wristctl"]
+    made = [*wristctl, "gen-data", "--samples", "2000", "--out", str(results)]
+    subprocess.run(made, env=environment, check=True, capture_output=True)
+    replay = [*wristctl, "runs", "replay", "latest:gen-data", "--out", str(results)]
+    child = subprocess.Popen(replay, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    below = Path(f"/proc/{child.pid}/task/{child.pid}/children")
+    while not (found := [each for each in below.read_text().split() if _repeats(each)]):
+        time.sleep(0.01)
+    child.kill()
+    child.wait()
+    until = time.monotonic() + 60.0
+    while any(Path(f"/proc/{each}/environ").exists() and _lives(each) for each in found):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    assert "ok" not in [run.state for each in scratch.glob("wristctl-replay-*") for run in list_runs(each)]
+
+
+def _repeats(pid: str) -> bool:
+    """Whether a child is the repetition already, and no longer a copy of its parent."""
+    return b"--label\0replay" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def _lives(pid: str) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

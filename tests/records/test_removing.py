@@ -1,0 +1,80 @@
+"""Runs and what killed processes leave are deleted, and nothing else."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import InputRun, Run, open_run, start_run
+from wristctl.records.leftovers import clear, leftovers, lost_tags
+from wristctl.records.lock import LOCK
+from wristctl.records.query import entries
+from wristctl.records.remove import foreign, removable, remove
+from wristctl.records.tags import change_tags, read_tags
+
+Make = Callable[..., Run]
+
+
+def test_of_a_link_to_a_run_the_link_is_deleted(make: Make, results: Path, tmp_path: Path) -> None:
+    precious = tmp_path / "archive" / "precious"
+    shutil.copytree(make().path, precious)
+    (results / "precious").symlink_to(precious)
+    assert "precious" in [entry.id for entry in entries(results)]
+    change_tags(results, "precious", add=["mine"])
+    (run,) = removable([open_run("precious", results)])
+    remove(run)
+    assert precious.is_dir() and not (results / "precious").is_symlink() and read_tags(results) == {}
+
+
+def test_a_run_that_was_used_or_deleted_while_the_user_thought_is_not_deleted(make: Make, results: Path) -> None:
+    run = make()
+    asked = removable([run])
+    with start_run("train", Study(), "", results, inputs=[InputRun("data", run)]) as user:
+        pass
+    with pytest.raises(UserError, match="runs were made from it"):
+        removable(asked)
+    remove(Run(user.path))
+    remove(*removable(asked))
+    with pytest.raises(UserError, match="gone meanwhile"):
+        removable(asked)
+
+
+def test_what_others_put_into_a_run_is_named_before_it_goes(make: Make) -> None:
+    run = make()
+    (run.path / "my notes.txt").write_text("keep me")
+    assert foreign(run) == ["my notes.txt"]
+
+
+def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results: Path) -> None:
+    run, crashed = make(), make("tune")
+    change_tags(results, "20250101T000000Z-tune-123456", add=["old"])
+    (crashed.path / "SHA256SUMS").unlink()
+    manifest = crashed.path / "run.json"
+    manifest.write_text(manifest.read_text().replace('"state": "ok"', '"state": "running"'))
+    begun = results / "20260101T000000Z-tune-abcdef"
+    mine = results / "20260101T000000Z-notes"
+    for folder in (results / ".20250101T000000Z-tune-123456.removed", begun, mine):
+        folder.mkdir()
+    left = [begun / LOCK, begun / "config.yaml", begun / ".environment.txt.part", results / ".index-abcd1234"]
+    left += [results / ".tags.json.part", crashed.path / ".reserve", crashed.path / "data" / ".samples.csv.part"]
+    for file in (*left, mine / "thesis.txt"):
+        file.write_bytes(bytes(100))
+    found = list(leftovers(results))
+    assert {each.path.name for each in found} == {
+        ".20250101T000000Z-tune-123456.removed", begun.name, ".index-abcd1234", ".tags.json.part", ".reserve",
+        ".samples.csv.part",
+    }  # fmt: skip
+    assert {each.path.name: each.size for each in found}[begun.name] == 300
+    assert lost_tags(results) == {"20250101T000000Z-tune-123456": ["old"]}
+    for each in found:
+        clear(each)
+    assert list(leftovers(results)) == []
+    assert {each.name for each in results.iterdir() if not each.name.startswith(".")} == {
+        run.id, crashed.id, mine.name, "tags.json",
+    }  # fmt: skip
+    run.check()
