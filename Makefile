@@ -61,10 +61,11 @@ bench-peers: .venv/run
 bench-all: .venv/run
 	$(BIN)/python benchmarks/all.py
 
-# Runs killed at 50 random moments, 10,000 runs listed, a run of every kind repeated.
+# Every command killed, refused and interrupted at all points, crowds of processes, 20,000 runs, a run of every kind
+# repeated, other surroundings and processors.
 test-trust: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/faults tests/cli/test_kill.py tests/cli/test_replay.py tests/records/test_query.py \
-	  tests/lanes/test_processors.py
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/faults tests/cli/test_kill.py tests/cli/test_crowd.py \
+	  tests/cli/test_environments.py tests/cli/test_replay.py tests/records/test_query.py tests/lanes/test_processors.py
 
 # Small wrong changes to a copy of the package: does a test notice each? The listed ones, or `make mutants SEED=7`.
 mutants: .venv/dev

@@ -107,9 +107,11 @@ def run(work: Path, arguments: tuple[str, ...]) -> int:
 
 def named(work: Path, arguments: tuple[str, ...]) -> list[str]:
     """The arguments with the ids of the runs that they name."""
-    made = [each.id for each in runs(work) if "-gen-data-" in each.id]
-    poses = [each.id for each in runs(work) if "-hw-run-" in each.id]
-    ids = dict(zip(("DATA", "UPRIGHT", "LEVEL"), (*made[:1], *poses[:2]), strict=False))
+    there = [each.id for each in runs(work)]
+    poses = [each for each in there if "-hw-run-" in each]
+    ids = {"DATA": next((each for each in there if "-gen-data-base-" in each), "DATA")}
+    ids |= {"LARGE": next((each for each in there if "-gen-data-large-" in each), "LARGE")}
+    ids |= dict(zip(("UPRIGHT", "LEVEL"), poses, strict=False))
     return [ids.get(each, each) for each in arguments]
 
 

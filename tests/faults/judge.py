@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.faults.commands import LOST, runs
 from wristctl.records.leftovers import clear, clear_tags, leftovers, lost_tags
+from wristctl.records.manifest import SUMS
 from wristctl.records.tags import known_tags
 
 HANGS, KILLED = -1, -9
@@ -36,6 +37,45 @@ def faults(work: Path, name: str, mode: str, ended: tuple[int, str], sound: Soun
     outside = {each.name for each in work.iterdir()} - {"results", "pictures", "out", "err"}
     if outside:
         yield f"outside results: {outside}"
+
+
+def lost_by_power_cut(work: Path, operations: list[list[str]]) -> Iterator[str]:
+    """What would not be on the disk if the power went right after a run was sealed, by the operations that made it.
+
+    A file counts where it was synced after its last write, a name in a folder where the folder was synced after it.
+    """
+    written, synced, named = _dates(operations)
+    for run in runs(work):
+        if str(run.path / SUMS) not in written:
+            continue  # made before
+        for name in (SUMS, *(line.partition("  ")[2] for line in run.file(SUMS).read_text().splitlines())):
+            file = str(run.path / name)
+            if synced.get(file, -1) < written.get(file, -1):
+                yield f"{run.id}: {name} is not on the disk"
+        for below in (run.path.parent, run.path, *(each for each in run.path.rglob("*") if each.is_dir())):
+            if synced.get(str(below), -1) < named.get(str(below), -1):
+                yield f"{run.id}: not every name in {below.relative_to(work)} is on the disk"
+
+
+def _dates(operations: list[list[str]]) -> tuple[dict[str, int], dict[str, int], dict[str, int]]:
+    """When a path was last written, last synced, and a folder last given a new name, as numbers of operations."""
+    written: dict[str, int] = {}
+    synced: dict[str, int] = {}
+    named: dict[str, int] = {}
+    for at, (kind, path, other) in enumerate(operations):
+        if kind == "fsync":
+            synced[path] = at
+        elif kind == "rename":
+            for dates in (written, synced):
+                if path in dates:
+                    dates[other] = dates.pop(path)
+            named[str(Path(other).parent)] = at
+        elif kind == "write":
+            written[path] = at
+        elif kind == "mkdir" or (kind == "open" and path not in written and not Path(path).name.startswith(".")):
+            written.setdefault(path, at)
+            named[str(Path(path).parent)] = at
+    return written, synced, named
 
 
 def _of_the_end(mode: str, code: int, said: str) -> Iterator[str]:

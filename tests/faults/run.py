@@ -27,7 +27,7 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 
 from tests.faults import commands
-from tests.faults.judge import HANGS, KILLED, Sound, faults, timeless
+from tests.faults.judge import HANGS, KILLED, Sound, faults, lost_by_power_cut, timeless
 
 ROOT = Path(__file__).parents[2]
 LIMIT = 120.0
@@ -106,6 +106,7 @@ def command(base: Path, name: str, modes: list[str], every: int, jobs: int) -> i
         for at in list(_chosen(operations))[::every]
     }
     wrong = [] if code == 0 else [f"undisturbed: exit {code}: {said[-300:]}"]
+    wrong += [f"after a power cut: {each}" for each in lost_by_power_cut(work, operations)]
     print(f"{name}: {len(operations)} operations, {len(chosen)} points", *wrong, flush=True)
     for mode in modes:
         began = time.monotonic()

@@ -53,13 +53,15 @@ def unreadable(error: OSError, file: Path) -> UserError:
 
 
 def write_seal(folder: Path, known: dict[str, str]) -> None:
-    """Seal a directory as it is, each file on the disk before; `known` are hashes of files that are there already."""
+    """Seal a directory as it is, all on the disk before; `known` are hashes of files that are on the disk already."""
     found = {}
     for name in files_below(folder):
         if name not in _BESIDE and not (folder / name).is_symlink():
             if name not in known:
                 sync(folder / name)
             found[name] = known.get(name) or sha256_of(folder / name)
+    for below in sorted({(folder / name).parent for name in found}):
+        sync(below)
     write_text(folder / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sorted(found.items())))
 
 
