@@ -99,12 +99,14 @@ def command(base: Path, arguments: tuple[str, ...], name: str, moments: int, num
 
 
 def _of_the_interrupted(ended: Ended, states: Sequence[str]) -> Iterator[str]:
+    if ended.before < BEGUN and not states:
+        return
     # killed by the signal: also where it fell into an exec of the interpreter's, which a shell tells as 130 too
     if ended.code not in (0, 130, -signal.SIGINT):
         yield f"exit {ended.code}: {ended.said[-300:]}"
     if ended.cpu > LIMIT:
         yield f"{ended.cpu:.2f} s of processor time"
-    if "bug in wristctl" in ended.said or ("Traceback" in ended.said and ended.before > BEGUN):
+    if "bug in wristctl" in ended.said or "Traceback" in ended.said:
         yield f"a bug: {ended.said[-300:]}"
     if ended.code == 0 and any(state != "ok" for state in states):
         yield f"exit 0, and {states}"

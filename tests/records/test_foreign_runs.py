@@ -19,6 +19,7 @@ from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, list_runs, open_run, start_run
 from wristctl.records.lineage import ancestry
 from wristctl.records.seal import write_seal
+from wristctl.report.page import page
 
 Make = Callable[..., Run]
 
@@ -105,3 +106,34 @@ def _lives(pid: str) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_a_link_in_a_run_is_not_followed_into_a_report(make: Make, tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("of this computer")
+    for name in ("config.yaml", "tables.json", "data"):
+        run = make()
+        file = run.path / name
+        shutil.rmtree(file) if file.is_dir() else file.unlink(missing_ok=True)
+        file.symlink_to(tmp_path if name == "data" else secret)
+        with pytest.raises(UserError, match="is a link"):
+            run.data("samples") if name == "data" else page(Run(run.path), run.manifest)
+
+
+ODD_TABLES = [
+    b"\xff",
+    b"3",
+    b"[3]",
+    b'[{"title": "a", "columns": ["x"], "rows": [1]}]',
+    b'[{"title": 1, "columns": [], "rows": []}]',
+    b'[{"title": "", "columns": [], "rows": [[{}]]}]',
+    b"[" * 100_000,
+]
+
+
+@pytest.mark.parametrize("content", ODD_TABLES)
+def test_odd_tables_are_named_and_no_bug(make: Make, content: bytes) -> None:
+    run = make()
+    (run.path / "tables.json").write_bytes(content)
+    with pytest.raises(UserError, match="no tables as wristctl writes them"):
+        page(run, run.manifest)

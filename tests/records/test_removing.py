@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,8 +12,8 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, open_run, start_run
-from wristctl.records.leftovers import clear, leftovers, lost_tags
-from wristctl.records.lock import LOCK
+from wristctl.records.leftovers import clear, leftovers, lost_repetitions, lost_tags
+from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.query import entries
 from wristctl.records.remove import foreign, removable, remove
 from wristctl.records.tags import change_tags, read_tags
@@ -78,3 +79,19 @@ def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results:
         run.id, crashed.id, mine.name, "tags.json",
     }  # fmt: skip
     run.check()
+
+
+def test_the_scratch_folders_of_killed_replays_are_found_and_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    killed, alive, kept, strange = (tmp_path / f"wristctl-replay-{name}" for name in ("a", "b", "c", "d"))
+    for each in (killed, alive, kept):
+        each.mkdir()
+    strange.symlink_to(kept)
+    (killed / LOCK).write_text("")
+    held = RunLock(alive)
+    assert [each.path for each in lost_repetitions()] == [killed]
+    held.release()
+    clear(next(lost_repetitions()))
+    assert not killed.exists() and list(lost_repetitions()) == []

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +21,10 @@ from wristctl.records.tags import change_tags, known_tags
 
 _BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK}
 """All that a run may have written before its manifest."""
+
+
+SCRATCH = "wristctl-replay-"
+"""Beginning of the name of a scratch folder; its lock is gone once the repetition has ended."""
 
 
 class Leftover(NamedTuple):
@@ -48,6 +54,15 @@ def leftovers(results: Path) -> Iterator[Leftover]:
             unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
             if unfinished or path == run.path / LOCK:
                 yield Leftover(path, "left by a run that was killed", _size(path))
+
+
+def lost_repetitions() -> Iterator[Leftover]:
+    """Scratch folders of your replays that were killed."""
+    for folder in sorted(Path(tempfile.gettempdir()).glob(f"{SCRATCH}*")):
+        found = folder.lstat()
+        yours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+        if yours and (folder / LOCK).exists() and not is_locked(folder):
+            yield Leftover(folder, "of a replay that was killed", _size(folder))
 
 
 def lost_tags(results: Path) -> dict[str, list[str]]:

@@ -23,6 +23,7 @@ from wristctl.records.seal import (
     ADDED,
     ADDED_FOLDER,
     CHANGED,
+    LINK,
     MISSING,
     faults_of_files,
     faults_of_manifest,
@@ -130,8 +131,10 @@ class Run:
         return read_arrays(self.file(f"data/{name}.npz"))
 
     def file(self, name: str) -> Path:
-        """The path of one of its files."""
+        """The path of one of its files; UserError where there is none, or a link, which may lead anywhere."""
         path = self.path / name
+        if any(each.is_symlink() for each in (path, *path.parents[: len(Path(name).parts) - 1])):
+            raise UserError(LINK, str(path), _RESTORE)
         if not path.is_file():
             raise UserError(f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path)))
         return path

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl import __version__
+from wristctl.config.errors import UserError
+from wristctl.config.wording import Call
 from wristctl.records.lineage import ancestry
 from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of
 from wristctl.records.run import Run
@@ -43,7 +45,7 @@ def page(run: Run, manifest: Manifest) -> str:
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
         provenance=_provenance(manifest),
         files=[(each.path, each.bytes, each.sha256, not each.volatile) for each in manifest.outputs],
-        config=(run.path / CONFIG).read_text(encoding="utf-8"),
+        config=run.file(CONFIG).read_text(encoding="utf-8", errors="replace"),
     )
 
 
@@ -98,9 +100,27 @@ def _metrics(run: Run) -> list[tuple[Any, ...]]:
 
 
 def _tables(run: Run) -> list[dict[str, Any]]:
-    file = run.path / TABLES
-    found: list[dict[str, Any]] = json.loads(file.read_bytes()) if file.is_file() else []
+    if not (run.path / TABLES).exists():
+        return []
+    file = run.file(TABLES)
+    try:
+        found = json.loads(file.read_bytes())
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, list) or not all(map(_is_table, found)):
+        again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
+        raise UserError("no tables as wristctl writes them", str(file), again)
     return found
+
+
+def _is_table(found: object) -> bool:
+    """Whether a page can show it: a title, names of columns and rows of cells."""
+    if not isinstance(found, dict) or not isinstance(found.get("title"), str):
+        return False
+    columns, rows = found.get("columns"), found.get("rows")
+    if not isinstance(columns, list) or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        return False
+    return not any(isinstance(cell, list | dict) for row in (columns, *rows) for cell in row)
 
 
 def _provenance(manifest: Manifest) -> list[tuple[str, str]]:

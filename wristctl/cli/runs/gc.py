@@ -10,7 +10,7 @@ from wristctl.cli.options import Debug, Out
 from wristctl.cli.runs.run_options import RESULTS
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
-from wristctl.records.leftovers import clear, clear_tags, leftovers, lost_tags
+from wristctl.records.leftovers import clear, clear_tags, leftovers, lost_repetitions, lost_tags
 
 
 def gc(
@@ -19,7 +19,7 @@ def gc(
     debug: Debug = False,
 ) -> None:
     """Clear away what killed processes have left, after asking: no run that began is touched."""
-    found, tags = list(leftovers(out)), lost_tags(out)
+    found, tags = [*leftovers(out), *lost_repetitions()], lost_tags(out)
     for each in found:
         say(f"{each.path}  {each.what}, {each.size / 1e6:.1f} MB")
     for run, names in tags.items():
@@ -29,7 +29,7 @@ def gc(
         return
     if not yes and not typer.confirm(f"Delete {len(found) + len(tags)} leftovers?", err=True):
         raise UserError("nothing was deleted", str(out), "answer y, or give --yes")
-    still = set(leftovers(out))
+    still = {*leftovers(out), *lost_repetitions()}
     refused = []
     for each in found:
         if each in still:  # not meanwhile the beginning of a run

@@ -18,7 +18,9 @@ from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.records import Run, list_runs, open_run
+from wristctl.records.leftovers import SCRATCH
 from wristctl.records.lineage import input_run
+from wristctl.records.lock import RunLock
 from wristctl.records.manifest import CONFIG, KINDS, command_of
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
 from wristctl.records.run import NAME_A_RUN
@@ -48,8 +50,15 @@ def replay(
     changed = changed_inputs(run)
     if changed:
         return _conclude(run, None, [], changed, as_json)
-    scratch = Path(tempfile.mkdtemp(prefix="wristctl-replay-"))
-    code = _again(run, scratch, override or [])
+    scratch = Path(tempfile.mkdtemp(prefix=SCRATCH))
+    lock = RunLock(scratch)  # a sign of life, for `runs gc`
+    try:
+        code = _again(run, scratch, override or [])
+    except KeyboardInterrupt:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+    finally:
+        lock.release()
     ended = list_runs(scratch)
     if code or not ended:
         why = causes(run, ended[0]) if ended else []
