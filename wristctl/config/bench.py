@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from wristctl.config.plant import Actuator, Plant
+from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import SceneSettings
 
@@ -72,7 +72,7 @@ class RenderedCamera(Section):
         return self
 
 
-class WeakenedPlant(Plant):
+class WeakenedPlant(TrueWrist):
     """The wrist as it is; a controller knows it with its stiffness when new."""
 
     stiffness_scale: float = quantity(0.7, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)

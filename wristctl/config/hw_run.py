@@ -9,7 +9,7 @@ from pydantic import model_validator
 from wristctl.config.bench import BenchSettings
 from wristctl.config.control import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
-from wristctl.config.plant import Actuator, Plant, Push, Sensor
+from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
 
@@ -109,13 +109,23 @@ class HwRunSettings(RigSettings):
             raise ValueError("positions: stored needs a calibration run")
         return self
 
+    def _emulated_world(self) -> Plant:
+        """The bench as the plant of a loop: what of its motors and camera is not as believed stands there."""
+        motors, camera = self.bench.actuator, self.bench.camera
+        own = {name: getattr(motors, name) for name in TrueActuator.model_fields}
+        own = {name: each for name, each in own.items() if each != getattr(self.actuator, name)}
+        seen = {name: getattr(camera, name) for name in ("delay_frames", "dropped")}
+        seen = {name: each for name, each in seen.items() if each != getattr(self.sensor, name)}
+        wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
+        return Plant(**wrist, actuator=TrueActuator(**own), sensor=TrueSensor(**seen))
+
     @property
     def loop(self) -> Loop:
         """The same loop in simulation: the emulated plant, or the known one of a real or an identified wrist."""
         emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,
-            plant=self.bench.plant if emulated else Plant(),
+            plant=self._emulated_world() if emulated else Plant(),
             actuator=self.actuator,
             sensor=self.sensor,
             control_period=self.control_period,

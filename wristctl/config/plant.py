@@ -8,12 +8,33 @@ from typing import Annotated, Literal
 
 from wristctl.config.choices import DISTURBANCES, PLANTS
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.truth import NotNegative, Positive, Truth, truth, unsaid
 
 PlantName = Annotated[str, OneOf(PLANTS)]
 
 
-class Plant(Section):
-    """How the simulated wrist differs from the one that its controller knows."""
+class TrueActuator(Truth):
+    """Motors and tendons as they are, where that is not what the controller believes."""
+
+    lag: Positive = truth("s", "time constant of the motor's force (lagged)")
+    tendon_stiffness: Positive = truth("N/m", "stiffness of one tendon")
+    friction: NotNegative = truth("", "capstan friction (tendon); the observer counts on none, whatever is believed")
+    pulley_radius: Positive = truth("m", "radius of the pulley: motors report steps, not metres")
+    step_rate: Positive = truth("1/s", "largest rate of microsteps")
+    step_acceleration: Positive = truth("1/s^2", "largest change of that rate (tendon)")
+
+
+class TrueSensor(Truth):
+    """The camera as it is, where that is not what the controller believes."""
+
+    delay_frames: NotNegative = truth("", "frames between capture and use; the observer dates them by what it believes")
+    noise_deg: NotNegative = truth("deg", "standard deviation of the angle")
+    dropped: NotNegative = truth("", "share of frames without a result")
+    zero_deg: float = truth("deg", "angle that the camera shows of a straight wrist", 0.0)
+
+
+class TrueWrist(Truth):
+    """The wrist as it is: leaves by value or as a multiple (`x1.05`); scales, payload and spreads come on top."""
 
     model: PlantName = choice("pcc", "what is simulated: pcc is piecewise constant curvature")
     stiffness_scale: float = quantity(1.0, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
@@ -24,6 +45,20 @@ class Plant(Section):
     )
     damping_spread: float = quantity(0.0, "", "the same of the damping", ge=0, lt=1)
     payload_spread: float = quantity(0.0, "kg", "each repetition's payload is drawn anew, up to so much more", ge=0)
+    length: Positive = truth("m", "arc length from the first to the last disc")
+    mass: Positive = truth("kg", "moving mass of the wrist itself")
+    hand_mass: NotNegative = truth("kg", "mass of the hand")
+    hand_offset: NotNegative = truth("m", "hand's centre of mass beyond the last disc")
+    stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
+    damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
+    tendon_radius: Positive = truth("m", "radius of the circle of tendons")
+
+
+class Plant(TrueWrist):
+    """How the simulated world differs from the one that its controller knows: wrist, motors with tendons, camera."""
+
+    actuator: TrueActuator = unsaid(TrueActuator())
+    sensor: TrueSensor = unsaid(TrueSensor())
 
 
 class Push(Section):

@@ -14,6 +14,7 @@ from wristctl.config.keys import choices_of, keys_of, source_of, unit_of
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
+from wristctl.config.truth import is_unsaid
 
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 
@@ -43,6 +44,8 @@ def _names(command: str) -> set[str]:
 def _entries(section: Section) -> Iterator[Entry]:
     for (key, field), name in zip(keys_of(type(section)).items(), type(section).model_fields, strict=True):
         value = getattr(section, name)
+        if is_unsaid(field) and value == field.default:
+            continue
         unit, source = unit_of(field), source_of(field) if value == field.default else ""
         choices = ", ".join(choices_of(field))
         meaning = f"{field.description or ''}{choices and f': {choices}'}"

@@ -4,6 +4,9 @@ lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon,
 tendon: a stepper reels tendon in; k (reeled in - path's shortening) pulls, never pushes, less friction at the discs.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
 positively with a gain near 1.
+
+A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
+deliver for that count is the world's (`Winding`).
 """
 
 from __future__ import annotations
@@ -50,6 +53,17 @@ read_motor = tuple_of(Motor)
 """A Motor of lanes from rows of lanes, in compiled code."""
 
 
+class Winding(NamedTuple):
+    """What the motors deliver is `scale` times what their host counts, and `offset` [m]."""
+
+    scale: Any
+    offset: Any
+
+
+read_winding = tuple_of(Winding)
+"""A Winding of lanes from rows of lanes, in compiled code."""
+
+
 def level_of(actuator: Actuator) -> int | None:
     """LAGGED, TENDON, or None where tensions are as commanded, and nothing of a motor is compiled in."""
     return {"ideal": None, "lagged": LAGGED, "tendon": TENDON}[actuator.level]
@@ -74,12 +88,31 @@ def drive_of(actuator: Actuator) -> Drive | None:
     return None if level is None else Drive(level, motor_of(actuator))
 
 
-def at_rest(drive: Drive | None, wrist: WristParameters, model: PlantModel, q: Array) -> Array:
-    """State of both sides at pretension with the plant at q: pull or reeled length, then speed; (4,)."""
+def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
+    """The motor as its host counts: lengths and pulls are what it believes, only how fast it is, it is in truth."""
+    step = believed.step_length
+    own = {"lag": actual.lag, "speed": step * actual.step_rate, "acceleration": step * actual.step_acceleration}
+    return motor_of(believed)._replace(**own)
+
+
+def winding_of(believed: Actuator, actual: Actuator, pull: float) -> Winding:
+    """What a count means: both sides were homed at this pull [N] on the straight wrist, where the counts are right."""
+    counts, does = motor_of(believed), motor_of(actual)
+    if believed.level == "lagged":
+        return Winding(does.stiffness * does.step / (counts.stiffness * counts.step), 0.0)
+    scale = does.step / counts.step
+    return Winding(scale, pull / does.stiffness - scale * (pull / counts.stiffness))
+
+
+def at_rest(drive: Drive | None, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
+    """Counts of both sides at pretension with the plant at q: pull or reeled length, then speed; (4,).
+
+    `wrist` is the one that is wound, `drive` as its host counts, `scale` that of the winding.
+    """
     pull = TENDONS_PER_SIDE * wrist.pretension
     if drive is None or drive.level != TENDON:
         return np.array([pull, 0.0, pull, 0.0])
-    plus, minus = pull / drive.motor.stiffness + wrist.length - model.taut(wrist, q)
+    plus, minus = pull / drive.motor.stiffness + wrist.length / scale - model.taut(wrist, q) / scale
     return np.array([plus, 0.0, minus, 0.0])
 
 
@@ -120,7 +153,7 @@ def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
 
 @compiled
 def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    """What both sides deliver over one control period to commanded pulls [N]: pulls, or reeled lengths [m] (tendon)."""
+    """What the host counts of both sides a period after commanded pulls [N]: pulls, or lengths [m] (tendon)."""
     if drive is None:
         return plus, minus
     if drive.level == LAGGED:
@@ -129,6 +162,14 @@ def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus
     reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, known.length, path_plus), h)
     reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, known.length, path_minus), h)
     return reeled_plus, reeled_minus
+
+
+@compiled
+def wound(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
+    """What the motors of both sides deliver for what their host counts."""
+    if drive is None:
+        return plus, minus
+    return winding.scale * plus + winding.offset, winding.scale * minus + winding.offset
 
 
 @compiled

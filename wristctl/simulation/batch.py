@@ -13,16 +13,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import Drive, at_rest, level_of, motor_of
+from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import readings, schedule
 from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
-from wristctl.simulation.worlds import World, plant_of
+from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 Indices = NDArray[np.int64]
 Start = Callable[[WristParameters], Array]
@@ -72,9 +73,10 @@ def batch(
     ticks, samples = max(1, round(sample_period(period) / period)), len(motions[0].theta_ref)
     followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
     wide = followed.shape[1:]
-    actual = [plant_of(each.wrist, each.loop.plant) for each in worlds]
+    actual = [each.plant for each in worlds]
     rest = np.zeros((len(worlds), k)) if start is None else np.array([start(each) for each in actual])
-    motors = [motor_of(each.loop.actuator) for each in worlds]
+    counted = [counted_motor(each.loop.actuator, each.actuator) for each in worlds]
+    windings = [_winding(each) for each in worlds]
 
     def of_worlds(row: Callable[[int], Array]) -> Array:
         """A row of each world's as blocks; of one world as one block for all."""
@@ -87,15 +89,17 @@ def batch(
         return np.array([world.wrist.pretension, world.wrist.tension_limit if world.loop.limits else np.inf])
 
     def at_the_motors(each: int) -> Array:
-        drive = None if level is None else Drive(level, motors[each])
-        return at_rest(drive, actual[each], model, rest[each])
+        drive = None if level is None else Drive(level, counted[each])
+        return at_rest(drive, actual[each], model, rest[each], windings[each].scale)
 
     goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
         model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
         limits=of_worlds(limits),
-        motor=of_worlds(lambda each: np.array(motors[each])),
+        motor=of_worlds(lambda each: np.array(counted[each])),
+        tendons=of_worlds(lambda each: np.array(motor_of(worlds[each].actuator))),
+        winding=of_worlds(lambda each: np.array(windings[each])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
     )
@@ -139,10 +143,11 @@ def _watch(
     loop, count = worlds[0].loop, len(lanes.motion)
     if loop.sensor.level == "ideal":
         return None, None
-    frames = schedule(loop.sensor, loop.control_period, horizon)
-    longest = int((frames.arrivals - frames.captures).max() + np.diff(frames.captures).max(initial=1)) + 2
-    sensors = [each.loop.sensor for each in worlds]
+    frames = schedule(worlds[0].sensor, loop.control_period, horizon, loop.sensor)
+    longest = int((frames.arrivals - frames.dated).max() + np.diff(frames.dated).max(initial=1)) + 2
+    sensors = [each.sensor for each in worlds]
     taken = readings(len(frames.captures), [sensors[each] for each in lanes.world], lanes.streams)
+    taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
     lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
@@ -159,6 +164,10 @@ def _watch(
     pictures = np.zeros((blocks, len(frames.captures), *wide))
     turn = np.zeros((blocks, 2), np.int64)
     return Watch(np.ascontiguousarray(by_block), pictures, turn, observer), frames
+
+
+def _winding(world: World) -> Winding:
+    return winding_of(world.loop.actuator, world.actuator, TENDONS_PER_SIDE * world.wrist.pretension)
 
 
 def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:

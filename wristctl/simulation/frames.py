@@ -12,12 +12,17 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.observer import Schedule
 
 
-def schedule(sensor: Sensor, period: float, horizon: float) -> Schedule:
-    """Control ticks at which the frames of `horizon` [s] are taken and at which they arrive, (F,) each."""
+def schedule(sensor: Sensor, period: float, horizon: float, believed: Sensor | None = None) -> Schedule:
+    """Control ticks of the frames of `horizon` [s], (F,) each; the observer dates them by the believed delay."""
     times = np.arange(int(horizon * sensor.frame_rate) + 1) / sensor.frame_rate
     captures = np.rint(times / period).astype(np.int64)
-    delay = int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))
-    return Schedule(captures, captures + delay)
+    arrivals = captures + _delay(sensor, period)
+    return Schedule(captures, arrivals, np.maximum(arrivals - _delay(believed or sensor, period), 0))
+
+
+def _delay(sensor: Sensor, period: float) -> int:
+    """Control ticks between capture and use."""
+    return int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))
 
 
 def readings(count: int, sensors: Sequence[Sensor], streams: Sequence[Entropy]) -> Array:

@@ -13,7 +13,7 @@ from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import Drive, actuate, pulls, read_motor
+from wristctl.simulation.actuator import Drive, actuate, pulls, read_motor, read_winding, wound
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of
 from wristctl.wrist.allocation import torque_of
@@ -58,12 +58,17 @@ class LoopCourse(NamedTuple):
 
 
 class LoopValues(NamedTuple):
-    """Values that stay, [block, row, lane]; with one block only they are every block's."""
+    """Values that stay, [block, row, lane]; with one block only they are every block's.
+
+    `plant`, `tendons` and `winding` are what is, `model`, `limits` and `motor` what the controller's side believes.
+    """
 
     plant: Any
     model: Any
     limits: Any
     motor: Any
+    tendons: Any
+    winding: Any
     gains: Any
     goals: Any
 
@@ -117,6 +122,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     cut, period, ticks = setup.coordinates, setup.period, setup.ticks
     undisturbed = parameters_of(setup.plant, rows_of(world.plant))
     known, drive = load_segments(rows_of(world.model)), _drive(setup.level, world.motor)
+    tendons, winding = _drive(setup.level, world.tendons), read_winding(rows_of(world.winding))
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
     view, bound, goal = now_of(scratch.now), rows_of(world.limits), goals_of(world.goals)
     motor, sum_ = rows_of(state.motors), rows_of(state.sums)
@@ -139,7 +145,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
-            acting_plus, acting_minus = pulls(drive, plant, q, rates, given_plus, given_minus)
+            reeled_plus, reeled_minus = wound(drive, winding, given_plus, given_minus)
+            acting_plus, acting_minus = pulls(tendons, plant, q, rates, reeled_plus, reeled_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
@@ -159,7 +166,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
             for substep in range(setup.substeps):
                 if substep > 0:
-                    acting_plus, acting_minus = pulls(drive, plant, q, rates, given_plus, given_minus)
+                    acting_plus, acting_minus = pulls(tendons, plant, q, rates, reeled_plus, reeled_minus)
                 sum_[_ALIVE] = advance_or_stop(plant, q, rates, acting_plus, acting_minus, h, sum_[_ALIVE])
 
 

@@ -40,10 +40,12 @@ class Observer(NamedTuple):
 
 
 class Schedule(NamedTuple):
-    """Ticks at which frames are taken and at which they arrive, (F,) each; the same for all lanes."""
+    """Ticks at which frames are taken, at which they arrive, and at which the observer believes that they were taken,
+    (F,) each; the same for all lanes."""
 
     captures: Any
     arrivals: Any
+    dated: Any
 
 
 class Watch(NamedTuple):
@@ -80,7 +82,7 @@ def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: 
         rows_of(pictures)[taken] = angle + rows_of(readings[taken])[0]
         turn[0] = taken + 1
     if arrived < turn[0] and schedule.arrivals[arrived] == tick:
-        seen, captured = rows_of(readings[arrived])[1], schedule.captures[arrived]
+        seen, captured = rows_of(readings[arrived])[1], schedule.dated[arrived]
         fuse(watch.observer, drive, known, (captured, tick), 0.0, rows_of(pictures)[arrived], seen, h)
         turn[1] = arrived + 1
 

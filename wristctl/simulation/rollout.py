@@ -121,8 +121,8 @@ def _by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float
     """Rollouts whose cameras take frames at the same ticks run together."""
     if len(worlds) == 1 or worlds[0].loop.sensor.level == "ideal":
         return [np.arange(len(world))]
-    ticks = [schedule(each.loop.sensor, each.loop.control_period, horizon) for each in worlds]
-    keys = [(each.captures.tobytes(), each.arrivals.tobytes()) for each in ticks]
+    ticks = [schedule(each.sensor, each.loop.control_period, horizon, each.loop.sensor) for each in worlds]
+    keys = [tuple(part.tobytes() for part in each) for each in ticks]
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     group = np.array([numbers[key] for key in keys])[world]
     return [np.flatnonzero(group == number) for number in range(len(numbers))]

@@ -3,35 +3,80 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from wristctl.config.keys import unit_of
 from wristctl.config.loop import Loop
-from wristctl.config.plant import Plant
+from wristctl.config.plant import Actuator, Sensor, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 
 
 class World(NamedTuple):
-    """A loop, and the wrist as its controller knows it."""
+    """A loop, and the wrist as its controller knows it; what is true of wrist, actuator and sensor follows."""
 
     loop: Loop
     wrist: WristParameters
 
+    @property
+    def plant(self) -> WristParameters:
+        """The wrist as it is."""
+        return plant_of(self.wrist, self.loop.plant)
 
-def plant_of(wrist: WristParameters, plant: Plant) -> WristParameters:
-    """The wrist with the plant's own stiffness, damping and payload."""
-    return wrist.model_copy(
+    @property
+    def actuator(self) -> Actuator:
+        """The actuator as it is."""
+        actual: Actuator = self.loop.plant.actuator.of(self.loop.actuator)
+        return actual
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sensor as it is."""
+        actual: Sensor = self.loop.plant.sensor.of(self.loop.sensor)
+        return actual
+
+
+class Difference(NamedTuple):
+    """A leaf of wrist, actuator or sensor that is not what the controller believes."""
+
+    key: str
+    believed: float
+    actual: float
+    unit: str
+
+
+def differences(world: World) -> list[Difference]:
+    """All that the world of a loop has, and its controller does not know of; spreads are not drawn."""
+    loop, found = world.loop, list[Difference]()
+    sides = {"": (world.wrist, world.plant), "actuator.": (loop.actuator, world.actuator)}
+    for begin, (believed, actual) in (sides | {"sensor.": (loop.sensor, world.sensor)}).items():
+        for name, field in type(believed).model_fields.items():
+            values = getattr(believed, name), getattr(actual, name)
+            if values[0] != values[1]:
+                found.append(Difference(begin + name, *values, unit_of(field)))
+    if zero := loop.plant.sensor.zero_deg:
+        found.append(Difference("sensor.zero_deg", 0.0, zero, "deg"))
+    return found
+
+
+def plant_of(wrist: WristParameters, plant: TrueWrist) -> WristParameters:
+    """The wrist as it is: with the plant's own leaves, its scales of stiffness and damping, and its payload."""
+    own: WristParameters = plant.of(wrist)
+    return own.model_copy(
         update={
-            "stiffness": wrist.stiffness * plant.stiffness_scale,
-            "damping": wrist.damping * plant.damping_scale,
-            "hand_mass": wrist.hand_mass + plant.payload,
+            "stiffness": own.stiffness * plant.stiffness_scale,
+            "damping": own.damping * plant.damping_scale,
+            "hand_mass": own.hand_mass + plant.payload,
         }
     )
 
 
-def drawn(plant: Plant, stream: Entropy) -> Plant:
+P = TypeVar("P", bound=TrueWrist)
+
+
+def drawn(plant: P, stream: Entropy) -> P:
     """The plant with its spreads drawn; the same stream draws every plant the same way, each by its own spreads."""
     if plant.stiffness_spread == plant.damping_spread == plant.payload_spread == 0.0:
         return plant

@@ -71,6 +71,7 @@ class Compared(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
     from wristctl.comparison.combinations import count_rollouts, refuse_tuned_scenarios
+    from wristctl.report.truth_table import truth_told
 
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -84,7 +85,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
-    return f"{searched}{count_rollouts(settings)} rollouts of {settings.horizon:g} s"
+    told = truth_told(study.wrist, settings.loops)
+    return f"{searched}{count_rollouts(settings)} rollouts of {settings.horizon:g} s{told}"
 
 
 def compare(session: Session) -> Compared:
@@ -92,6 +94,7 @@ def compare(session: Session) -> Compared:
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
     from wristctl.comparison.statistics import spread
+    from wristctl.report.truth_table import truth_tables
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.draws import Draws
 
@@ -120,7 +123,7 @@ def compare(session: Session) -> Compared:
     with session.progress("drawing"):
         _draw(findings, settings, results)
     by_loop = [_loop_tables(loop, [r for r in results if r.loop == loop]) for loop in settings.loops]
-    tables = [*chain.from_iterable(by_loop), _step_table(times)]
+    tables = [*chain.from_iterable(by_loop), _step_table(times), *truth_tables(study.wrist, settings.loops)]
     return Compared(study, findings, tables, results, searches, times)
 
 

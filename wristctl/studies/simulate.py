@@ -56,16 +56,19 @@ def plan(study: Study, inputs: Inputs) -> str:
     settings = study.simulate
     with under("simulate"):
         check_row(settings, tuned_gains(inputs))
+    from wristctl.report.truth_table import truth_told
     from wristctl.simulation.draws import is_random
 
     times = settings.repetitions if is_random(settings.loop) else 1
-    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s"
+    told = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{told}"
 
 
 def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.repetition_figures import error_sizes
+    from wristctl.report.truth_table import truth_tables
     from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
@@ -88,7 +91,7 @@ def simulate(session: Session) -> Simulated:
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
     title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if failed else "")
-    table = _table(findings, title, repeated)
+    tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
         findings.figure("angle", angles, [course])
         findings.figure("error", errors, [course])
@@ -96,7 +99,7 @@ def simulate(session: Session) -> Simulated:
             findings.figure("error-repetitions", error_sizes, [repeated])
         findings.figure("tensions", tensions, course)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
-    return Simulated(session.study, findings, [table], repeated, failed)
+    return Simulated(session.study, findings, tables, repeated, failed)
 
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:

@@ -49,8 +49,11 @@ class Tuned(StudyResult):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controllers' names and say what the search costs."""
+    from wristctl.report.truth_table import truth_told
+
     with under("tune"):
-        return planned_search(study.tune)
+        told = truth_told(identified(study, "tune", inputs).wrist, study.tune.loops)
+        return planned_search(study.tune) + told
 
 
 def planned_search(settings: TuneSettings) -> str:
@@ -76,6 +79,8 @@ def planned_search(settings: TuneSettings) -> str:
 
 def tune(session: Session) -> Tuned:
     """Search for gains by rollouts, a whole swarm as one batch."""
+    from wristctl.report.truth_table import truth_tables
+
     study = identified(session.study, "tune", session.inputs)
     loops = study.tune.loops.values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
@@ -86,6 +91,7 @@ def tune(session: Session) -> Tuned:
         for name, result in found.items()
     ]
     tables = [Table("Tuned gains", ("controller", "objective", "evaluations", "gains"), rows)]
+    tables += truth_tables(study.wrist, study.tune.loops)
     return Tuned(session.study, session.findings, tables, found)
 
 

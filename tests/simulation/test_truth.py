@@ -1,0 +1,211 @@
+"""What the world is and what its controller believes: each leaf moves the wrist, and the controller knows of none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.choices import PLANTS
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSensor
+from wristctl.config.resolved import config_hash, resolved_yaml
+from wristctl.config.truth import actual
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import now_of
+from wristctl.control.response import Controlled, respond
+from wristctl.control.table import controller, gains_of
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.rows import rows_of
+from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
+from wristctl.simulation.batch import Batch, Lanes, batch
+from wristctl.simulation.kernel import run_blocks
+from wristctl.simulation.observer import go_on, sense
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import _advance
+from wristctl.simulation.worlds import World, differences, plant_of
+from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.segments import load_segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+WRIST = WristParameters()
+CAMERA = Sensor(level="camera")
+LOOPS = {
+    "tendon": Loop(actuator=Actuator(level="tendon"), sensor=CAMERA),
+    "lagged": Loop(actuator=Actuator(level="lagged"), sensor=CAMERA),
+}
+LEAVES: dict[str, dict[str, Any]] = {
+    **{name: {name: "x1.03"} for name in ("length", "mass", "hand_mass", "hand_offset", "stiffness", "damping")},
+    "tendon_radius": {"tendon_radius": "x1.03"},
+    "by value": {"stiffness": 0.5, "tendon_radius": 0.0195},
+    "tendon_stiffness": {"actuator": {"tendon_stiffness": "x0.5"}},
+    "lag": {"actuator": {"lag": "x3"}},
+    "friction": {"actuator": {"friction": 0.3}},
+    "pulley_radius": {"actuator": {"pulley_radius": "x1.02"}},
+    "step_rate": {"actuator": {"step_rate": "x0.02"}},
+    "step_acceleration": {"actuator": {"step_acceleration": "x0.1"}},
+    "delay_frames": {"sensor": {"delay_frames": 3.5}},
+    "noise_deg": {"sensor": {"noise_deg": "x2"}},
+    "dropped": {"sensor": {"dropped": 0.3}},
+    "zero_deg": {"sensor": {"zero_deg": 1.0}},
+}
+STILL = {
+    ("lagged", "friction"): "tendons pull without friction there",
+    ("lagged", "step_acceleration"): "motors change their pull at once there, no faster than the steps come",
+    ("tendon", "lag"): "a stepper has none",
+}
+"""Leaves that are of another level, with the reason."""
+COLUMNS = {"theta": 0, "torque_wanted": 2, "tension_plus": 4, "tension_minus": 5, "seen": 8}
+
+
+def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
+    """One rollout, each tick of it recorded."""
+    law, followed = controller("smc-tracking"), motion(Reference(duration=0.3), WRIST, horizon, 1e-3)
+    world = World(loop.model_copy(update={"plant": plant}), WRIST)
+    lanes = Lanes(np.zeros(1, np.int64), np.zeros(1, np.int64), [(4, 2)])
+    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS["pcc"], None, True)
+
+
+def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
+    """The same, run to its end."""
+    done = prepared(plant, loop, horizon)
+    _advance(done, kernel_of(run_blocks, PLANTS["pcc"]), 1, None)
+    return done
+
+
+def column(done: Batch, name: str) -> np.ndarray:
+    record: np.ndarray = done.state.record[0, :, COLUMNS[name]]
+    return record.ravel()
+
+
+@kernel
+def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: Any, out: Any) -> None:
+    """What `run_blocks` does of one lane without a plant: frames and their dates are given."""
+    known, drive = load_segments(rows_of(world.model)), Drive(setup.level, read_motor(rows_of(world.motor)))
+    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
+    bound, motor, target = rows_of(world.limits), rows_of(state.motors), rows_of(scratch.target)
+    low, high = TENDONS_PER_SIDE * bound[0], TENDONS_PER_SIDE * bound[1]
+    zero, view = 0.0 * low, now_of(scratch.now)
+    for tick in range(out.shape[0]):
+        for value in range(3):
+            target[value] = course.references[0, tick, value] + zero
+        seen, rate = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
+        wanted, _, _, plus, minus = respond(control, known, seen, rate, (low, high), 0.0, setup.period)
+        row = rows_of(out[tick])
+        row[0], row[1], row[2] = wanted, plus, minus
+        counted_plus, counted_minus = actuate(drive, motor, known, view.theta_ref, plus, minus, setup.period)
+        go_on(state.watch, drive, known, tick, counted_plus, counted_minus, setup.period)
+
+
+def only(values: Any) -> Any:
+    """The only block of named arrays of blocks."""
+    return type(values)(*(only(each) if hasattr(each, "_fields") else each[0] for each in values))
+
+
+def commands_from(recorded: Batch, loop: Loop, speeds: TrueActuator) -> np.ndarray:
+    """Torque and both pulls (T, 3) of a controller that gets the frames of another run, and has only its belief."""
+    fresh, watch = prepared(Plant(actuator=speeds), loop), recorded.state.watch
+    start, delivered = fresh.state.watch.observer, np.zeros_like(watch.observer.delivered)
+    given = watch._replace(
+        turn=np.array([[len(recorded.course.schedule.captures), 0]]), observer=start._replace(delivered=delivered)
+    )
+    out = np.zeros((recorded.samples, 3))
+    course, state = fresh.course._replace(schedule=recorded.course.schedule), fresh.state._replace(watch=given)
+    _controller_side(fresh.setup, course, only(fresh.world), only(state), fresh.scratch(), out)
+    return out
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+@pytest.mark.parametrize("level", LOOPS)
+def test_a_leaf_moves_the_wrist_and_the_controller_knows_only_its_frames_and_steps(level: str, leaf: str) -> None:
+    loop, plant = LOOPS[level], load_study([], [f"simulate.loop.plant={json.dumps(LEAVES[leaf])}"]).simulate.loop.plant
+    believed, actual = finished(Plant(), loop), finished(plant, loop)
+    moved = np.abs(column(actual, "theta") - column(believed, "theta")).max()
+    if (level, leaf) in STILL:
+        assert moved == 0.0, STILL[level, leaf]
+    else:
+        assert moved > 1e-6
+    own = plant.actuator
+    speeds = TrueActuator(lag=own.lag, step_rate=own.step_rate, step_acceleration=own.step_acceleration)
+    again = commands_from(actual, loop, speeds)
+    for number, name in enumerate(("torque_wanted", "tension_plus", "tension_minus")):
+        own_side = again[:, number] / (TENDONS_PER_SIDE if number else 1.0)
+        assert own_side.tobytes() == column(actual, name).tobytes()
+
+
+def test_what_is_given_as_it_is_believed_changes_no_bit() -> None:
+    for loop in LOOPS.values():
+        given = TrueActuator(**{name: getattr(loop.actuator, name) for name in TrueActuator.model_fields})
+        same = Plant(length=WRIST.length, tendon_radius="x1", actuator=given, sensor=TrueSensor(noise_deg="x1.0"))
+        assert column(finished(same, loop), "theta").tobytes() == column(finished(Plant(), loop), "theta").tobytes()
+
+
+def test_steps_mean_what_the_worlds_pulley_makes_of_them() -> None:
+    """At rest an ideal controller's spools stand where it counts them; a pulley 2 % larger has reeled in 2 % more."""
+    believed, own = Actuator(level="tendon"), Actuator(level="tendon", pulley_radius=1.02 * Actuator().pulley_radius)
+    winding = winding_of(believed, own, 4.0)
+    home = 4.0 / (TENDONS_PER_SIDE * believed.tendon_stiffness)
+    assert winding.scale == pytest.approx(1.02)
+    assert winding.scale * home + winding.offset == pytest.approx(home, rel=1e-12), "homed at the same pull"
+    steps = 500 * believed.step_length
+    reeled = winding.scale * (home + steps) + winding.offset
+    assert reeled - home == pytest.approx(500 * own.step_length, rel=1e-9)
+    softer = winding_of(believed, Actuator(level="tendon", tendon_stiffness=10e3), 4.0)
+    assert softer.scale == 1.0 and home + softer.offset == pytest.approx(4.0 / (TENDONS_PER_SIDE * 10e3))
+
+
+def test_a_zero_that_is_wrong_by_a_degree_costs_a_degree_and_is_not_seen() -> None:
+    done = finished(Plant(sensor=TrueSensor(zero_deg=1.0)), LOOPS["tendon"], horizon=4.0)
+    theta, seen = (np.degrees(column(done, name)[-1000:].mean()) for name in ("theta", "seen"))
+    assert seen - theta == pytest.approx(1.0, abs=0.05) and theta < 29.7
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [(None, 2.0), (3.0, 3.0), ("x1.5", 3.0), ("X 0.5", 1.0), ("x1e-1", 0.2)],
+)
+def test_a_leaf_is_a_value_or_a_multiple(given: float | str | None, expected: float) -> None:
+    assert actual(2.0, given) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("given", ["tendon_radius=x-1", "tendon_radius=x0", "stiffness=0", "sensor.noise_deg=-1",
+    "length=1.05x", "actuator.lag=many", "tendon_radiu=1", "actuator.level=tendon", "tension_limit=3"])  # fmt: skip
+def test_what_a_leaf_cannot_be_is_refused(given: str) -> None:
+    with pytest.raises(UserError, match=r"simulate\.loop\.plant\."):
+        load_study([], [f"simulate.loop.plant.{given}"])
+
+
+def test_the_wrist_as_it_is_has_its_leaves_then_scales_and_payload() -> None:
+    plant = Plant(stiffness="x0.9", stiffness_scale=0.5, hand_mass=0.2, payload=0.1, length="x1.1")
+    own = plant_of(WRIST, plant)
+    assert own.stiffness == pytest.approx(0.45 * WRIST.stiffness) and own.hand_mass == pytest.approx(0.3)
+    assert own.length == pytest.approx(0.088) and own.tendon_radius == WRIST.tendon_radius
+
+
+def test_a_study_without_truth_is_written_and_hashed_as_before(tmp_path: Path) -> None:
+    plain, told = load_study(), load_study([], ["simulate.loop.plant={length: x1.05, sensor: {zero_deg: 0.5}}"])
+    assert "zero_deg" not in resolved_yaml(plain, "simulate")
+    assert "length" not in plain.simulate.loop.plant.model_dump()
+    text = resolved_yaml(told, "simulate")
+    assert "length: x1.05" in text and "zero_deg: 0.5" in text
+    assert config_hash(told, "simulate") != config_hash(plain, "simulate")
+    (tmp_path / "told.yaml").write_text(text)
+    assert load_study([tmp_path / "told.yaml"]).simulate == told.simulate
+
+
+def test_what_differs_is_listed_with_what_is_believed() -> None:
+    plant = Plant(tendon_radius="x1.03", payload=0.1, sensor=TrueSensor(zero_deg=0.5, delay_frames=3.0))
+    loop = LOOPS["tendon"].model_copy(update={"plant": plant})
+    found = {each.key: (each.believed, each.actual, each.unit) for each in differences(World(loop, WRIST))}
+    assert found == {
+        "tendon_radius": (0.02, pytest.approx(0.0206), "m"),
+        "hand_mass": (0.3, pytest.approx(0.4), "kg"),
+        "sensor.delay_frames": (2.0, 3.0, ""),
+        "sensor.zero_deg": (0.0, 0.5, "deg"),
+    }
+    assert differences(World(LOOPS["tendon"], WRIST)) == []

@@ -1,0 +1,83 @@
+"""What the simulated world is, where that is not what its controller believes: by value, or as a multiple.
+
+A leaf here overrides the leaf of the same name that the controller knows: `tendon_radius: 0.021`, or `x1.05` of what it
+believes. One that is not given is as believed.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic.config import JsonDict
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
+
+from wristctl.config.section import Section
+
+_SCALE = re.compile(r"x ?([0-9]+\.?[0-9]*(?:e[+-]?[0-9]+)?)", re.IGNORECASE)
+
+
+def _scale(given: str) -> str:
+    found = _SCALE.fullmatch(given)
+    if found is None or float(found[1]) <= 0.0:
+        raise PydanticCustomError("scale", "Input should be a number, or a multiple of what is believed, as x1.05")
+    return given
+
+
+Scale = Annotated[str, AfterValidator(_scale)]
+Positive = Annotated[float, Field(gt=0)] | Scale | None
+NotNegative = Annotated[float, Field(ge=0)] | Scale | None
+"""A leaf as it is: a value, a multiple of the believed one, or None where it is as believed."""
+
+
+def truth(unit: str, meaning: str, default: float | None = None) -> Any:
+    """A leaf as it is in the world; config.yaml leaves it out where it is as believed."""
+    also = ", or x1.05 of what is believed" if default is None else ""
+    extra: JsonDict = {"unit": unit, "source": "" if also else "assumed", "unsaid": True}
+    return Field(default, description=meaning + also, json_schema_extra=extra)
+
+
+def unsaid(default: Truth) -> Any:
+    """A section of such leaves, left out of config.yaml where nothing in it is given."""
+    return Field(default, json_schema_extra={"unsaid": True})
+
+
+def actual(believed: Any, given: Any) -> Any:
+    """A leaf as it is, from what is believed of it and what was given."""
+    if given is None:
+        return believed
+    if isinstance(given, str):
+        return type(believed)(believed * float(given.lower().removeprefix("x")))
+    return given
+
+
+def is_unsaid(field: FieldInfo) -> bool:
+    """Whether a field is left out of what is written where it has its default."""
+    extra = field.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("unsaid"))
+
+
+class Truth(Section):
+    """Leaves that override those of the same names in another section; what is as believed is not written out."""
+
+    def of(self, believed: Any) -> Any:
+        """The other section with what is true of it."""
+        names = [
+            name
+            for name, field in type(self).model_fields.items()
+            if is_unsaid(field) and name in type(believed).model_fields
+        ]
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        changed = {name: actual(getattr(believed, name), each) for name, each in given.items()}
+        return believed.model_copy(update=changed) if changed else believed
+
+    @model_serializer(mode="wrap")
+    def _without_the_unsaid(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields = {field.alias or name: field for name, field in type(self).model_fields.items()}
+        unsaid = {key for key, field in fields.items() if is_unsaid(field)}
+        written = handler(self)
+        return {
+            key: each for key, each in written.items() if key not in unsaid or each not in (fields[key].default, {})
+        }

@@ -1,0 +1,29 @@
+"""What the world of a loop is and its controller does not know, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.report.printed_table import Table
+from wristctl.simulation.worlds import World, differences
+
+
+def truth_tables(wrist: WristParameters, loops: Mapping[str, Loop]) -> list[Table]:
+    """A table of what differs in each loop, by its name, before spreads are drawn; none where nothing does."""
+    worlds = {name: differences(World(loop, wrist)) for name, loop in loops.items()}
+    rows = [(name, *each) for name, found in worlds.items() for each in found]
+    if not rows:
+        return []
+    title = "What the world is and the controller does not know"
+    return [Table(title, ("loop", "leaf", "believed", "actual", "unit"), rows)]
+
+
+def truth_told(wrist: WristParameters, loops: Mapping[str, Loop]) -> str:
+    """The same in a line for each, for a plan."""
+    told = ""
+    for table in truth_tables(wrist, loops):
+        for loop, leaf, believed, actual, unit in table.rows:
+            told += f"\n{loop}: {leaf} is {actual:g} {unit}".rstrip() + f", believed {believed:g}"
+    return told
