@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from wristctl.cli import progress as module
-from wristctl.studies.counting import Count
+from wristctl.studies.counting import Count, no_event
 
 
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
@@ -36,16 +36,20 @@ def test_a_line_tells_count_and_figures(monkeypatch: pytest.MonkeyPatch) -> None
     assert lines[-1] == "tuning: 1000 of 1000 steps, best 0.001"
 
 
-def test_a_line_tells_the_time_that_is_left_at_the_pace_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
     count = Count("drawing", 1000, "samples", 250, began=0.0)
-    monkeypatch.setattr("time.monotonic", lambda: 20.0)
-    assert count.seconds_left() == 60.0
-    assert count.line() == "drawing: 250 of 1000 samples, about 60 s left"
-    monkeypatch.setattr("time.monotonic", lambda: 2400.0)
-    assert count.line().endswith("about 2 h left")
-    assert Count("drawing", 1000, "samples", 1000).seconds_left() is None
-    assert Count("drawing", 1000, "samples").line() == "drawing"
-    assert Count("drawing", None, "samples", 3).line() == "drawing: 3 samples"
+    for now, left in ((1.0, ""), (20.0, "about 60 s left"), (200.0, "about 10 min left"), (2400.0, "about 2 h left")):
+        monkeypatch.setattr("time.monotonic", lambda now=now: now)
+        assert count.remaining() == left
+    for known in (Count("drawing", 1000, "samples", 1000, began=0.0), Count("drawing", None, "samples", 3, began=0.0)):
+        assert known.seconds_left() is None and known.remaining() == ""
+    instants = iter([0.0, 0.0, *[20.0] * 10])
+    monkeypatch.setattr("time.monotonic", lambda: next(instants))
+    monkeypatch.setattr(module, "_LINE_EVERY", 0.0)
+    screen = io.StringIO()
+    with module.progress(Console(file=screen, width=20), no_event, "drawing", 40, "samples", False) as done:
+        done(10)
+    assert screen.getvalue() == "drawing: 10 of 40 samples, about 60 s left\n"
 
 
 def test_a_length_that_is_unknown_is_announced_and_quiet_is_quiet() -> None:

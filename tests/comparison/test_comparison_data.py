@@ -30,8 +30,8 @@ def course(segments: int) -> Trajectory:
 
 def row(name: str, metrics: dict[str, list[float]], failed: list[bool], segments: int = 1) -> ComparedRow:
     values = {each: np.array(given) for each, given in metrics.items()}
-    first = Simulation(course(segments), {each: given[0] for each, given in metrics.items()}, failed[0])
-    repeated = Repeated(first, values, np.array(failed), first.trajectory.error[None])
+    first = Simulation(course(segments), {each: given[0] for each, given in metrics.items()}, failed[0], 0.5)
+    repeated = Repeated(first, values, np.array(failed), np.full(len(failed), 0.5), first.trajectory.error[None])
     return ComparedRow("four", "step 30 deg", "exact", name, "printed", repeated)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.faults.commands import LOST, runs
+from wristctl.board.board_errors import SAFETY_STOP
 from wristctl.records.leftovers import clear, clear_tags, leftovers, lost_tags
 from wristctl.records.manifest import SUMS
 from wristctl.records.tags import known_tags
@@ -83,7 +84,7 @@ def _of_the_end(mode: str, code: int, said: str) -> Iterator[str]:
         yield f"a bug: {said[-300:]}"
     if mode == "kill" and code != KILLED:
         yield f"was not killed: {code}"
-    if mode != "kill" and code not in (0, 2):
+    if mode != "kill" and code not in (0, 2, SAFETY_STOP):
         yield f"exit {code}: {said[-300:]}"
     errors = [line for line in said.splitlines() if line.startswith("error: ")]
     if code == 2 and len(errors) != 1:

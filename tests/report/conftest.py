@@ -59,7 +59,7 @@ def late() -> Trajectory:
 def result(row: str, reference: str, rmse: float, failed: bool = False) -> ComparedRow:
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
-    done = Simulation(course(row, 1.0, failed), metrics, failed)
+    done = Simulation(course(row, 1.0, failed), metrics, failed, 0.5)
     return ComparedRow("default", reference, "exact", controller, gains, Repeated.once(done))
 
 

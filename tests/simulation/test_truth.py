@@ -28,7 +28,7 @@ from wristctl.simulation.kernel import run_blocks
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import _advance
-from wristctl.simulation.worlds import World, differences, plant_of
+from wristctl.simulation.worlds import World, mismatches, plant_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -201,11 +201,11 @@ def test_a_study_without_truth_is_written_and_hashed_as_before(tmp_path: Path) -
 def test_what_differs_is_listed_with_what_is_believed() -> None:
     plant = Plant(tendon_radius="x1.03", payload=0.1, sensor=TrueSensor(zero_deg=0.5, delay_frames=3.0))
     loop = LOOPS["tendon"].model_copy(update={"plant": plant})
-    found = {each.key: (each.believed, each.actual, each.unit) for each in differences(World(loop, WRIST))}
+    found = {each.key: (each.believed, each.actual, each.unit) for each in mismatches(World(loop, WRIST))}
     assert found == {
         "tendon_radius": (0.02, pytest.approx(0.0206), "m"),
         "hand_mass": (0.3, pytest.approx(0.4), "kg"),
         "sensor.delay_frames": (2.0, 3.0, ""),
         "sensor.zero_deg": (0.0, 0.5, "deg"),
     }
-    assert differences(World(LOOPS["tendon"], WRIST)) == []
+    assert mismatches(World(LOOPS["tendon"], WRIST)) == []

@@ -56,13 +56,14 @@ def course(label: str, diverges: bool = False) -> Trajectory:
 
 
 def repeated(label: str, rmse: Sequence[float] = (1e-3,), failed: int = 0, **metrics: float) -> Repeated:
-    """A loop done as often as there are RMSEs, the last `failed` of which diverged: every other metric is 1."""
-    every = {name: np.ones(len(rmse)) for name in METRICS} | {"rmse": np.array(rmse)}
+    """A loop done as often as there are RMSEs, the last `failed` of which failed; it does not swing, all else is 1."""
+    every = {name: np.ones(len(rmse)) for name in METRICS}
+    every |= {"rmse": np.array(rmse), "oscillation": np.zeros(len(rmse))}
     every |= {name: np.full(len(rmse), value) for name, value in metrics.items()}
     bad = np.arange(len(rmse)) >= len(rmse) - failed
     one = course(label, bool(bad[0]))
-    first = Simulation(one, {name: float(values[0]) for name, values in every.items()}, bool(bad[0]))
-    return Repeated(first, every, bad, one.error[None])
+    first = Simulation(one, {name: float(values[0]) for name, values in every.items()}, bool(bad[0]), 0.5)
+    return Repeated(first, every, bad, np.full(len(bad), 0.5), one.error[None])
 
 
 def session(study: Study, run: LiveRun | None = None, inputs: Mapping[str, Given] | None = None) -> Session:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -66,22 +67,30 @@ def test_a_row_shows_every_metric_that_has_a_heading_below_it_and_the_papers_num
     first = dict(zip(table.columns, table.rows[0], strict=True))
     headed = {metric.heading: name for name, metric in METRICS.items() if metric.heading}
     assert list(table.columns[:4]) == ["controller", "inverse", METRICS["rmse"].heading, METRICS["settling"].heading]
-    assert set(headed) == set(table.columns) - {"controller", "inverse", "paper's", "verdict"}
+    assert set(headed) == set(table.columns) - {"controller", "inverse", "paper's", "verdict", "fate"}
     for heading, name in headed.items():
         assert first[heading] == known[name]
     assert first["paper's"] == "0.0015 / 3 / 0.00248" and first["verdict"] == "not reproduced"
-    assert table.rows[1][-2:] == ("", ""), "the paper has none"
+    assert table.rows[1][-3:] == ("", "", ""), "the paper has none"
 
 
 def test_a_row_as_good_as_the_papers_is_reproduced(compare: Compare) -> None:
     done = compare([row("fast", STEP, "pid/printed", rmse=[1.5e-3], settling=3.0, steady_state=2e-3)])
-    assert done.tables[0].rows[0][-1] == "reproduced"
+    assert done.tables[0].rows[0][-2:] == ("reproduced", "")
 
 
-@pytest.mark.parametrize(("failed", "said"), [(0, "never"), (1, "diverged")])
-def test_what_never_settles_says_so_or_that_it_diverged(compare: Compare, failed: int, said: str) -> None:
+@pytest.mark.parametrize(("failed", "said"), [(0, "never"), (1, "failed")])
+def test_what_never_settles_says_so_or_that_it_failed(compare: Compare, failed: int, said: str) -> None:
     (table, _) = compare([row("fast", STEP, "pid/printed", failed=failed, settling=np.nan)]).tables
-    assert dict(zip(table.columns, table.rows[0], strict=True))[METRICS["settling"].heading] == said
+    shown = dict(zip(table.columns, table.rows[0], strict=True))
+    assert shown[METRICS["settling"].heading] == said
+    assert shown["fate"] == ("FAILED: left its range at 0.5 s" if failed else "")
+
+
+def test_a_row_that_swings_at_rest_is_told_to(compare: Compare) -> None:
+    rows = [row("fast", STEP, f"pid/{size}", oscillation=math.radians(size)) for size in (0.09, 0.12)]
+    (table, _) = compare(rows).tables
+    assert [each[-1][:21] for each in table.rows] == ["", "LIMIT CYCLE: +-0.12 d"]
 
 
 def test_of_repetitions_medians_are_shown_with_the_interval_of_the_rmse(compare: Compare) -> None:

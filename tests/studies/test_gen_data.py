@@ -43,7 +43,7 @@ def samples(others: bool = True) -> Samples:
 def generate(monkeypatch: pytest.MonkeyPatch) -> Generate:
     """Samples that were drawn as these four."""
 
-    def drawn(settings: Any, wrist: Any, rng: Any) -> Samples:
+    def drawn(settings: Any, wrist: Any, rng: Any, done: Any = None) -> Samples:
         assert (settings.samples, wrist.length) == (50, 0.1) and isinstance(rng, np.random.Generator)
         return samples(settings.source == "plant")
 

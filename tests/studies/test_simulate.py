@@ -86,7 +86,9 @@ def test_two_repetitions_are_several(simulate: Simulate) -> None:
 def test_one_repetition_that_fails_is_a_failure(simulate: Simulate, failed: int, said: bool) -> None:
     done = simulate(repeated("smc/exchanged", NINE, failed=failed))
     assert done.failed is said
-    assert (" FAILED: the wrist bent beyond a full turn, 9" in done.tables[0].title) == said
+    count = f"in {failed} of 9 repetitions, 9 repetitions"
+    assert (f", FAILED: left its range at 0.5 s {count}" in done.tables[0].title) == said
+    assert (done.fault is not None and done.fault.exit_code == 3 and "left its range" in done.fault.what) == said
 
 
 def test_a_run_keeps_the_trajectory_with_units_and_every_repetition(simulate: Simulate, tmp_path: Path) -> None:

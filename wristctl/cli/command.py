@@ -90,3 +90,5 @@ def _execute(procedure: Procedure[Any], options: Options, shortcuts: Sequence[st
             console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)
             raise
     print_result(run.path, found.tables, options.as_json)
+    if found.fault is not None:
+        raise found.fault

@@ -102,7 +102,7 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
         instant = time.monotonic()
         if lines and instant - last_line >= _LINE_EVERY:
             last_line = instant
-            console.print(count.line(), **PLAIN)
+            console.print(", ".join(part for part in (count.line(), count.remaining()) if part), **PLAIN)
 
     if lines and total is None:
         console.print(f"{what} ...", **PLAIN)

@@ -112,6 +112,7 @@ METRICS: Choices[Any] = Choices(
         "rmse_desired": "wristctl.simulation.metrics:RMSE_DESIRED",
         "tip_rmse_mm": "wristctl.simulation.metrics:TIP_RMSE",
         "tip_steady_mm": "wristctl.simulation.metrics:TIP_STEADY",
+        "oscillation": "wristctl.simulation.metrics:OSCILLATION",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
     },
 )

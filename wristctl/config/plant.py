@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 
 from wristctl.config.choices import DISTURBANCES, PLANTS
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
-from wristctl.config.truth import NotNegative, Positive, Truth, truth, unsaid
+from wristctl.config.truth import NotNegative, Overrides, Positive, truth, unsaid
 
 PlantName = Annotated[str, OneOf(PLANTS)]
 
 
-class TrueActuator(Truth):
+class TrueActuator(Overrides):
     """Motors and tendons as they are, where that is not what the controller believes."""
 
     lag: Positive = truth("s", "time constant of the motor's force (lagged)")
@@ -24,7 +24,7 @@ class TrueActuator(Truth):
     step_acceleration: Positive = truth("1/s^2", "largest change of that rate (tendon)")
 
 
-class TrueSensor(Truth):
+class TrueSensor(Overrides):
     """The camera as it is, where that is not what the controller believes."""
 
     delay_frames: NotNegative = truth("", "frames between capture and use; the observer dates them by what it believes")
@@ -33,7 +33,7 @@ class TrueSensor(Truth):
     zero_deg: float = truth("deg", "angle that the camera shows of a straight wrist", 0.0)
 
 
-class TrueWrist(Truth):
+class TrueWrist(Overrides):
     """The wrist as it is: leaves by value or as a multiple (`x1.05`); scales, payload and spreads come on top."""
 
     model: PlantName = choice("pcc", "what is simulated: pcc is piecewise constant curvature")

@@ -39,7 +39,7 @@ def truth(unit: str, meaning: str, default: float | None = None) -> Any:
     return Field(default, description=meaning + also, json_schema_extra=extra)
 
 
-def unsaid(default: Truth) -> Any:
+def unsaid(default: Overrides) -> Any:
     """A section of such leaves, left out of config.yaml where nothing in it is given."""
     return Field(default, json_schema_extra={"unsaid": True})
 
@@ -59,7 +59,7 @@ def is_unsaid(field: FieldInfo) -> bool:
     return isinstance(extra, dict) and bool(extra.get("unsaid"))
 
 
-class Truth(Section):
+class Overrides(Section):
     """Leaves that override those of the same names in another section; what is as believed is not written out."""
 
     def of(self, believed: Any) -> Any:

@@ -69,6 +69,8 @@ class LiveRun:
         self._metrics: dict[str, dict[str, Any]] = {}
         self._columns: dict[str, list[Column]] = {}
         self._volatile: set[str] = set()
+        self.exit_code = 0
+        """The command's, where the run itself ends ok."""
         self._summary: list[str] = []
         self._began = time.perf_counter(), time.process_time()
         self._write_manifest()
@@ -171,7 +173,8 @@ class LiveRun:
         self._journal.close()
         write_text(self.path / README, readme(manifest, "\n\n".join(self._summary)))
         self._write_manifest()
-        reserve.unlink(missing_ok=True)
+        for left in (reserve, *self.path.rglob(RESERVE)):  # also what a part of the run kept for itself
+            left.unlink(missing_ok=True)
         self._still_there()
         for folder in sorted(each for each in self.path.rglob("*") if each.is_dir())[::-1]:
             if not any(folder.iterdir()):

@@ -84,7 +84,7 @@ def start_run(
         try:
             yield run
             with undisturbed():
-                run.end("ok")
+                run.end("ok", run.exit_code)
         except BaseException as error:
             outcome = KeyboardInterrupt() if seen.asked else _refused(error, path)
             with undisturbed():

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.report.printed_table import Table
-from wristctl.simulation.worlds import World, differences
+from wristctl.simulation.worlds import World, mismatches
 
 
 def truth_tables(wrist: WristParameters, loops: Mapping[str, Loop]) -> list[Table]:
     """A table of what differs in each loop, by its name, before spreads are drawn; none where nothing does."""
-    worlds = {name: differences(World(loop, wrist)) for name, loop in loops.items()}
+    worlds = {name: mismatches(World(loop, wrist)) for name, loop in loops.items()}
     rows = [(name, *each) for name, found in worlds.items() for each in found]
     if not rows:
         return []

@@ -18,6 +18,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory
+from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation_frequency
 from wristctl.simulation.reference import Motion, motion, reference_name, toward
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.simulation.trajectory import Trajectory
@@ -31,11 +32,12 @@ _TOGETHER = 64
 
 @dataclass(frozen=True)
 class Simulation:
-    """A trajectory with its metrics; `failed` where the wrist bent beyond a full turn."""
+    """A trajectory with its metrics; `failed` where the wrist left its range, which it was in `until` then [s]."""
 
     trajectory: Trajectory
     metrics: dict[str, float]
     failed: bool
+    until: float
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Repeated:
     """Of each repetition, (R,)."""
     failed: NDArray[np.bool_]
     """(R,)"""
+    until: Array
+    """(R,) when each was last within its range [s]."""
     errors: Array
     """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
 
@@ -54,7 +58,20 @@ class Repeated:
     def once(cls, done: Simulation) -> Repeated:
         """One simulation."""
         metrics = {name: np.array([value]) for name, value in done.metrics.items()}
-        return cls(done, metrics, np.array([done.failed]), done.trajectory.error[None])
+        return cls(done, metrics, np.array([done.failed]), np.array([done.until]), done.trajectory.error[None])
+
+    @property
+    def fate(self) -> str:
+        """In words what became of it: that it failed, or swings; empty where it came to rest, or is not known to."""
+        if self.failed.any():
+            count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
+            return f"FAILED: left its range at {self.until[self.failed].min():.3g} s{count}"
+        known = self.metrics.get("oscillation", np.empty(0))
+        swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        if swing <= LIMIT_CYCLE:
+            return ""
+        rate = oscillation_frequency(self.first.trajectory)
+        return f"LIMIT CYCLE: +-{np.degrees(swing):.2g} deg at {rate:.2g} Hz"
 
     def labelled(self, label: str) -> Repeated:
         """The same with this label on its trajectory."""
@@ -110,26 +127,30 @@ class _Gathered:
         self._first: Simulation | None = None
         self._metrics: list[dict[str, float]] = []
         self._failed: list[bool] = []
+        self._until: list[float] = []
         self._errors: list[Array] = []
 
     def add(self, done: Simulation) -> None:
         self._first = self._first or done
         self._metrics.append(done.metrics)
         self._failed.append(done.failed)
+        self._until.append(done.until)
         if len(self._errors) < _TOGETHER:
             self._errors.append(done.trajectory.error)
 
     def repeated(self) -> Repeated:
         assert self._first is not None
         metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
-        return Repeated(self._first, metrics, np.array(self._failed), np.array(self._errors))
+        failed, until = np.array(self._failed), np.array(self._until)
+        return Repeated(self._first, metrics, failed, until, np.array(self._errors))
 
 
 def simulation(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Simulation:
     """The recorded rollout `index` with all its metrics; `plant` is the wrist as it is, of this plant model."""
     course = trajectory(outcome, index, followed, plant, model)
     metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
-    return Simulation(course, metrics | of_trajectory(course), bool(outcome.failed[index]))
+    failed, until = bool(outcome.failed[index]), float(outcome.until[index])
+    return Simulation(course, metrics | of_trajectory(course), failed, until)
 
 
 def trajectory(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Trajectory:

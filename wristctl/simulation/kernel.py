@@ -15,7 +15,7 @@ from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import Drive, actuate, pulls, read_motor, read_winding, wound
 from wristctl.simulation.observer import go_on, sense
-from wristctl.simulation.sums import SUMS, gather, goals_of
+from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, tip_angle
 from wristctl.wrist.segments import load_segments
@@ -111,7 +111,8 @@ class Span(NamedTuple):
 def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, span: Any) -> None:
     """Advance the span's blocks, one by one, over its samples of `setup.ticks` control periods each.
 
-    A lane leaves the game when its plant does (a segment bends beyond a full turn). What is None is not compiled in.
+    A lane leaves the game when its wrist leaves its range (or a segment bends beyond a full turn). What is None is not
+    compiled in.
     """
     for block in range(span.begin, span.end):
         _run_block(setup, course, block_of(world, block), block_of(state, block), scratch, span.first, span.last)
@@ -149,6 +150,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             acting_plus, acting_minus = pulls(tendons, plant, q, rates, reeled_plus, reeled_minus)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             time = now_tick * period + zero
+            watch_range(sum_, time, angle, bound[2])
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])

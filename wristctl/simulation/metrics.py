@@ -16,6 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.simulation.oscillation import oscillation
 from wristctl.simulation.trajectory import Trajectory
 
 _LEAST_MOVE = 1e-9
@@ -196,6 +197,12 @@ TIP_STEADY = Metric(
     "mm",
     "mean distance of the tip from the wanted position over the last 10 %",
     of_trajectory=lambda course: 1e3 * course.tip_distance[-max(1, len(course.time) // 10) :].mean(),
+)
+OSCILLATION = Metric(
+    "rad",
+    "half the peak-to-peak of the angle over the last second at rest, its trend removed",
+    of_trajectory=oscillation,
+    heading="oscillation [rad]",
 )
 OUTSIDE_DOMAIN = Metric(
     "", "share of the wanted tips outside the network's trained domain", of_trajectory=lambda course: course.outside

@@ -39,7 +39,9 @@ class Outcome:
 
     metrics: dict[str, Array]
     failed: NDArray[np.bool_]
-    """Rollouts whose wrist bent beyond a full turn, or not to any number at all."""
+    """Rollouts whose wrist left its range, or bent to no number at all."""
+    until: Array
+    """When they were last within it [s]: where they have failed."""
     samples: Array | None
 
     def column(self, name: str, rollout: int) -> Array:
@@ -87,8 +89,9 @@ def rollout(
     back = np.argsort(np.concatenate(groups), kind="stable")
     metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in done[0].metrics}
     failed = np.concatenate([each.failed for each in done])[back]
+    until = np.concatenate([each.until for each in done])[back]
     samples = [each.samples for each in done if each.samples is not None]
-    return Outcome(metrics, failed, np.concatenate(samples)[back] if samples else None)
+    return Outcome(metrics, failed, until, np.concatenate(samples)[back] if samples else None)
 
 
 def _worlds(
@@ -155,7 +158,7 @@ def _run(
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
     samples = None if kept is None else kept.reshape(count, done.samples, -1)
-    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, samples)
+    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], samples)
 
 
 def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None] | None) -> None:

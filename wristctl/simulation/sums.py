@@ -19,6 +19,7 @@ from wristctl.lanes.rows import rows_named, rows_of
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "plus", "minus", "alive",
+    "until",
 )  # fmt: skip
 """Running sums of a lane, of which metrics are made."""
 
@@ -29,6 +30,7 @@ goals_of = rows_named(GOALS)
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _PLUS, _MINUS, _ALIVE,
+    _UNTIL,
 ) = range(len(SUMS))  # fmt: skip
 
 
@@ -62,6 +64,14 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
     sums[_SLACK] = sums[_SLACK] + where((plus <= 0.0) | (minus <= 0.0), 1.0, 0.0 * plus)
     sums[_TICKS] = sums[_TICKS] + 1.0
     sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
+
+
+@compiled
+def watch_range(sums: Any, time: Any, theta: Any, reach: Any) -> None:
+    """A lane that bends beyond `reach` [rad], or to no number, has failed; until when it had not."""
+    alive, zero = sums[_ALIVE], 0.0 * reach
+    sums[_UNTIL] = where(alive > 0.0, time, sums[_UNTIL])
+    sums[_ALIVE] = where(abs(theta) < reach, alive, zero)
 
 
 @kernel

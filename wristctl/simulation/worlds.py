@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
@@ -12,6 +13,9 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator, Sensor, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
+
+LEEWAY_DEG = 5.0
+"""By how much a wrist may pass its range [deg]."""
 
 
 class World(NamedTuple):
@@ -38,7 +42,12 @@ class World(NamedTuple):
         return actual
 
 
-class Difference(NamedTuple):
+def reach(wrist: WristParameters) -> float:
+    """Bending angle [rad] beyond which a wrist has left its range, and its loop has failed."""
+    return math.radians(wrist.range_deg + LEEWAY_DEG)
+
+
+class Mismatch(NamedTuple):
     """A leaf of wrist, actuator or sensor that is not what the controller believes."""
 
     key: str
@@ -47,17 +56,17 @@ class Difference(NamedTuple):
     unit: str
 
 
-def differences(world: World) -> list[Difference]:
+def mismatches(world: World) -> list[Mismatch]:
     """All that the world of a loop has, and its controller does not know of; spreads are not drawn."""
-    loop, found = world.loop, list[Difference]()
+    loop, found = world.loop, list[Mismatch]()
     sides = {"": (world.wrist, world.plant), "actuator.": (loop.actuator, world.actuator)}
     for begin, (believed, actual) in (sides | {"sensor.": (loop.sensor, world.sensor)}).items():
         for name, field in type(believed).model_fields.items():
             values = getattr(believed, name), getattr(actual, name)
             if values[0] != values[1]:
-                found.append(Difference(begin + name, *values, unit_of(field)))
+                found.append(Mismatch(begin + name, *values, unit_of(field)))
     if zero := loop.plant.sensor.zero_deg:
-        found.append(Difference("sensor.zero_deg", 0.0, zero, "deg"))
+        found.append(Mismatch("sensor.zero_deg", 0.0, zero, "deg"))
     return found
 
 

@@ -194,7 +194,7 @@ def _loop_tables(loop: str, results: list[ComparedRow]) -> list[Table]:
     tables = []
     for reference in dict.fromkeys(result.reference for result in results):
         rows = [_row(result, shown, bool(ends)) for result in results if result.reference == reference]
-        heads = ("controller", "inverse", *shown.values(), *ends, "paper's", "verdict")
+        heads = ("controller", "inverse", *shown.values(), *ends, "paper's", "verdict", "fate")
         medians = f", medians of {times} repetitions" if ends else ""
         tables.append(Table(f"Loop {loop}, {reference}{medians}", heads, rows))
     return tables
@@ -205,11 +205,11 @@ def _row(result: ComparedRow, shown: Iterable[str], repeated: bool) -> tuple[str
     from wristctl.comparison.statistics import spread
 
     metrics = metrics_of(result)
-    never = "diverged" if result.repeated.failed.any() else "never"
+    never = "failed" if result.repeated.failed.any() else "never"
     settling = metrics["settling"] if metrics["settling"] == metrics["settling"] else never
     values = [settling if name == "settling" else metrics[name] for name in shown]
     ends = spread(result.repeated.metrics["rmse"])[1:3] if repeated else ()
-    return (result.label, result.inverse, *values, *ends, *_paper(result))
+    return (result.label, result.inverse, *values, *ends, *_paper(result), result.repeated.fate)
 
 
 def _step_table(times: dict[str, StepTime]) -> Table:

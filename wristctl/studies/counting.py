@@ -19,6 +19,8 @@ Watch = Callable[[str, int, int | None, Mapping[str, float]], None]
 
 _EVENT_EVERY = 1.0
 """Seconds between two events."""
+_TELLS = 2.0
+"""Seconds after which a pace tells something."""
 
 
 @dataclass
@@ -30,13 +32,14 @@ class Count:
     unit: str
     count: int = 0
     figures: dict[str, float] = field(default_factory=dict)
-    began: float = field(default_factory=time.monotonic)
+    began: float = field(default_factory=lambda: time.monotonic())
 
     def seconds_left(self) -> float | None:
         """What is left at the pace so far [s]; None where nothing is known of it, or all is done."""
-        if self.total is None or not 0 < self.count < self.total:
+        passed = time.monotonic() - self.began
+        if self.total is None or not 0 < self.count < self.total or passed < _TELLS:
             return None
-        return (time.monotonic() - self.began) * (self.total - self.count) / self.count
+        return passed * (self.total - self.count) / self.count
 
     def remaining(self) -> str:
         """The same in words; empty where it is not known."""
@@ -51,7 +54,7 @@ class Count:
         """All of it as text."""
         of = "" if self.total is None else f" of {self.total}"
         counted = f"{self.count}{of} {self.unit}".rstrip() if self.count else ""
-        shown = ", ".join(part for part in (counted, self.beside(), self.remaining()) if part)
+        shown = ", ".join(part for part in (counted, self.beside()) if part)
         return f"{self.what}: {shown}" if shown else self.what
 
     def fields(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pandas as pd
 
 from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.system_errors import fix_of
 from wristctl.config.wrist import WristParameters
 from wristctl.records import LiveRun
 from wristctl.report.printed_table import Table
@@ -80,7 +81,7 @@ def perform_trials(
     try:
         trial_log.close()
     except OSError as error:
-        stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", "free space")
+        stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", fix_of(error))
     if film is not None:
         film.close()
     for name, stream in trial_log.streams.items():

@@ -81,6 +81,8 @@ def perform(
         run.summary(f"```\n{text}\n```")
     content = json.dumps(plain_tables(found.tables), indent=2, allow_nan=False)
     run.file(TABLES).write_text(content + "\n", encoding="utf-8")
+    if found.fault is not None:
+        run.exit_code = found.fault.exit_code
     return found
 
 

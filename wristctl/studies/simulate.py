@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from wristctl.config.errors import under
+from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
@@ -33,13 +33,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Simulated(StudyResult):
-    """One closed loop, as often as the study says, and whether the wrist ever bent beyond a full turn."""
+    """One closed loop, as often as the study says, and whether the wrist ever left its range."""
 
     kind = "simulate"
 
     repeated: Repeated
     """Metrics of every repetition."""
     failed: bool
+
+    @property
+    def fault(self) -> UserError | None:
+        """That the wrist left its range."""
+        if not self.failed:
+            return None
+        where = str(self.findings.run.path) if self.findings.run else ""
+        what = self.repeated.fate.removeprefix("FAILED: ")
+        return UserError(
+            f"the wrist {what}", where, "look at the figures; try other gains or a slower move", exit_code=3
+        )
 
     @property
     def trajectory(self) -> Trajectory:
@@ -90,7 +101,7 @@ def simulate(session: Session) -> Simulated:
     columns = COLUMNS | own
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
-    title = f"{course.label}" + (" FAILED: the wrist bent beyond a full turn" if failed else "")
+    title = ", ".join(part for part in (course.label, repeated.fate) if part)
     tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
         findings.figure("angle", angles, [course])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
+from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import Run
 from wristctl.report.printed_table import Table
@@ -37,6 +38,11 @@ class StudyResult(ABC):
     @abstractmethod
     def frame(self) -> pd.DataFrame:
         """The main table."""
+
+    @property
+    def fault(self) -> UserError | None:
+        """What the command ends with although the study was done: a result that cannot stand; None where it can."""
+        return None
 
     @property
     def metrics(self) -> dict[str, float]:

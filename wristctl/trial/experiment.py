@@ -9,6 +9,7 @@ from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
+from wristctl.config.system_errors import fix_of
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.interrupt import undisturbed
@@ -194,5 +195,5 @@ class Experiment:
 def _of_the_log(error: BaseException) -> BaseException:
     """The safety stop behind a disk that takes no more rows; any other error as it is."""
     if isinstance(error, OSError):
-        return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), "free space")
+        return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), fix_of(error))
     return error

@@ -7,6 +7,7 @@ import math
 import os
 from collections import deque
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,11 @@ class Disk:
 
     def __init__(self, folder: Path) -> None:
         self._reserve = folder / ".reserve"
-        self._reserve.write_bytes(bytes(_RESERVED))
+        try:
+            self._reserve.write_bytes(bytes(_RESERVED))
+        except OSError:
+            self.give_up_reserve()
+            raise
         self.pretend_full = False
         """A fault to inject: every further write fails until the reserve is given up."""
 
@@ -92,7 +97,8 @@ class Disk:
 
     def give_up_reserve(self) -> None:
         """Free the space."""
-        self._reserve.unlink(missing_ok=True)
+        with suppress(OSError):  # whoever seals the run clears it away; what waits to be written is worth more
+            self._reserve.unlink(missing_ok=True)
         self.pretend_full = False
 
 
@@ -135,12 +141,14 @@ class TrialLog:
 
     def __init__(self, folder: Path, segments: int | None, period: float) -> None:
         self.disk = Disk(folder)
-        self.streams = {
-            name: Stream(folder / f"{name}.csv", columns, self.disk)
-            for name, columns in (("log", LOG), ("between", LOG), ("frames", FRAMES))
-        }
+        tables = {"log": LOG, "between": LOG, "frames": FRAMES}
         if segments is not None:
-            self.streams["truth"] = Stream(folder / "truth.csv", truth_columns(segments), self.disk)
+            tables["truth"] = truth_columns(segments)
+        try:
+            self.streams = {name: Stream(folder / f"{name}.csv", each, self.disk) for name, each in tables.items()}
+        except OSError:
+            self.disk.give_up_reserve()
+            raise
         self.last: deque[dict[str, Any]] = deque(maxlen=round(1.0 / period))
         """The last second of ticks."""
         self._truth: deque[tuple[int, NDArray[np.float64]]] = deque()

@@ -12,6 +12,7 @@ from wristctl.board.board_errors import SAFETY_STOP
 from wristctl.board.messages import State
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import Safety
+from wristctl.config.wording import Phrase
 from wristctl.trial.spools import Spools
 from wristctl.trial.steering import Answer, Estimate
 
@@ -19,7 +20,7 @@ from wristctl.trial.steering import Answer, Estimate
 class SafetyStop(UserError):
     """The trial was stopped; motors are to be stopped too."""
 
-    def __init__(self, what: str, where: str = "", fix: str = "") -> None:
+    def __init__(self, what: str, where: str = "", fix: Phrase = "") -> None:
         super().__init__(f"stopped: {what}", where, fix, SAFETY_STOP)
 
 
