@@ -142,7 +142,7 @@ def simulate(
 
     `network` (train) stands behind a reference with `inverse: network`, `tuned` (tune) behind `gains: tuned`; the
     parameters of `from_identified` (identify) replace the study's. The result has `.trajectory` (`.frame()` is its
-    table, SI units) and `.failed`, whether the wrist bent beyond a full turn. Raises UserError for unknown controllers
+    table, SI units) and `.failed`, whether the wrist left its range. Raises UserError for unknown controllers
     or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,

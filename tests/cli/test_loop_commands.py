@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.records import list_runs, open_run
+from wristctl.records import Run, list_runs, open_run
 from wristctl.seeds import stream
 
 LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.5")
@@ -240,3 +240,13 @@ def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
          "--set", f"loops={{default: {seen}}}")  # fmt: skip
     drawn = open_run("latest:tune").manifest.streams
     assert "search smc" in drawn and any(each.startswith("tuning camera: ") for each in drawn)
+
+
+def test_simulate_exits_3_where_the_wrist_left_its_range_and_its_run_stands(call: Call) -> None:
+    loop = "simulate.loop={sensor: {level: camera}, actuator: {level: tendon, tendon_stiffness: 2000.0}}"
+    settings = ("simulate.controller=smc-tracking", "simulate.gains=camera", loop)
+    code, out, err = call("simulate", *(part for each in settings for part in ("--set", each)))
+    run = Run(Path(out.splitlines()[-1]))
+    assert code == 3 and "the wrist left its range at" in err and "FAILED: left its range at" in out
+    assert run.state == "ok" and run.manifest.exit_code == 3 and run.problems() == []
+    assert "FAILED: left its range at" in run.file("README.md").read_text()

@@ -17,7 +17,9 @@ LIMIT_CYCLE = np.deg2rad(0.1)
 """Half peak-to-peak [rad] above which a loop is said to swing."""
 WINDOW = 1.0
 """[s]"""
-_HARMONICS = 4
+_HARMONICS = 4.0
+_STILL = 1e-9
+"""[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
 
 
@@ -28,43 +30,49 @@ def oscillation(course: Trajectory) -> float:
 
 
 def oscillation_frequency(course: Trajectory) -> float:
-    """Of what is left the strongest frequency [1/s], to one over the window; nan where there is nothing."""
+    """Of what is left the strongest frequency [1/s]; nan where there is nothing."""
     left = remaining(course)
-    if left is None or np.ptp(left) == 0.0:
-        return _UNKNOWN
-    power = np.abs(np.fft.rfft(left * np.hanning(len(left))))
-    return float(np.argmax(power[1:]) + 1) / (len(left) * _step(course))
+    return _UNKNOWN if left is None or np.ptp(left) < _STILL else _strongest(left, _step(course))
 
 
 def remaining(course: Trajectory) -> Array | None:
-    """What is left at the end of a course, its trend or its reference's harmonics removed, (W,) [rad]."""
+    """What is left at the end of a course, its trend or what follows its reference removed, (W,) [rad]."""
     step, samples = _step(course), len(course.time)
     window = round(WINDOW / step)
     if window > samples or not np.isfinite(course.theta[-window:]).all():
         return None
     if np.ptp(course.theta_ref[-window:]) == 0.0:
-        return _without(course.theta[-window:], np.stack([np.ones(window), np.arange(window)], axis=1))
-    frequency = _frequency(course.theta_ref, step)
+        return _without_trend(course.theta[-window:])
+    frequency = _strongest(course.theta_ref - course.theta_ref.mean(), step)
     window = min(samples, max(window, round(2.0 / (frequency * step))))
-    phase = 2.0 * np.pi * frequency * step * np.arange(window)
-    waves = [wave(k * phase) for k in range(1, _HARMONICS + 1) for wave in (np.cos, np.sin)]
     error = (course.theta - course.theta_ref)[-window:]
     if not np.isfinite(error).all():
         return None
-    return _without(error, np.stack([np.ones(window), np.arange(window), *waves], axis=1))
-
-
-def _without(values: Array, known: Array) -> Array:
-    """What least squares leaves of values (W,) by known courses (W, k)."""
-    scaled = known / np.abs(known).max(axis=0)
-    left: Array = values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0]
+    degree = 4 + round(
+        math.pi * _HARMONICS * frequency * step * window
+    )  # a polynomial follows so many waves, and no more
+    place = np.linspace(-1.0, 1.0, window)
+    left: Array = error - np.polynomial.legendre.Legendre.fit(place, error, min(degree, window // 2))(place)
     return left
 
 
-def _frequency(reference: Array, step: float) -> float:
-    """The strongest frequency of a reference [1/s]."""
-    power = np.abs(np.fft.rfft(reference - reference.mean(), 8 * len(reference)))
-    return float(np.argmax(power[1:]) + 1) / (8 * len(reference) * step)
+def _without_trend(angle: Array) -> Array:
+    """The angle less its mean and slope, told apart from those of a swing that is cut in its middle."""
+    place = np.linspace(-1.0, 1.0, len(angle))
+    trend = np.stack([np.ones_like(place), place], axis=1)
+    left = angle - trend @ np.linalg.lstsq(trend, angle, rcond=None)[0]
+    if np.ptp(left) < _STILL:
+        return np.asarray(left)
+    phase = math.pi * _strongest(left, 1.0) * len(angle) * place
+    both = np.concatenate([trend, np.stack([np.cos(phase), np.sin(phase)], axis=1)], axis=1)
+    return np.asarray(angle - trend @ np.linalg.lstsq(both, angle, rcond=None)[0][:2])
+
+
+def _strongest(values: Array, step: float) -> float:
+    """The strongest frequency [1/s] of values `step` [s] apart."""
+    count = 8 * len(values)
+    power = np.abs(np.fft.rfft(values * np.hanning(len(values)), count))
+    return float(np.argmax(power[8:]) + 8) / (count * step)
 
 
 def _step(course: Trajectory) -> float:

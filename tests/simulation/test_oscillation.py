@@ -1,0 +1,90 @@
+"""Oscillation at rest on closed forms, and a wrist that leaves its range."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wristctl.arrays import Array
+from wristctl.config.load import load_study
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Plant
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation, oscillation_frequency
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout
+from wristctl.simulation.trajectory import Trajectory
+
+TIME = np.linspace(0.0, 4.999, 5000)
+SOFT = ("simulate.controller=smc-tracking", "simulate.gains=camera", "simulate.loop.sensor.level=camera",
+    "simulate.loop.actuator={level: tendon, tendon_stiffness: 2000.0}")  # fmt: skip
+
+
+def course(theta: Array, theta_ref: Array) -> Trajectory:
+    nothing: Array = np.zeros(len(theta))
+    pair: Array = np.zeros((len(theta), 2))
+    return Trajectory(
+        "", TIME[: len(theta)], theta, theta[:, None], nothing, theta_ref, theta_ref, pair, pair, nothing, nothing, pair
+    )
+
+
+@pytest.mark.parametrize("frequency", [2.0, 7.0, 40.0, 200.0])
+def test_a_swing_about_a_creeping_angle_is_its_amplitude_and_its_frequency(frequency: float) -> None:
+    swing = 3e-3 * np.sin(2.0 * np.pi * frequency * TIME)
+    done = course(0.5 + 0.01 * TIME + swing, np.full(5000, 0.5))
+    assert oscillation(done) == pytest.approx(3e-3, rel=0.05)
+    assert oscillation_frequency(done) == pytest.approx(frequency, abs=1.0)
+
+
+def test_what_was_before_the_last_second_does_not_count() -> None:
+    early = np.where(TIME < 4.0, 0.2 * np.sin(30.0 * TIME), 0.0)
+    assert oscillation(course(0.5 + early, np.full(5000, 0.5))) < 1e-12
+    assert np.isnan(oscillation_frequency(course(np.full(5000, 0.5), np.full(5000, 0.5))))
+
+
+@pytest.mark.parametrize("frequency", [0.3, 0.5, 2.0])
+def test_a_lag_behind_a_sine_is_no_oscillation_and_a_buzz_on_it_is(frequency: float) -> None:
+    phase = 2.0 * np.pi * frequency * TIME
+    reference, theta = 0.5 * np.sin(phase), 0.45 * np.sin(phase - 0.3) + 0.02 * np.cos(3.0 * phase)
+    assert oscillation(course(theta, reference)) < 5e-4 < LIMIT_CYCLE
+    buzz = 4e-3 * np.sin(2.0 * np.pi * 25.0 * TIME)
+    assert oscillation(course(theta + buzz, reference)) == pytest.approx(4e-3, rel=0.2)
+
+
+def test_of_a_wrist_that_has_failed_or_had_no_second_it_is_not_known() -> None:
+    lost = np.where(TIME < 4.5, 0.1, np.nan)
+    assert np.isnan(oscillation(course(lost, np.full(5000, 0.1))))
+    assert np.isnan(oscillation(course(np.zeros(900), np.zeros(900))))
+
+
+def test_a_wrist_fails_when_it_leaves_its_range_by_five_degrees_and_not_before() -> None:
+    """Springs that lost 40 %, and a law that does not look: the wrist bends on beyond what is wanted."""
+    law, period = controller("feedforward"), 1e-3
+    wide = WristParameters(range_deg=170.0)
+    followed = [motion(Reference(angle_deg=40.0), wide, 2.0, period)]
+    loop = Loop(plant=Plant(stiffness_scale=0.6))
+
+    def done(wrist: WristParameters) -> tuple[bool, float, Array]:
+        found = rollout(law, np.zeros((1, 0)), followed, np.zeros(1, np.int64), loop, wrist, record=True)
+        return bool(found.failed[0]), float(found.until[0]), np.degrees(found.column("theta", 0))
+
+    failed, _, free = done(wide)
+    largest = np.abs(free).max()
+    assert not failed and 50.0 < largest < 170.0
+    for range_deg in (largest - 5.5, largest - 4.5):
+        failed, until, theta = done(WristParameters(range_deg=range_deg))
+        assert failed == (range_deg + 5.0 < largest)
+        if failed:
+            outside = int(np.flatnonzero(np.abs(free) > range_deg + 5.0)[0])
+            assert until == pytest.approx(outside * period, abs=1.5 * period)
+            assert np.isfinite(theta[: outside - 1]).all() and np.isnan(theta[outside + 1 :]).all()
+
+
+def test_soft_tendons_behind_a_camera_fail_or_swing_by_the_steppers_acceleration() -> None:
+    slow = simulate(load_study([], [*SOFT]))
+    assert slow.failed.any() or slow.metrics["oscillation"][0] > LIMIT_CYCLE
+    assert slow.fate.startswith(("FAILED: left its range at", "LIMIT CYCLE: +-"))
+    quick = simulate(load_study([], [*SOFT, "simulate.loop.actuator.step_acceleration=400000.0"]))
+    assert not quick.failed.any() and quick.metrics["oscillation"][0] < 2.0 * LIMIT_CYCLE
