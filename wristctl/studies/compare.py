@@ -72,6 +72,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
     from wristctl.comparison.combinations import count_rollouts, refuse_tuned_scenarios
     from wristctl.report.truth_table import truth_told
+    from wristctl.simulation.size import check_size
 
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -85,6 +86,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
+    with under("compare"):
+        check_size(settings.loops.values(), settings.horizon)
     told = truth_told(study.wrist, settings.loops)
     return f"{searched}{count_rollouts(settings)} rollouts of {settings.horizon:g} s{told}"
 

@@ -65,10 +65,13 @@ class Simulated(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     settings = study.simulate
-    with under("simulate"):
-        check_row(settings, tuned_gains(inputs))
     from wristctl.report.truth_table import truth_told
     from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import check_size
+
+    with under("simulate"):
+        check_row(settings, tuned_gains(inputs))
+        check_size([settings.loop], settings.horizon)
 
     times = settings.repetitions if is_random(settings.loop) else 1
     told = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})

@@ -63,9 +63,11 @@ def planned_search(settings: TuneSettings) -> str:
     """
     from wristctl.control.table import controller
     from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import check_size
     from wristctl.tuning.search import check_loops, check_tunable
 
     check_loops(settings)
+    check_size(settings.loops.values(), settings.horizon)
     for number, name in enumerate(settings.controllers):
         try:
             check_tunable(controller(name))
