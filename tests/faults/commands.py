@@ -8,6 +8,7 @@ import math
 import os
 import re
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 import cv2
@@ -61,14 +62,14 @@ LOST = "20200101T000000Z-tune-1"
 """A run that is gone, and has a tag still."""
 
 
-def prepare(work: Path) -> None:
-    """The runs and pictures that the commands read."""
+def prepare(work: Path, read: Collection[str]) -> None:
+    """The runs and pictures that commands with these words read."""
     run(work, (*COMMANDS["gen-data"], "--label", "base"))
-    for pose in (UPRIGHT, LEVEL):
+    for pose in (UPRIGHT, LEVEL) if "UPRIGHT" in read else ():
         write_run(work / "results", 0, pose, sides=("ulnar", "extension"))
     scene, drawn = Scene(SceneSettings(), WristParameters()), np.random.default_rng(0)
     (work / "pictures").mkdir()
-    for k in range(4):
+    for k in range(4 if "pictures" in read else 0):
         cv2.imwrite(str(work / f"pictures/{k}.png"), scene.render(np.full((1, 4), math.radians(k) / 4), drawn))
     tags = {each.id: ["paper"] for each in runs(work)} | {LOST: ["another"]}
     (work / "results/tags.json").write_text(json.dumps(tags))

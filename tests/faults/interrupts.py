@@ -27,7 +27,7 @@ LIMIT = 1.0
 """Seconds of processor time, of all its processes, from the signal to the end."""
 BEGUN = 0.1
 """Seconds of processor time in which it is the interpreter itself that starts, and says so with a traceback."""
-OUTLIVES = 10.0
+OUTLIVES = {signal.SIGINT: 1.0, signal.SIGKILL: 10.0}
 """Seconds that a process may outlive the one that began it."""
 LARGE = {
     "gen-data-1e6": ("gen-data", "--samples", "1000000"),
@@ -64,8 +64,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="wristctl-interrupts-") as scratch:
         base = Path(scratch) / "base"
         base.mkdir()
-        commands.prepare(base)
-        for name in given.only.split(","):
+        names = given.only.split(",")
+        commands.prepare(base, {word for name in names for word in every[name]})
+        for name in names:
             if "LARGE" in every[name]:
                 commands.run(base, (*LARGE["gen-data-1e6"], "--label", "large"))
             wrong += command(base, every[name], name, given.moments, number)
@@ -141,7 +142,7 @@ def _ended(base: Path, arguments: tuple[str, ...], after: float, number: signal.
         (os.kill if number == signal.SIGKILL else os.killpg)(child.pid, number)
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
-    until = time.monotonic() + (OUTLIVES if number == signal.SIGKILL else 0.0)
+    until = time.monotonic() + OUTLIVES[number]
     while _session(child.pid) and time.monotonic() < until:
         time.sleep(0.1)
     said = (work / "err").read_text(errors="replace")

@@ -83,8 +83,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="wristctl-faults-") as scratch:
         base = Path(scratch) / "base"
         base.mkdir()
-        commands.prepare(base)
-        for name in given.only.split(","):
+        names = given.only.split(",")
+        commands.prepare(base, {word for name in names for word in commands.COMMANDS[name]})
+        for name in names:
             modes = given.modes.split(",") if given.modes else ["kill", *(["turns"] if name in LONG else ERRORS)]
             wrong += command(base, name, modes, given.every, given.jobs)
     print(f"{wrong} wrong")

@@ -14,12 +14,9 @@ ROOT = Path(__file__).parents[2]
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 FAULTS = [
     ("--only", "tag,rm,gc,ls,report", "--modes", "kill,ENOSPC", "--every", "3"),
-    ("--only", "gen-data", "--modes", "kill,EIO", "--every", "16"),
+    ("--only", "gen-data", "--modes", "kill,EIO", "--every", "24"),
 ]
-INTERRUPTS = [
-    ("--only", "gen-data,ls", "--moments", "3"),
-    ("--only", "replay", "--moments", "2", "--kill"),
-]
+INTERRUPTS = [("--only", "gen-data", "--moments", "2"), ("--only", "replay", "--moments", "1", "--kill")]
 KILLED = "gen-data,train,train-search,tune,compare,audit,replay,report"
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from wristctl.config.errors import UserError
+from wristctl.interrupt import deferred
 from wristctl.learning.dataset import Samples
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
@@ -22,6 +26,8 @@ Report = Callable[[int, Epoch], None]
 """Told the job's number and its last epoch."""
 
 _given: dict[str, Any] = {}
+_TO_END = 0.35
+"""Seconds in which trainings that are interrupted come to the end of an epoch; their checkpoints stay in any case."""
 
 
 def train_all(
@@ -53,38 +59,56 @@ def _over_processes(
     samples: Samples, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
 ) -> list[TrainingResult]:
     context = multiprocessing.get_context("spawn")
-    told, stop = context.SimpleQueue(), context.Event()
-    given = {"samples": samples, "device": device, "checkpoints": checkpoints, "told": told, "stop": stop}
+    told, stop, begun = context.SimpleQueue(), context.Event(), context.Event()
+    given = {"samples": samples, "device": device, "checkpoints": checkpoints}
+    given |= {"told": told, "stop": stop, "begun": begun}
     interrupted = False
     try:
-        with ProcessPoolExecutor(workers, context, _begin, (given,)) as pool:
-            futures = [pool.submit(_work, number, job) for number, job in enumerate(jobs)]
+        with ProcessPoolExecutor(workers, context, _begin, (given,)) as pool, _ended():
+            with deferred():  # the workers' too, which begin with it
+                futures = [pool.submit(_work, number, job) for number, job in enumerate(jobs)]
             pending: set[Future[TrainingResult | None]] = set(futures)
-            while pending:
+            until = math.inf
+            while pending and time.monotonic() < until:
                 try:
-                    _, pending = wait(pending, timeout=0.2)
+                    _, pending = wait(pending, timeout=min(0.2, _TO_END))
                     while not told.empty():
                         report(*told.get())
                 except KeyboardInterrupt:
-                    interrupted = True
-                    stop.set()
-                    for future in futures:
-                        future.cancel()
-            trials = [future.result() for future in futures if not future.cancelled()]
+                    interrupted, until = True, time.monotonic() + _TO_END * begun.is_set()
+                    stop.set()  # what had not begun comes back with nothing
+            trials = [future.result() for future in futures if not interrupted or _came_back(future)]
     except BrokenProcessPool as error:
+        if interrupted:
+            raise KeyboardInterrupt from error
         raise UserError(
             "a worker process died", "train.workers", "train again with resume: RUN and fewer workers"
         ) from error
-    begun = [trial for trial in trials if trial is not None]
-    if interrupted and not begun:
+    done = [trial for trial in trials if trial is not None]
+    if interrupted and not done:
         raise KeyboardInterrupt
-    return begun
+    return done
+
+
+def _came_back(future: Future[TrainingResult | None]) -> bool:
+    return future.done() and future.exception() is None
+
+
+@contextmanager
+def _ended() -> Iterator[None]:
+    """At the block's end all workers end at once: their pool would wait for all that it was given."""
+    try:
+        yield
+    finally:
+        for worker in multiprocessing.active_children():
+            worker.kill()  # a milder signal waits there, as it does here while they are begun
 
 
 def _begin(given: dict[str, Any]) -> None:
     """Leave Ctrl-C to the parent, and end with it: a parent that was killed tells nobody."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _given.update(given)
+    given["begun"].set()
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
