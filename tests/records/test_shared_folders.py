@@ -104,6 +104,7 @@ def test_of_a_run_in_a_read_only_archive_the_report_is_written_here(
     shutil.copytree(run.path, archive / run.id)
     subprocess.run(["mount", "-o", "remount,ro", str(archive)], check=True)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     def call(*arguments: str) -> tuple[object, str, str]:
         monkeypatch.setattr(sys, "argv", ["wristctl", "runs", *arguments, "--out", str(archive)])
