@@ -19,7 +19,7 @@ BEGIN = "import wristctl.cli.app as app; print(); input(); app.main()"
 
 def together(folder: Path, *commands: tuple[str, ...]) -> list[tuple[int, str]]:
     """Exit code and stderr of each of these, begun in one moment."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
     children = [
         subprocess.Popen(
             [sys.executable, "-P", "-c", BEGIN, *each], cwd=folder, env=environment, text=True,
