@@ -81,6 +81,13 @@ def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results:
     run.check()
 
 
+def test_an_empty_dated_folder_is_a_leftover_and_a_folder_within_one_is_somebodys(results: Path) -> None:
+    empty, own = results / "20260101T000000Z-tune-abcdef", results / "20260101T000001Z-tune-abcdef"
+    (own / "config.yaml").mkdir(parents=True)
+    empty.mkdir()
+    assert [each.path for each in leftovers(results)] == [empty]
+
+
 def test_the_scratch_folders_of_killed_replays_are_found_and_no_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
