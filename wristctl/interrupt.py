@@ -35,14 +35,19 @@ class Interrupts:
     asked: bool = False
 
 
+_around: list[Interrupts] = []
+"""Of the block that is entered, where one is."""
+
+
 @contextmanager
 def interrupts() -> Iterator[Interrupts]:
     """Within the block (main thread only) Ctrl-C, where it is not ignored, and SIGTERM raise KeyboardInterrupt.
 
     One that falls into a destructor or a callback is swallowed by the interpreter, which tells only
-    `sys.unraisablehook`: with `again` for that hook it comes once more.
+    `sys.unraisablehook`: with `again` for that hook it comes once more. One that a library swallows, as while it is
+    imported, is known from `asked`, which a block within a block shares.
     """
-    seen = Interrupts()
+    seen = _around[-1] if _around else Interrupts()
 
     def raised(number: int, frame: FrameType | None) -> None:
         seen.asked = True
@@ -52,17 +57,38 @@ def interrupts() -> Iterator[Interrupts]:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         handlers[signal.SIGINT] = raised
     with _handled(handlers):
-        yield seen
+        _around.append(seen)
+        try:
+            yield seen
+        finally:
+            _around.pop()
 
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Within the block, which must be short, Ctrl-C and SIGTERM wait; they come at its end."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
+    """Within the block, which must be short, Ctrl-C and SIGTERM wait; they come at its end.
+
+    Processes that begin in it begin with both blocked. Another thread may be given the signal meanwhile: Python
+    would handle it here all the same.
+    """
+    if threading.current_thread() is not threading.main_thread():
         yield
+        return
+    came: list[int] = []
+    noted: dict[signal.Signals, Any] = {}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            noted[number] = lambda number, frame: came.append(number)
+    try:
+        with _handled(noted):
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for each in dict.fromkeys(came):
+            signal.raise_signal(each)
 
 
 def undisturbed() -> Any:

@@ -71,7 +71,7 @@ def _over_processes(
             until = math.inf
             while pending and time.monotonic() < until:
                 try:
-                    _, pending = wait(pending, timeout=min(0.2, _TO_END))
+                    _, pending = wait(pending, timeout=0.2)
                     while not told.empty():
                         report(*told.get())
                 except KeyboardInterrupt:

@@ -69,6 +69,8 @@ def start_run(
     with interrupts() as seen:
         try:
             with deferred():
+                if seen.asked:  # and swallowed by a library
+                    raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 lock = RunLock(path)
             run = _begin(path, kind, study, label, argv, inputs, digest, page)
