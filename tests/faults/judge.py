@@ -30,7 +30,7 @@ def timeless(run: str) -> str:
 
 def faults(work: Path, name: str, mode: str, ended: tuple[int, str], sound: Sound) -> Iterator[str]:
     """What is wrong with what a command has left that ended with this code and these words; gc is tried as well."""
-    yield from _of_the_end(mode, *ended)
+    yield from _of_the_end(name, mode, *ended)
     yield from _of_the_runs(work, mode, ended[0], sound)
     if name != "gc" and LOST not in known_tags(work / "results"):
         yield "another run's tags are gone"
@@ -79,12 +79,12 @@ def _dates(operations: list[list[str]]) -> tuple[dict[str, int], dict[str, int],
     return written, synced, named
 
 
-def _of_the_end(mode: str, code: int, said: str) -> Iterator[str]:
+def _of_the_end(name: str, mode: str, code: int, said: str) -> Iterator[str]:
     if "bug in wristctl" in said or "Traceback" in said:
         yield f"a bug: {said[-300:]}"
     if mode == "kill" and code != KILLED:
         yield f"was not killed: {code}"
-    if mode != "kill" and code not in (0, 2, SAFETY_STOP):
+    if mode != "kill" and code not in (0, 2, *([SAFETY_STOP] if name == "hw-run" else [])):
         yield f"exit {code}: {said[-300:]}"
     errors = [line for line in said.splitlines() if line.startswith("error: ")]
     if code == 2 and len(errors) != 1:

@@ -111,13 +111,13 @@ class HwRunSettings(RigSettings):
 
     def _emulated_world(self) -> Plant:
         """The bench as the plant of a loop: what of its motors and camera is not as believed stands there."""
-        motors, camera = self.bench.actuator, self.bench.camera
-        own = {name: getattr(motors, name) for name in TrueActuator.model_fields}
-        own = {name: each for name, each in own.items() if each != getattr(self.actuator, name)}
-        seen = {name: getattr(camera, name) for name in ("delay_frames", "dropped")}
-        seen = {name: each for name, each in seen.items() if each != getattr(self.sensor, name)}
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
-        return Plant(**wrist, actuator=TrueActuator(**own), sensor=TrueSensor(**seen))
+        camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
+        return Plant(
+            **wrist,
+            actuator=TrueActuator.between(self.actuator, self.bench.actuator),
+            sensor=TrueSensor.between(self.sensor, camera),
+        )
 
     @property
     def loop(self) -> Loop:

@@ -7,7 +7,7 @@ believes. One that is not given is as believed.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer
 from pydantic.config import JsonDict
@@ -61,6 +61,12 @@ def is_unsaid(field: FieldInfo) -> bool:
 
 class Overrides(Section):
     """Leaves that override those of the same names in another section; what is as believed is not written out."""
+
+    @classmethod
+    def between(cls, believed: Any, actual: Any) -> Self:
+        """What is true of a section, where it is not as in the other."""
+        names = [name for name in cls.model_fields if name in type(believed).model_fields]
+        return cls(**{n: getattr(actual, n) for n in names if getattr(actual, n) != getattr(believed, n)})
 
     def of(self, believed: Any) -> Any:
         """The other section with what is true of it."""

@@ -24,7 +24,6 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 GRAVITY = 9.81
 """[m/s^2]"""
 
-
 BLOCK = 20_000
 """Equilibria that are searched together: a bound on memory."""
 

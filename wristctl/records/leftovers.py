@@ -22,7 +22,6 @@ from wristctl.records.tags import change_tags, known_tags
 _BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK}
 """All that a run may have written before its manifest."""
 
-
 SCRATCH = "wristctl-replay-"
 """Beginning of the name of a scratch folder; its lock is gone once the repetition has ended."""
 

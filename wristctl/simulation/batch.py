@@ -20,7 +20,7 @@ from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValu
 from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
-from wristctl.simulation.worlds import World, reach
+from wristctl.simulation.worlds import World, bending_limit
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -87,7 +87,7 @@ def batch(
     def limits(each: int) -> Array:
         world = worlds[each]
         most = world.wrist.tension_limit if world.loop.limits else np.inf
-        return np.array([world.wrist.pretension, most, reach(world.plant)])
+        return np.array([world.wrist.pretension, most, bending_limit(actual[each])])
 
     def at_the_motors(each: int) -> Array:
         drive = None if level is None else Drive(level, counted[each])

@@ -61,11 +61,18 @@ class Repeated:
         return cls(done, metrics, np.array([done.failed]), np.array([done.until]), done.trajectory.error[None])
 
     @property
+    def failure(self) -> str:
+        """In words how it failed; empty where it did not."""
+        if not self.failed.any():
+            return ""
+        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
+        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
+
+    @property
     def fate(self) -> str:
         """In words what became of it: that it failed, or swings; empty where it came to rest, or is not known to."""
-        if self.failed.any():
-            count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
-            return f"FAILED: left its range at {self.until[self.failed].min():.3g} s{count}"
+        if self.failure:
+            return f"FAILED: {self.failure}"
         known = self.metrics.get("oscillation", np.empty(0))
         swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
         if swing <= LIMIT_CYCLE:

@@ -7,6 +7,7 @@ error's, over the last second or the last two of its periods, with all up to fou
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,9 +52,16 @@ def remaining(course: Trajectory) -> Array | None:
     degree = 4 + round(
         math.pi * _HARMONICS * frequency * step * window
     )  # a polynomial follows so many waves, and no more
-    place = np.linspace(-1.0, 1.0, window)
-    left: Array = error - np.polynomial.legendre.Legendre.fit(place, error, min(degree, window // 2))(place)
+    basis = _polynomials(window, min(degree, window // 2))
+    left: Array = error - basis @ (basis.T @ error)
     return left
+
+
+@lru_cache(8)
+def _polynomials(samples: int, degree: int) -> Array:
+    """An orthonormal basis of the polynomials up to a degree, (samples, degree + 1)."""
+    basis: Array = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, samples), degree))[0]
+    return basis
 
 
 def _without_trend(angle: Array) -> Array:

@@ -42,7 +42,7 @@ class World(NamedTuple):
         return actual
 
 
-def reach(wrist: WristParameters) -> float:
+def bending_limit(wrist: WristParameters) -> float:
     """Bending angle [rad] beyond which a wrist has left its range, and its loop has failed."""
     return math.radians(wrist.range_deg + LEEWAY_DEG)
 

@@ -47,10 +47,8 @@ class Simulated(StudyResult):
         if not self.failed:
             return None
         where = str(self.findings.run.path) if self.findings.run else ""
-        what = self.repeated.fate.removeprefix("FAILED: ")
-        return UserError(
-            f"the wrist {what}", where, "look at the figures; try other gains or a slower move", exit_code=3
-        )
+        fix = "look at the figures; try other gains or a slower move"
+        return UserError(f"the wrist {self.repeated.failure}", where, fix, exit_code=3)
 
     @property
     def trajectory(self) -> Trajectory:

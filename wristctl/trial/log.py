@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.records.live import RESERVE
 from wristctl.wrist.directions import ACTIVE
 
 Columns = Mapping[str, tuple[str, str]]
@@ -80,7 +81,7 @@ class Disk:
     """Space kept in a folder for what is still to be written when the disk is full: a trial's truth, some rows."""
 
     def __init__(self, folder: Path) -> None:
-        self._reserve = folder / ".reserve"
+        self._reserve = folder / RESERVE
         try:
             self._reserve.write_bytes(bytes(_RESERVED))
         except OSError:
