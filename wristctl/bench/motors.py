@@ -8,6 +8,7 @@ fits the drive's count: up to two full steps away, so that positions are lost wi
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,13 +18,13 @@ from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import pulls
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of
+from wristctl.simulation.nonideal import electrical_turn, worn_tendon
+from wristctl.wrist.elastic import Tendons, read_nonideal, spool_pull
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)
 
-_FULL_STEPS_PER_TURN = 4  # electrical, of a two-phase motor
 _PORT_A, _PORT_C = ord("A"), ord("C")
 
 
@@ -33,6 +34,7 @@ class Stepper(NamedTuple):
     step: float
     turn: float  # of the field: four full steps
     holding: float
+    top_speed: float  # at which it holds nothing; inf: it holds as much at any speed
     detent: float
     release: float  # share of its surplus stretch that a released tendon loses in one period
 
@@ -42,8 +44,9 @@ def stepper_of(settings: BenchSettings) -> Stepper:
     actuator, motors = settings.actuator, settings.motors
     return Stepper(
         step=actuator.step_length,
-        turn=_FULL_STEPS_PER_TURN * actuator.microstep * actuator.step_length,
+        turn=electrical_turn(actuator),
         holding=motors.holding_torque / actuator.pulley_radius,
+        top_speed=math.inf if motors.top_speed is None else motors.top_speed * actuator.step_length,
         detent=motors.detent_torque / actuator.pulley_radius,
         release=PERIOD / (motors.release_time + PERIOD),
     )
@@ -109,55 +112,68 @@ def _turn(spools: Any, motor: Any, stiffness: float) -> None:
     for axis in range(AXES):
         pull = spools.pull[axis]
         if spools.energised[axis]:
-            if pull > motor.holding:
+            stepped = motor.step * spools.counted[axis] - spools.slack[axis]
+            speed = abs(stepped + motor.turn * spools.slipped[axis] - spools.reeled[axis]) / PERIOD
+            if pull > motor.holding * max(0.0, 1.0 - speed / motor.top_speed):
                 spools.slipped[axis] -= 1
-            turned = motor.step * spools.counted[axis] + motor.turn * spools.slipped[axis]
-            spools.reeled[axis] = turned - spools.slack[axis]
+            spools.reeled[axis] = stepped + motor.turn * spools.slipped[axis]
         else:
             spools.reeled[axis] -= motor.release * max(0.0, pull - motor.detent) / stiffness
 
 
 class Hanging(NamedTuple):
-    """What hangs on the board: the plant (its model and the values of its parameters), the Drive of one tendon, the
-    motors, and the axes of two tendons on the + and two on the - side."""
+    """What hangs on the board: the plant (its model and the values of its parameters), a tendon's stiffness [N/m], the
+    values of Nonideal and the state that go with four of them, the motors, and the axes of two tendons on the + and two
+    on the - side."""
 
     model: Any
     values: Any
-    tendon: Any
+    stiffness: float
+    nonideal: Any
+    tendons: Any
     motor: Any
     sides: Any
 
 
-def follow(hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, out: Any, cut: Any) -> int:
+def follow(
+    hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, start: float, out: Any, cut: Any
+) -> int:
     """Advance spools and wrist by a period for each row (tip force, stiffness scale) of `acting`; the edges used up.
+
+    Tendons break and slip so long after `start` [s].
 
     `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on. A row of
     `out` is what is so at a period's end: coordinates, rates; and what was in its middle, and held throughout: pulls,
     reeled lengths.
     """
     undisturbed = parameters_of(hanging.model, rows_of(hanging.values))
-    motor, tendon, sides = hanging.motor, hanging.tendon, hanging.sides
+    motor, sides = hanging.motor, hanging.sides
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     zero = 0.0 * reeled[0]
+    tendons = Tendons(hanging.stiffness + zero, read_nonideal(rows_of(hanging.nonideal)), rows_of(hanging.tendons))
+    ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
     at = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
         while at < edges.shape[0] and edges[at, 0] < middle:
             _hear(spools, motor, edges[at, 0], edges[at, 1], edges[at, 2])
             at += 1
-        _turn(spools, motor, tendon.motor.stiffness)
+        _turn(spools, motor, hanging.stiffness)
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
-        plus, minus = zero, zero
-        for pair in range(2):
-            one, other = sides[pair], sides[2 + pair]
-            pull_plus, pull_minus = pulls(tendon, plant, q, rate, reeled[one], reeled[other])
-            pull[one] = pull_plus
-            pull[other] = pull_minus
-            plus = plus + pull_plus
-            minus = minus + pull_minus
-        advance_or_stop(plant, q, rate, plus, minus, PERIOD + zero, 1.0 + zero)
+        time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
+        given = (
+            worn_tendon(tendons, 0, reeled[ahead], zero, time, path[0], 0.0),
+            worn_tendon(tendons, 1, reeled[behind], zero, time, path[1], 1.0),
+            worn_tendon(tendons, 2, reeled[ahead_too], zero, time, path[0], 1.0),
+            worn_tendon(tendons, 3, reeled[behind_too], zero, time, path[1], 1.0),
+        )
+        pull[ahead] = spool_pull(tendons, given[0], 0, path[0])
+        pull[behind] = spool_pull(tendons, given[1], 1, path[1])
+        pull[ahead_too] = spool_pull(tendons, given[2], 2, path[0])
+        pull[behind_too] = spool_pull(tendons, given[3], 3, path[1])
+        advance_or_stop(plant, q, rate, given, tendons, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]
         for axis in range(AXES):

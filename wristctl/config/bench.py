@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from wristctl.config.plant import Actuator, TrueWrist
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import SceneSettings
 
@@ -48,6 +48,9 @@ class Motors(Section):
         (False, False, False, False), "whether the motor is wired the other way round, so that it pays out"
     )
     holding_torque: float = quantity(1.2, "N m", "beyond it an energised motor slips four full steps", "assumed", gt=0)
+    top_speed: float | None = quantity(
+        None, "1/s", "microsteps per second at which its torque has fallen to none; null: it does not fall", gt=0
+    )
     detent_torque: float = quantity(0.03, "N m", "what a released motor still holds", "assumed: NEMA 23", ge=0)
     release_time: float = quantity(
         5e-3, "s", "time constant with which a released motor lets its tendon go", "assumed", gt=0
@@ -78,7 +81,7 @@ class WeakenedPlant(TrueWrist):
     stiffness_scale: float = quantity(0.7, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
 
 
-class StepperActuator(Actuator):
+class StepperActuator(Actuator, TendonFacts):
     """Elastic tendons on the stepper motors that the board turns."""
 
     level: Literal["tendon"] = choice("tendon", "the simulation's actuator with motors and elastic tendons")

@@ -129,5 +129,4 @@ class HwRunSettings(RigSettings):
             actuator=self.actuator,
             sensor=self.sensor,
             control_period=self.control_period,
-            substeps=max(1, round(self.control_period / 1e-3)),
         )

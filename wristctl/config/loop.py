@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -15,6 +16,15 @@ InverseName = Literal["none", "exact", "network"]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 
+LONGEST_STEP = 1e-3
+"""Integration step [s] below which elastic tendons and their friction cost no accuracy (docs/accuracy.md)."""
+
+
+def steps_within(period: float) -> int:
+    """How many steps of at most LONGEST_STEP a period has."""
+    return max(1, math.ceil(period / LONGEST_STEP * (1.0 - 1e-9)))
+
+
 class Loop(Section):
     """The plant and the timing. Controllers always see one segment (E13: a scalar input)."""
 
@@ -24,8 +34,18 @@ class Loop(Section):
     actuator: Actuator = Actuator()
     sensor: Sensor = Sensor()
     control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
-    substeps: int = choice(1, "integration steps within one control period", ge=1, le=1000)
+    substeps: int | None = choice(
+        None,
+        "integration steps within one control period; null: of 1 ms at most where tendons are elastic, else one",
+        ge=1,
+        le=1000,
+    )
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")
+
+    @property
+    def steps(self) -> int:
+        """Integration steps within one control period."""
+        return self.substeps or (steps_within(self.control_period) if self.actuator.level == "tendon" else 1)
 
     @model_validator(mode="after")
     def _a_frame_lasts_a_tick(self) -> Self:

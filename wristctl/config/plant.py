@@ -8,20 +8,39 @@ from typing import Annotated, Literal
 
 from wristctl.config.choices import DISTURBANCES, PLANTS
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
-from wristctl.config.truth import NotNegative, Overrides, Positive, truth, unsaid
+from wristctl.config.truth import NotNegative, Overrides, Positive, fact, truth, unsaid
 
 PlantName = Annotated[str, OneOf(PLANTS)]
 
 
-class TrueActuator(Overrides):
+class TendonFacts(Section):
+    """What tendons on their spools do that no controller believes; all of the tendon level."""
+
+    backlash: float = fact(0.0, "m", "dead band between motor and tendon; homing leaves it where it reels in", ge=0)
+    creep: float = fact(0.0, "", "share of a tendon's stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
+    creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
+    broken_at: float | None = fact(None, "s", "when one of the + side's two tendons breaks; null: never", ge=0)
+    slips_at: float | None = fact(None, "s", "when the + side's tendons slip on their spool; null: never", ge=0)
+    slip: float = fact(1e-3, "m", "by how much", gt=0)
+
+
+class TrueActuator(Overrides, TendonFacts):
     """Motors and tendons as they are, where that is not what the controller believes."""
 
     lag: Positive = truth("s", "time constant of the motor's force (lagged)")
     tendon_stiffness: Positive = truth("N/m", "stiffness of one tendon")
-    friction: NotNegative = truth("", "capstan friction (tendon); the observer counts on none, whatever is believed")
+    friction: NotNegative = truth("", "coefficient of the tendons' friction; the observer counts on none")
+    sheath: NotNegative = truth("rad", "angle by which each tendon is wrapped before it reaches the wrist (tendon)")
+    presliding: Positive = truth("m", "path in which friction turns round (tendon)")
     pulley_radius: Positive = truth("m", "radius of the pulley: motors report steps, not metres")
     step_rate: Positive = truth("1/s", "largest rate of microsteps")
     step_acceleration: Positive = truth("1/s^2", "largest change of that rate (tendon)")
+    torque: float | None = fact(
+        None, "N m", "of a standing motor: pulled harder it falls back by four full steps; null: never (tendon)", gt=0
+    )
+    top_speed: float | None = fact(
+        None, "1/s", "microsteps per second at which its torque has fallen to none, in a straight line", gt=0
+    )
 
 
 class TrueSensor(Overrides):
@@ -30,7 +49,8 @@ class TrueSensor(Overrides):
     delay_frames: NotNegative = truth("", "frames between capture and use; the observer dates them by what it believes")
     noise_deg: NotNegative = truth("deg", "standard deviation of the angle")
     dropped: NotNegative = truth("", "share of frames without a result")
-    zero_deg: float = truth("deg", "angle that the camera shows of a straight wrist", 0.0)
+    burst: float = fact(1.0, "", "frames that are lost in a row, on average; 1: each by itself", ge=1)
+    zero_deg: float = fact(0.0, "deg", "angle that the camera shows of a straight wrist")
 
 
 class TrueWrist(Overrides):
@@ -52,6 +72,11 @@ class TrueWrist(Overrides):
     stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
     damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
     tendon_radius: Positive = truth("m", "radius of the circle of tendons")
+    creep: float = fact(0.0, "", "share of the stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
+    creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
+    end_stop_deg: float | None = fact(None, "deg", "bending angle at which the wrist meets its end stops", gt=0, le=180)
+    end_stop_stiffness: float = fact(20.0, "N m/rad", "of the whole wrist's end stops", gt=0)
+    end_stop_dissipation: float = fact(1.0, "s/rad", "Hunt and Crossley's: share of that per rate of impact", ge=0)
 
 
 class Plant(TrueWrist):
@@ -96,7 +121,13 @@ class Actuator(Section):
     level: Literal["ideal", "lagged", "tendon"] = choice("ideal", "how much of motors and tendons is simulated")
     lag: float = quantity(5e-3, "s", "time constant of the motor's force (lagged)", "assumed", gt=0)
     tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed; sweep 2-50 kN/m", gt=0)
-    friction: float = quantity(0.1, "", "capstan friction: coefficient times bend (tendon)", "assumed", ge=0)
+    friction: float = quantity(0.1, "", "coefficient of the tendons' friction (tendon)", "assumed", ge=0)
+    sheath: float = quantity(
+        0.0, "rad", "angle by which each tendon is wrapped before it reaches the wrist (tendon)", "assumed; 0-3", ge=0
+    )
+    presliding: float = quantity(
+        2e-5, "m", "path in which friction turns round: Dahl's bristle (tendon)", "assumed; 5-100 um", gt=0
+    )
     motor_steps: int = choice(200, "full steps per revolution", "assumed", gt=0)
     microstep: int = choice(16, "microsteps per full step", "assumed", gt=0)
     pulley_radius: float = quantity(7.5e-3, "m", "radius of the pulley", "assumed", gt=0)

@@ -32,11 +32,16 @@ NotNegative = Annotated[float, Field(ge=0)] | Scale | None
 """A leaf as it is: a value, a multiple of the believed one, or None where it is as believed."""
 
 
-def truth(unit: str, meaning: str, default: float | None = None) -> Any:
+def truth(unit: str, meaning: str) -> Any:
     """A leaf as it is in the world; config.yaml leaves it out where it is as believed."""
-    also = ", or x1.05 of what is believed" if default is None else ""
-    extra: JsonDict = {"unit": unit, "source": "" if also else "assumed", "unsaid": True}
-    return Field(default, description=meaning + also, json_schema_extra=extra)
+    extra: JsonDict = {"unit": unit, "source": "", "unsaid": True}
+    return Field(None, description=f"{meaning}, or x1.05 of what is believed", json_schema_extra=extra)
+
+
+def fact(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
+    """A leaf of the world that no controller believes anything of; config.yaml leaves it out where it is not given."""
+    extra: JsonDict = {"unit": unit, "source": "assumed", "unsaid": True}
+    return Field(default, description=meaning, json_schema_extra=extra, **constraints)
 
 
 def unsaid(default: Overrides) -> Any:
@@ -65,8 +70,9 @@ class Overrides(Section):
     @classmethod
     def between(cls, believed: Any, actual: Any) -> Self:
         """What is true of a section, where it is not as in the other."""
-        names = [name for name in cls.model_fields if name in type(believed).model_fields]
-        return cls(**{n: getattr(actual, n) for n in names if getattr(actual, n) != getattr(believed, n)})
+        own = {n: f for n, f in cls.model_fields.items() if n in type(actual).model_fields}
+        known = {n: getattr(believed, n, f.default) for n, f in own.items()}
+        return cls(**{n: getattr(actual, n) for n in own if getattr(actual, n) != known[n]})
 
     def of(self, believed: Any) -> Any:
         """The other section with what is true of it."""

@@ -98,7 +98,9 @@ class Problem:
         own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")} | known
         one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
         wrist = trial.wrist.model_copy(update=own)
-        return SupposedWrist(wrist, values["tendon_stiffness"], values["friction"], (one, two, three, four))
+        believed = {name: self.start[name] for name in ("sheath", "presliding") if name in self.start}
+        taut = one, two, three, four
+        return SupposedWrist(wrist, values["tendon_stiffness"], values["friction"], taut, **believed)
 
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist]) -> Array:
         """Angles (count, T) of the candidates in a trial."""

@@ -11,19 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import TENDON, Drive, Motor, pulls
+from wristctl.simulation.nonideal import nonideal_of, unmoved
+from wristctl.wrist.elastic import Nonideal, Tendons, read_nonideal
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle
+
+_STIFFNESS = len(Nonideal._fields)
+"""Row of a tendon's stiffness, before what each has reeled in more."""
 
 SETTLE = 0.5
 """Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast."""
 
 
 class SupposedWrist(NamedTuple):
-    """A wrist and its tendons as they may be: stiffness of one tendon [N/m], capstan friction.
+    """A wrist and its tendons as they may be: stiffness of one tendon [N/m], its friction (coefficient, the sheath's
+    angle [rad] and presliding [m]).
 
     `taut` is what each tendon has reeled in more [m] than its spool's count says: two of the + side, two of the -.
     """
@@ -32,6 +38,15 @@ class SupposedWrist(NamedTuple):
     tendon_stiffness: float
     friction: float
     taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    sheath: float = Actuator().sheath
+    presliding: float = Actuator().presliding
+
+
+def _nonideal(candidate: SupposedWrist, h: float) -> Nonideal:
+    own = Actuator(
+        level="tendon", friction=candidate.friction, sheath=candidate.sheath, presliding=candidate.presliding
+    )
+    return nonideal_of(TrueWrist(), own, TendonFacts(), h)
 
 
 class Reeled(NamedTuple):
@@ -43,26 +58,26 @@ class Reeled(NamedTuple):
     settle: int
 
 
-def _advance(model: Any, values: Any, tendons: Any, spools: Any, state: Any, angle: Any, cut: Any) -> None:
-    plant, tendon = parameters_of(model, rows_of(values)), rows_of(tendons)
-    zero = 0.0 * tendon[0]
-    drive = Drive(TENDON, Motor(zero, tendon[0], tendon[1], zero, zero, zero))
+def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
+    plant, own = parameters_of(model, rows_of(values)), rows_of(tendon)
+    zero = 0.0 * own[0]
+    tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive = 1.0 + zero
-    reeled = spools.lengths
+    reeled, taut = spools.lengths, _STIFFNESS + 1
     for k in range(-spools.settle, reeled.shape[0]):
         now = max(k, 0)
         if k >= 0:
             total, _ = tip_angle(plant, q, rate)
             rows_of(angle)[k] = total
-        plus, minus = zero, zero
-        for pair in range(2):
-            ahead, behind = reeled[now, pair] + tendon[2 + pair], reeled[now, 2 + pair] + tendon[4 + pair]
-            one, other = pulls(drive, plant, q, rate, ahead, behind)
-            plus = plus + one
-            minus = minus + other
-        alive = advance_or_stop(plant, q, rate, plus, minus, spools.h + zero, alive)
+        given = (
+            reeled[now, 0] + own[taut],
+            reeled[now, 2] + own[taut + 2],
+            reeled[now, 1] + own[taut + 1],
+            reeled[now, 3] + own[taut + 3],
+        )
+        alive = advance_or_stop(plant, q, rate, given, tendons, spools.h + zero, alive)
 
 
 def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int, model: PlantModel = PCC) -> Array:
@@ -73,10 +88,13 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     A candidate that bends a segment beyond a full turn stays where it was.
     """
     values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
-    tendons = to_blocks(np.array([[each.tendon_stiffness, each.friction, *each.taut] for each in candidates]))
+    own = [np.array([*_nonideal(each, h), each.tendon_stiffness, *each.taut]) for each in candidates]
+    tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
-    spools, k = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h)), model.coordinates(n)
-    advance = kernel_of(_advance, model)
+    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h))
+    advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(2), np.zeros(4), np.zeros(k))
     for value, tendon, angle in zip(values, tendons, found, strict=True):
-        advance(model, value, tendon, spools, np.zeros((2 * k, *angle.shape[1:])), angle, (0,) * k)
+        wide = angle.shape[1:]
+        memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
+        advance(model, value, tendon, spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
     return to_rows(found, len(candidates))

@@ -115,4 +115,5 @@ def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
     actuator = truth.actuator
     wrist = in_plane(truth.wrist, direction)
-    return SupposedWrist(wrist, actuator.tendon_stiffness, actuator.friction, (one, two, three, four))
+    more = (one, two, three, four), actuator.sheath, actuator.presliding
+    return SupposedWrist(wrist, actuator.tendon_stiffness, actuator.friction, *more)

@@ -35,13 +35,32 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 
 
 @compiled
-def tanh(x: Any) -> Any:
-    """Hyperbolic tangent to 3 ulp: -t/(t + 2) with t = exp(-2|x|) - 1, by reduction to |r| <= ln(2)/2 and Taylor."""
-    y = -2.0 * minimum(abs(x), 22.0)
+def _reduced(y: Any) -> Any:
+    """exp(r) - 1 and 2^k with y = r + k ln 2, |r| <= ln(2)/2; below -44 as at -44."""
+    y = maximum(y, -44.0 + 0.0 * y)
     k = floor(y * _LOG2_E + 0.5)
     r = (y - k * _LN2_HIGH) - k * _LN2_LOW
-    scale = exp2i(k)
-    t = scale * (r + r * r * _exp_rest(r)) + (scale - 1.0)
+    return r + r * r * _exp_rest(r), exp2i(k)
+
+
+@compiled
+def expm1_of_negative(y: Any) -> Any:
+    """exp(y) - 1 for y <= 0, by Taylor's series within ln(2)/2 of a power of 2; below -44 as at -44."""
+    less, scale = _reduced(y)
+    return scale * less + (scale - 1.0)
+
+
+@compiled
+def exp_of_negative(y: Any) -> Any:
+    """exp(y) for y <= 0 to 1 ulp; below -44 as at -44, 8e-20."""
+    less, scale = _reduced(y)
+    return scale * (1.0 + less)
+
+
+@compiled
+def tanh(x: Any) -> Any:
+    """Hyperbolic tangent to 3 ulp: -t/(t + 2) with t = exp(-2|x|) - 1."""
+    t = expm1_of_negative(-2.0 * minimum(abs(x), 22.0))
     size = -t / (t + 2.0)
     return where(x < 0.0, -size, size)
 

@@ -25,5 +25,6 @@ def truth_told(wrist: WristParameters, loops: Mapping[str, Loop]) -> str:
     told = ""
     for table in truth_tables(wrist, loops):
         for loop, leaf, believed, actual, unit in table.rows:
-            told += f"\n{loop}: {leaf} is {actual:g} {unit}".rstrip() + f", believed {believed:g}"
+            told += f"\n{loop}: {leaf} is {actual:g} {unit}".rstrip()
+            told += ", believed none" if believed is None else f", believed {believed:g}"
     return told

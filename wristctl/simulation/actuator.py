@@ -1,7 +1,7 @@
 """Actuators: from commanded pulls to the pulls that act on the wrist. A side's pull is that of its two tendons.
 
 lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon, in whole microsteps of it.
-tendon: a stepper reels tendon in; k (reeled in - path's shortening) pulls, never pushes, less friction at the discs.
+tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.elastic`'s.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
 positively with a gain near 1.
 
@@ -19,16 +19,14 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import clip, maximum, minimum, tanh
+from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import floor, rounded, sqrt, where
 from wristctl.lanes.parts import tuple_of
-from wristctl.wrist.plant import PlantModel, stretch
+from wristctl.wrist.elastic import travel
+from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
 
 LAGGED, TENDON = 1, 2
-
-_SLIDING = 5e-3
-"""Speed [m/s] at which friction is fully developed."""
 
 
 class Motor(NamedTuple):
@@ -36,7 +34,6 @@ class Motor(NamedTuple):
 
     lag: Any
     stiffness: Any
-    friction: Any
     step: Any
     speed: Any
     acceleration: Any
@@ -75,7 +72,6 @@ def motor_of(actuator: Actuator) -> Motor:
     return Motor(
         lag=actuator.lag,
         stiffness=TENDONS_PER_SIDE * actuator.tendon_stiffness,
-        friction=actuator.friction,
         step=step,
         speed=step * actuator.step_rate,
         acceleration=step * actuator.step_acceleration,
@@ -95,13 +91,16 @@ def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
     return motor_of(believed)._replace(**own)
 
 
-def winding_of(believed: Actuator, actual: Actuator, pull: float) -> Winding:
-    """What a count means: both sides were homed at this pull [N] on the straight wrist, where the counts are right."""
+def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float = 0.0) -> Winding:
+    """What a count means: both sides were homed at this pull [N] on the straight wrist, where the counts are right.
+
+    `creep` is the share of the tendons' stiffness that had relaxed by then.
+    """
     counts, does = motor_of(believed), motor_of(actual)
     if believed.level == "lagged":
         return Winding(does.stiffness * does.step / (counts.stiffness * counts.step), 0.0)
     scale = does.step / counts.step
-    return Winding(scale, pull / does.stiffness - scale * (pull / counts.stiffness))
+    return Winding(scale, pull / (does.stiffness * (1.0 - creep)) - scale * (pull / counts.stiffness))
 
 
 def at_rest(drive: Drive | None, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
@@ -173,33 +172,16 @@ def wound(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
 
 
 @compiled
-def pulls(drive: Any, plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
-    """Pulls [N] of both sides on a plant at q, rate from what they deliver, less what the discs' friction takes."""
-    if drive is None:
-        return plus, minus
-    if drive.level != TENDON:
-        return plus, minus
-    motor = drive.motor
-    zero = 0.0 * plus
-    stretch_plus, stretch_minus, bend, slide_plus, slide_minus = stretch(plant, q, rate, plus, minus)
-    wrapped = 0.5 * motor.friction * bend
-    x_plus, x_minus = wrapped * tanh(slide_plus / _SLIDING), wrapped * tanh(slide_minus / _SLIDING)
-    # (1 - x/2)/(1 + x/2) is the capstan's exp(-x) to x^3/12
-    pull_plus = motor.stiffness * maximum(stretch_plus, zero) * (1.0 - x_plus) / (1.0 + x_plus)
-    pull_minus = motor.stiffness * maximum(stretch_minus, zero) * (1.0 - x_minus) / (1.0 + x_minus)
-    return pull_plus, pull_minus
-
-
-@compiled
-def frictionless_pulls(drive: Any, plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
-    """`pulls` of tendons that slide freely."""
+def frictionless_pulls(drive: Any, known: Any, theta: Any, plus: Any, minus: Any) -> Any:
+    """Pulls [N] of both sides on segments at theta from what their motors deliver, of tendons that slide freely."""
     if drive is None:
         return plus, minus
     if drive.level != TENDON:
         return plus, minus
     zero = 0.0 * plus
-    stretch_plus, stretch_minus, _, _, _ = stretch(plant, q, rate, plus, minus)
-    return drive.motor.stiffness * maximum(stretch_plus, zero), drive.motor.stiffness * maximum(stretch_minus, zero)
+    path_plus, path_minus, _ = travel(known, theta)
+    stiffness = drive.motor.stiffness
+    return stiffness * maximum(plus - path_plus, zero), stiffness * maximum(minus - path_minus, zero)
 
 
 @compiled

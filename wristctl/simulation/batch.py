@@ -17,6 +17,7 @@ from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor,
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import readings, schedule
 from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValues, Scratch, Setup
+from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
@@ -75,8 +76,16 @@ def batch(
     wide = followed.shape[1:]
     actual = [each.plant for each in worlds]
     rest = np.zeros((len(worlds), k)) if start is None else np.array([start(each) for each in actual])
-    counted = [counted_motor(each.loop.actuator, each.actuator) for each in worlds]
+    actuators = [each.actuator for each in worlds]
+    counted = [counted_motor(each.loop.actuator, own) for each, own in zip(worlds, actuators, strict=True)]
     windings = [_winding(each) for each in worlds]
+    step = period / loop.steps
+    nonideals = [
+        nonideal_of(each.loop.plant, own, each.loop.plant.actuator, step)
+        for each, own in zip(worlds, actuators, strict=True)
+    ]
+    ideal = all(map(is_ideal, nonideals))
+    elastic = not ideal or loop.actuator.level == "tendon"
 
     def of_worlds(row: Callable[[int], Array]) -> Array:
         """A row of each world's as blocks; of one world as one block for all."""
@@ -93,13 +102,19 @@ def batch(
         drive = None if level is None else Drive(level, counted[each])
         return at_rest(drive, actual[each], model, rest[each], windings[each].scale)
 
+    def resting(each: int) -> Array:
+        own, lengths = at_the_motors(each)[[0, 2]], model.taut(actual[each], rest[each])
+        given, path = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
+        return unmoved(given, path, given - path, rest[each])
+
     goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
         model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
         limits=of_worlds(limits),
         motor=of_worlds(lambda each: np.array(counted[each])),
-        tendons=of_worlds(lambda each: np.array(motor_of(worlds[each].actuator))),
+        tendons=of_worlds(lambda each: np.array([motor_of(actuators[each]).stiffness])) if elastic else None,
+        nonideal=None if ideal else of_worlds(lambda each: np.array(nonideals[each])),
         winding=of_worlds(lambda each: np.array(windings[each])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
@@ -114,13 +129,14 @@ def batch(
         memory=spread(np.zeros(max(1, controller.memory)), count),
         coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[lanes.world], count),
         motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[lanes.world], count),
+        tendons=None if ideal else spread(np.array([resting(each) for each in range(len(worlds))])[lanes.world], count),
         sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
         record=np.empty((blocks, samples if record else 0, len(RECORDED) + k, *wide)),
         watch=watch,
     )
     references = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
     course = LoopCourse(references, _stacked(cases, samples), frames)
-    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.substeps, ticks)
+    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks)
     return Batch(setup, course, values, state, blocks, samples, wide)
 
 
@@ -147,7 +163,8 @@ def _watch(
     frames = schedule(worlds[0].sensor, loop.control_period, horizon, loop.sensor)
     longest = int((frames.arrivals - frames.dated).max() + np.diff(frames.dated).max(initial=1)) + 2
     sensors = [each.sensor for each in worlds]
-    taken = readings(len(frames.captures), [sensors[each] for each in lanes.world], lanes.streams)
+    bursts = [worlds[each].loop.plant.sensor.burst for each in lanes.world]
+    taken = readings(len(frames.captures), [sensors[each] for each in lanes.world], lanes.streams, bursts)
     taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
@@ -168,7 +185,8 @@ def _watch(
 
 
 def _winding(world: World) -> Winding:
-    return winding_of(world.loop.actuator, world.actuator, TENDONS_PER_SIDE * world.wrist.pretension)
+    pull = TENDONS_PER_SIDE * world.wrist.pretension
+    return winding_of(world.loop.actuator, world.actuator, pull, world.loop.plant.actuator.creep)
 
 
 def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:

@@ -25,19 +25,34 @@ def _delay(sensor: Sensor, period: float) -> int:
     return int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))
 
 
-def readings(count: int, sensors: Sequence[Sensor], streams: Sequence[Entropy]) -> Array:
+def readings(
+    count: int, sensors: Sequence[Sensor], streams: Sequence[Entropy], bursts: Sequence[float] | None = None
+) -> Array:
     """Of `count` frames of each rollout the noise [rad], and 1 or 0 for seen or dropped, (rollouts, count, 2).
 
     Rollouts of the same stream meet the same draws, whatever stands beside them in the batch; each camera scales them
-    by its own noise and share of dropped frames.
+    by its own noise and share of dropped frames, which are lost so many in a row, on average, as `bursts` says.
     """
+    bursts = bursts or [1.0] * len(sensors)
     drawn = {each: _draws(each, count) for each in dict.fromkeys(streams)}
     found = np.empty((len(streams), count, 2))
-    for own, sensor, stream in zip(found, sensors, streams, strict=True):
+    for own, sensor, stream, burst in zip(found, sensors, streams, bursts, strict=True):
         normal, even = drawn[stream]
         own[:, 0] = np.deg2rad(sensor.noise_deg) * normal
-        own[:, 1] = even >= sensor.dropped
+        own[:, 1] = _seen(even, sensor.dropped, burst)
     return found
+
+
+def _seen(even: Array, dropped: float, burst: float) -> Array:
+    """1 or 0 for seen or lost (F,): each by itself, or Gilbert's two states with bursts of this mean length."""
+    if burst <= 1.0 / (1.0 - dropped):  # as short as they are by chance
+        return np.asarray(even >= dropped, float)
+    begin, stay, seen = dropped / (burst * (1.0 - dropped)), 1.0 - 1.0 / burst, np.empty(len(even))
+    lost = False
+    for at, value in enumerate(even):
+        lost = value < (stay if lost else begin)
+        seen[at] = not lost
+    return seen
 
 
 def _draws(stream: Entropy, count: int) -> tuple[Array, Array]:

@@ -13,11 +13,13 @@ from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import Drive, actuate, pulls, read_motor, read_winding, wound
+from wristctl.simulation.actuator import Drive, actuate, read_motor, read_winding, wound
+from wristctl.simulation.nonideal import worn
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, tip_angle
+from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_along, tip_angle
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
@@ -60,7 +62,8 @@ class LoopCourse(NamedTuple):
 class LoopValues(NamedTuple):
     """Values that stay, [block, row, lane]; with one block only they are every block's.
 
-    `plant`, `tendons` and `winding` are what is, `model`, `limits` and `motor` what the controller's side believes.
+    `plant`, `tendons`, `nonideal` and `winding` are what is, `model`, `limits` and `motor` what the controller's side
+    believes. `tendons` is a side's stiffness, None where pulls are held; `nonideal` None where nothing is.
     """
 
     plant: Any
@@ -68,6 +71,7 @@ class LoopValues(NamedTuple):
     limits: Any
     motor: Any
     tendons: Any
+    nonideal: Any
     winding: Any
     gains: Any
     goals: Any
@@ -76,7 +80,8 @@ class LoopValues(NamedTuple):
 class LoopState(NamedTuple):
     """What goes on, by block first: a long run may be done in pieces.
 
-    `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates.
+    `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates,
+    `tendons` what is remembered of tendons and springs that are not ideal, or None.
     `record` [block, sample, column, lane] takes each sample's values, or has no samples. `watch` is the camera with its
     observer, None where sensors are ideal.
     """
@@ -86,6 +91,7 @@ class LoopState(NamedTuple):
     memory: Any
     coordinates: Any
     motors: Any
+    tendons: Any
     sums: Any
     record: Any
     watch: Any
@@ -123,7 +129,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     cut, period, ticks = setup.coordinates, setup.period, setup.ticks
     undisturbed = parameters_of(setup.plant, rows_of(world.plant))
     known, drive = load_segments(rows_of(world.model)), _drive(setup.level, world.motor)
-    tendons, winding = _drive(setup.level, world.tendons), read_winding(rows_of(world.winding))
+    tendons = _tendons(world.tendons, world.nonideal, state.tendons)
+    winding = read_winding(rows_of(world.winding))
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
     view, bound, goal = now_of(scratch.now), rows_of(world.limits), goals_of(world.goals)
     motor, sum_ = rows_of(state.motors), rows_of(state.sums)
@@ -146,10 +153,11 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
-            reeled_plus, reeled_minus = wound(drive, winding, given_plus, given_minus)
-            acting_plus, acting_minus = pulls(tendons, plant, q, rates, reeled_plus, reeled_minus)
+            time, path = now_tick * period + zero, path_along(tendons, plant, q)
+            delivered = wound(drive, winding, given_plus, given_minus)
+            reeled = worn(tendons, delivered, (winding.scale * motor[1], winding.scale * motor[3]), time, path)
+            acting_plus, acting_minus = pulls_along(tendons, reeled, path)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
-            time = now_tick * period + zero
             watch_range(sum_, time, angle, bound[2])
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
             if tick == 0 and sample < state.record.shape[0]:
@@ -166,10 +174,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 for i in range(n):
                     row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
-            for substep in range(setup.substeps):
-                if substep > 0:
-                    acting_plus, acting_minus = pulls(tendons, plant, q, rates, reeled_plus, reeled_minus)
-                sum_[_ALIVE] = advance_or_stop(plant, q, rates, acting_plus, acting_minus, h, sum_[_ALIVE])
+            for _ in range(setup.substeps):
+                sum_[_ALIVE] = advance_or_stop(plant, q, rates, reeled, tendons, h, sum_[_ALIVE])
 
 
 @compiled
@@ -177,6 +183,27 @@ def _drive(level: Any, motor: Any) -> Any:
     if level is None:
         return None
     return Drive(level, read_motor(rows_of(motor)))
+
+
+@compiled
+def _tendons(stiffness: Any, nonideal: Any, state: Any) -> Any:
+    if stiffness is None:
+        return None
+    return Tendons(rows_of(stiffness)[0], _nonideal(nonideal), _rows(state))
+
+
+@compiled
+def _nonideal(values: Any) -> Any:
+    if values is None:
+        return None
+    return read_nonideal(rows_of(values))
+
+
+@compiled
+def _rows(state: Any) -> Any:
+    if state is None:
+        return None
+    return rows_of(state)
 
 
 @compiled

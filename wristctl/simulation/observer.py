@@ -61,9 +61,9 @@ class Watch(NamedTuple):
 @compiled
 def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> None:
     """Advance x by one control period, linearly implicit in damping and stiffness."""
-    theta, rate = part(x, 0, _ONE), part(x, 1, _ONE)
+    theta = part(x, 0, _ONE)
     angle, speed, load = x[0], x[1], x[2]
-    pull_plus, pull_minus = frictionless_pulls(drive, known, theta, rate, plus, minus)
+    pull_plus, pull_minus = frictionless_pulls(drive, known, theta, plus, minus)
     inertia, resisting = one_segment(known, angle, speed)
     stiffness = known.stiffness + 0.0 * angle
     stiffness = stiffness + tendon_stiffness(drive, known, angle)

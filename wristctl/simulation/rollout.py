@@ -116,7 +116,7 @@ def _worlds(
 
 
 def _structure(loop: Loop) -> tuple[object, ...]:
-    timing = loop.control_period, loop.substeps
+    timing = loop.control_period, loop.steps
     return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
 
 

@@ -19,9 +19,9 @@ _COLUMNS = 40
 def check_size(loops: Iterable[Loop], horizon: float) -> None:
     """UserError, with the largest horizon that there is room for, where a loop over `horizon` [s] asks for too much."""
     for loop in loops:
-        steps = horizon / loop.control_period * loop.substeps
+        steps = horizon / loop.control_period * loop.steps
         if steps > MOST_STEPS:
-            most, what = MOST_STEPS * loop.control_period / loop.substeps, f"{steps:.2g} integration steps of a rollout"
+            most, what = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"
             fix = f"at most {most:.3g} s with this control_period and substeps, or a longer control_period"
             raise UserError(f"{what} are more than {MOST_STEPS:g}", "horizon", fix)
         bytes_ = 8.0 * (_COLUMNS + loop.plant_segments) * horizon / sample_period(loop.control_period)

@@ -11,6 +11,8 @@ import numpy as np
 from wristctl.config.keys import unit_of
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator, Sensor, TrueWrist
+from wristctl.config.section import Section
+from wristctl.config.truth import is_unsaid
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 
@@ -51,7 +53,8 @@ class Mismatch(NamedTuple):
     """A leaf of wrist, actuator or sensor that is not what the controller believes."""
 
     key: str
-    believed: float
+    believed: float | None
+    """None: nothing of the kind."""
     actual: float
     unit: str
 
@@ -59,14 +62,23 @@ class Mismatch(NamedTuple):
 def mismatches(world: World) -> list[Mismatch]:
     """All that the world of a loop has, and its controller does not know of; spreads are not drawn."""
     loop, found = world.loop, list[Mismatch]()
-    sides = {"": (world.wrist, world.plant), "actuator.": (loop.actuator, world.actuator)}
-    for begin, (believed, actual) in (sides | {"sensor.": (loop.sensor, world.sensor)}).items():
+    sides: dict[str, tuple[Section, Section]] = {
+        "": (world.wrist, world.plant),
+        "actuator.": (loop.actuator, world.actuator),
+        "sensor.": (loop.sensor, world.sensor),
+    }
+    for begin, (believed, actual) in sides.items():
         for name, field in type(believed).model_fields.items():
             values = getattr(believed, name), getattr(actual, name)
             if values[0] != values[1]:
                 found.append(Mismatch(begin + name, *values, unit_of(field)))
-    if zero := loop.plant.sensor.zero_deg:
-        found.append(Mismatch("sensor.zero_deg", 0.0, zero, "deg"))
+    facts = {"": loop.plant, "actuator.": loop.plant.actuator, "sensor.": loop.plant.sensor}
+    for begin, own in facts.items():
+        for name, field in type(own).model_fields.items():
+            given = getattr(own, name)
+            own_fact = is_unsaid(field) and name not in type(sides[begin][0]).model_fields
+            if own_fact and given != field.default and not isinstance(given, Section):
+                found.append(Mismatch(begin + name, field.default, given, unit_of(field)))
     return found
 
 

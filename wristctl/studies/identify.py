@@ -119,7 +119,8 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
             exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
         trials += measured_trials(run.id, wrist, actuator.step_length, settings.step, *logged, exposure)
         own = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
-        known = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction, "delay": 0.0}
+        names = ("tendon_stiffness", "friction", "sheath", "presliding")
+        known = {name: float(getattr(actuator, name)) for name in names} | {"delay": 0.0}
         start = start or own | known
     return Problem(trials, start, settings)
 

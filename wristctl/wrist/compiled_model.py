@@ -134,7 +134,7 @@ def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segm
             state[i] = before[i]
         theta, omega = part(state, 0, segments), part(state, n, segments)
         for _ in range(steps[sample]):
-            step(segment, theta, omega, pull[0], pull[1], h + 0.0 * pull[0])
+            step(segment, theta, omega, (pull[0], pull[1]), None, h + 0.0 * pull[0])
 
 
 def integrate(

@@ -16,6 +16,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
+from wristctl.wrist.elastic import path_of, pulls_along, stiffen, yield_, yield_jacobians
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
 from wristctl.wrist.tendons import tendon_torques
@@ -35,8 +36,21 @@ def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any
 
 
 @compiled
-def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) -> None:
-    """Advance angles and rates by h [s] with the tendons' pulls [N] held."""
+def _accelerations(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, mass: Any, a: Any) -> None:
+    """-theta'' into `a`, with `mass` to work on."""
+    plus, minus = pulls_along(tendons, given, path_of(tendons, segment, theta))
+    equation_of_motion(segment, theta, omega, plus, minus, mass, a)
+    yield_(tendons, segment, theta, omega, given, a)
+    factorise(mass)
+    solve(mass, a)
+
+
+@compiled
+def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any) -> None:
+    """Advance angles and rates by h [s] with `given` held: both sides' pulls [N], or what their tendons reeled in [m].
+
+    Elastic tendons and their friction are evaluated at each stage, and their tangent is in the Jacobian.
+    """
     n = len(theta)
     hg = 0.5 * h
     per_h, per_hg = 1.0 / h, 2.0 / h
@@ -48,9 +62,12 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
 
     tangent = chords(theta, segment.length, arc)
+    path = path_of(tendons, segment, theta)
+    plus, minus = pulls_along(tendons, given, path)
     tendon_torques(theta, segment, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)
     bias(segment, theta, omega, arc, tangent, pull, a0)
+    yield_(tendons, segment, theta, omega, given, a0)
     for i in range(n):
         a0[i] = -a0[i]
         for j in range(n):
@@ -58,6 +75,8 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     factorise(other_mass)
     solve(other_mass, a0)
     residual_jacobians(segment, omega, a0, arc, tangent, slope, by_theta, lu)
+    stiffen(tendons, segment, theta, omega, given, path, by_theta)
+    yield_jacobians(tendons, theta, omega, by_theta, lu)
     for i in range(n):
         for j in range(n):
             lu[i, j] = per_hg * mass[i, j] + lu[i, j] + hg * by_theta[i, j]
@@ -72,9 +91,7 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     for i in range(n):
         at[i] = theta[i] + 2.0 * k1[i]
         rate[i] = omega[i] + 2.0 * l1[i]
-    equation_of_motion(segment, at, rate, plus, minus, other_mass, a)
-    factorise(other_mass)
-    solve(other_mass, a)
+    _accelerations(segment, at, rate, given, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i])
@@ -83,9 +100,7 @@ def step(segment: Any, theta: Any, omega: Any, plus: Any, minus: Any, h: Any) ->
     for i in range(n):
         at[i] = at[i] + k3[i]
         rate[i] = rate[i] + l3[i]
-    equation_of_motion(segment, at, rate, plus, minus, other_mass, a)
-    factorise(other_mass)
-    solve(other_mass, a)
+    _accelerations(segment, at, rate, given, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i] - 8.0 / 3.0 * k3[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i] - 8.0 / 3.0 * l3[i])

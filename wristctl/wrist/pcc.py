@@ -12,13 +12,13 @@ from wristctl.lanes.parts import replacing
 from wristctl.lanes.rows import planes_like
 from wristctl.wrist.arcs import ARC_LIMIT, Chords, chords, tip
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import chain_tip
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.shape import arcs_backbone
 from wristctl.wrist.statics import equilibrium
-from wristctl.wrist.tendons import lengths, moment_arms
 
 _load = replacing("stiffness", "force_y")
 
@@ -31,21 +31,6 @@ def _tip_angle(plant: Any, q: Any, rate: Any) -> Any:
         angle = angle + q[k]
         turning = turning + rate[k]
     return angle, turning
-
-
-@compiled
-def _stretch(plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
-    zero = 0.0 * plus
-    bend, slide_plus, slide_minus = zero, zero, zero
-    for k in range(len(q)):
-        path_plus, path_minus = lengths(q[k], plant)
-        arm_plus, arm_minus = moment_arms(q[k], plant)
-        plus = plus - plant.length + path_plus
-        minus = minus - plant.length + path_minus
-        bend = bend + abs(q[k])
-        slide_plus = slide_plus + arm_plus * rate[k]
-        slide_minus = slide_minus + arm_minus * rate[k]
-    return plus, minus, bend, slide_plus, slide_minus
 
 
 @compiled
@@ -91,7 +76,7 @@ PCC = PlantModel(
     values=segments,
     advance=step,
     tip_angle=_tip_angle,
-    stretch=_stretch,
+    travel=travel,
     within=_within,
     disturbed=_disturbed,
     tip_pose=_tip_pose,

@@ -25,10 +25,11 @@ from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import kernel, spelled_out
+from wristctl.lanes.compiled import compiled, kernel, spelled_out
 from wristctl.lanes.lane import dot, planar, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.wrist.elastic import settle
 from wristctl.wrist.shape import Backbone
 
 
@@ -45,7 +46,7 @@ class PlantModel:
     """The parameters' values of a wrist cut into so many segments, in their order."""
     advance: Any
     tip_angle: Any
-    stretch: Any
+    travel: Any
     within: Any
     disturbed: Any
     tip_pose: Any
@@ -118,8 +119,12 @@ def _parameters_of(model: Any, rows: Any) -> Any:
     return parameters
 
 
-def advance(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any) -> None:
-    """Move coordinates and rates on by h [s] under held pulls [N] of the + and the - side's tendons together."""
+def advance(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> None:
+    """Move coordinates and rates on by h [s] with `given` (plus, minus) held.
+
+    These are pulls [N] where `tendons` is None, else what elastic tendons have reeled in [m]: their pulls at any place
+    are `wristctl.wrist.elastic.pulls_along`'s; what else is in them, as end stops, is its `yield_`'s.
+    """
     raise NotImplementedError("compiled code only")
 
 
@@ -128,12 +133,9 @@ def tip_angle(plant: Any, q: Any, rate: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
-def stretch(plant: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
-    """What pulls where both sides have reeled in `plus` and `minus` [m] since they were taut on the straight wrist.
-
-    Elongation of the + and the - side's tendons [m], negative where slack; the bend that they are wrapped by [rad]; and
-    the speeds at which they slide along the discs [m/s], positive shortening.
-    """
+def travel(plant: Any, q: Any) -> Any:
+    """By how much the paths of the + and the - side's tendons are shorter than on the straight wrist [m], and the bend
+    that they are wrapped by [rad]."""
     raise NotImplementedError("compiled code only")
 
 
@@ -164,23 +166,33 @@ def _by_plant(function: Any) -> None:
         return None if model is None else getattr(model, function.__name__).py_func
 
 
-for _function in (advance, tip_angle, stretch, within, disturbed, tip_pose, tip_jacobian):
+for _function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
     _by_plant(_function)
 
 
 @spelled_out
-def advance_or_stop(plant: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any, alive: Any) -> Any:
+def advance_or_stop(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any, alive: Any) -> Any:
     """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
     before = lanes_like(q)
     for i in range(len(q)):
         before[i] = q[i]
-    advance(plant, q, rate, plus, minus, h)
+    advance(plant, q, rate, given, tendons, h)
     zero = 0.0 * alive
     alive = where(within(plant, q), alive, zero)
     for i in range(len(q)):
         q[i] = where(alive > zero, q[i], before[i])
         rate[i] = where(alive > zero, rate[i], zero)
+    settle(tendons, q, given, path_along(tendons, plant, q))
     return alive
+
+
+@compiled
+def path_along(tendons: Any, plant: Any, q: Any) -> Any:
+    """A plant's `travel` where it matters."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return travel(plant, q)
 
 
 @cache

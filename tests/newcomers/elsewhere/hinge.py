@@ -17,6 +17,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, turn
 from wristctl.lanes.parts import replacing
+from wristctl.wrist.elastic import pulls_along
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.shape import Planar
 
@@ -72,7 +73,13 @@ def _acceleration(rod: Any, q: Any, rate: Any, torque: Any) -> Any:
 
 
 @compiled
-def _advance(rod: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any) -> None:
+def _travel(rod: Any, q: Any) -> Any:
+    return rod.offset * q[0], -rod.offset * q[0], abs(q[0])
+
+
+@compiled
+def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> None:
+    plus, minus = pulls_along(tendons, given, _travel(rod, q))
     torque, x, v = rod.offset * (plus - minus), q[0], rate[0]
     a1 = _acceleration(rod, x, v, torque)
     v2 = v + 0.5 * h * a1
@@ -88,12 +95,6 @@ def _advance(rod: Any, q: Any, rate: Any, plus: Any, minus: Any, h: Any) -> None
 @compiled
 def _tip_angle(rod: Any, q: Any, rate: Any) -> Any:
     return q[0], rate[0]
-
-
-@compiled
-def _stretch(rod: Any, q: Any, rate: Any, plus: Any, minus: Any) -> Any:
-    sliding = rod.offset * rate[0]
-    return plus - rod.offset * q[0], minus + rod.offset * q[0], abs(q[0]), sliding, -sliding
 
 
 @compiled
@@ -140,7 +141,7 @@ HINGE = PlantModel(
     values=values,
     advance=_advance,
     tip_angle=_tip_angle,
-    stretch=_stretch,
+    travel=_travel,
     within=_within,
     disturbed=_disturbed,
     tip_pose=_tip_pose,

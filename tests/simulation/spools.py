@@ -1,0 +1,109 @@
+"""A wrist on spools that move as they are told, with what a real one has: the integration step without a loop."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq, fsolve
+
+from wristctl.arrays import Array
+from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.nonideal import nonideal_of, unmoved, worn
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal, spool_pull, travel
+from wristctl.wrist.plant import advance_or_stop
+from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+
+class Spooled(NamedTuple):
+    """What it did at the start of each step, (T,) each: bend and rate [rad, rad/s], travel of both sides' tendons [m],
+    their pulls at the spools and at the wrist [N], what the + side has reeled in [m], and its bristle's state."""
+
+    theta: Array
+    rate: Array
+    x_plus: Array
+    x_minus: Array
+    spool_plus: Array
+    spool_minus: Array
+    plus: Array
+    minus: Array
+    given_plus: Array
+    z_plus: Array
+
+
+@kernel
+def _spooled(
+    parameters: Any, values: Any, stiffness: float, reeled: Any, state: Any, memory: Any, out: Any, h: float, cut: Any
+) -> None:
+    segment, n = load_segments(rows_of(parameters)), len(cut)
+    zero = 0.0 * segment.length
+    tendons = Tendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory))
+    q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
+    alive, before = 1.0 + zero, (reeled[0, 0] + zero, reeled[0, 1] + zero)
+    for k in range(reeled.shape[0]):
+        path, turned = travel(segment, q), (reeled[k, 0] + zero, reeled[k, 1] + zero)
+        speeds = (turned[0] - before[0]) / h, (turned[1] - before[1]) / h
+        given = worn(tendons, turned, speeds, k * h + zero, path)
+        before = turned
+        row = rows_of(out[k])
+        row[4] = spool_pull(tendons, given[0], 0, path[0])
+        row[5] = spool_pull(tendons, given[1], 1, path[1])
+        row[6], row[7] = pulls_along(tendons, given, path)
+        row[0], row[1] = zero, zero
+        for i in range(n):
+            row[0] = row[0] + q[i]
+            row[1] = row[1] + rate[i]
+        row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[2]
+        alive = advance_or_stop(segment, q, rate, given, tendons, h + zero, alive)
+
+
+def spooled(
+    reeled: Array,
+    actuator: Actuator,
+    facts: TendonFacts | None = None,
+    plant: TrueWrist | None = None,
+    wrist: WristParameters | None = None,
+    h: float = 1e-3,
+    n: int = 4,
+    start: Array | None = None,
+    rate: Array | None = None,
+    force: float = 0.0,
+) -> Spooled:
+    """From straight, or angles `start` (n,), where both sides' spools have reeled in (T, 2) [m], in steps of h [s]."""
+    values = np.array(nonideal_of(plant or TrueWrist(), actuator, facts or TrueActuator(), h))
+    q = np.zeros(n) if start is None else start
+    memory, out = (
+        unmoved(np.array(reeled[0]), np.zeros(2), np.zeros(2), np.zeros(n)),
+        np.empty((len(reeled), len(Spooled._fields))),
+    )
+    state = np.concatenate([q, np.zeros(n) if rate is None else rate])
+    parameters = segments(wrist or WristParameters(), n, (0.0, force))
+    stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness
+    _spooled(parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, out, h, (0,) * n)
+    return Spooled(*out.T)
+
+
+def rest_angle(
+    reeled: tuple[float, float], actuator: Actuator, z: tuple[float, float], wrist: WristParameters, n: int
+) -> float:
+    """Bend [rad] at which held spools hold the wrist with the bristles in these states, by the statics alone."""
+    values, still = segments(wrist, n), np.zeros(n)
+    stiffness, mu, sheath = TENDONS_PER_SIDE * actuator.tendon_stiffness, actuator.friction, actuator.sheath
+
+    def residual(theta: Array) -> Array:
+        here = terms(values, theta, still)
+        torque = np.zeros(n)
+        for side in range(2):
+            shortening = wrist.length - here.tendon_lengths[:, side].sum()
+            wrapped = sheath + np.abs(theta).sum()
+            pull = stiffness * max(0.0, reeled[side] - shortening) * np.exp(-mu * wrapped * z[side])
+            torque += pull * here.moment_arms[:, side]
+        return here.bias + wrist.stiffness * n * theta - torque
+
+    guess = brentq(lambda bend: residual(np.full(n, bend / n)).sum(), -1.2, 1.2)
+    return float(fsolve(residual, np.full(n, guess / n), xtol=1e-13).sum())

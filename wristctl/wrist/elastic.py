@@ -1,0 +1,239 @@
+"""Elastic tendons and what else of a real wrist its ideal model leaves out, evaluated inside an integration step.
+
+Each side has one tendon or two alike; `given` holds what they have reeled in [m], (plus, minus) or twice that. Where
+a path is shorter by x a tendon of stiffness k is stretched by e = given - x, pulls k max(e - f psi, 0) at its spool,
+never pushes, and pulls less at the wrist by its friction (tendon_friction). psi is the creep of one Maxwell branch: it
+follows e with a time constant, so that the share f of the stiffness relaxes. Springs creep alike. End stops are that of
+Hunt and Crossley, k d (1 + c d') at a depth d (J. Appl. Mech. 42 (1975) 440), shared by all segments.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.functions import clip, maximum
+from wristctl.lanes.lane import rounded, where
+from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.rows import lanes_like
+from wristctl.wrist.tendon_friction import bristle, bristle_slope, capstan
+from wristctl.wrist.tendons import lengths, moment_arms
+
+
+class Nonideal(NamedTuple):
+    """What a real wrist has; lanes, SI units. All of it at 0 (`presliding` 1, `stop` inf) gives the ideal's bits."""
+
+    held: Any
+    """1 where `given` are pulls [N], held during a step, instead of lengths."""
+    friction: Any
+    sheath: Any
+    presliding: Any
+    tendon_creep: Any
+    """Share of a tendon's stiffness that relaxes."""
+    tendon_keep: Any
+    """exp(-step / time constant)"""
+    spring_creep: Any
+    spring_keep: Any
+    stop: Any
+    """Bending angle of the whole wrist at its end stops [rad]."""
+    stop_stiffness: Any
+    stop_dissipation: Any
+    backlash: Any
+    broken_at: Any
+    """Time [s] from which one of the + side's two tendons does not pull."""
+    slips_at: Any
+    slip: Any
+    torque: Any
+    """Pull [N] at which a standing motor falls out of step."""
+    top_speed: Any
+    """Speed [m/s] at which it cannot pull at all."""
+    turn: Any
+    """Length of an electrical turn, four full steps [m]."""
+
+
+read_nonideal = tuple_of(Nonideal)
+"""A Nonideal of lanes from rows of lanes, in compiled code."""
+
+OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped")
+"""Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in the
+backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows come x of both sides [m], after
+them the springs' psi [rad]."""
+_OWN = len(OF_A_TENDON)
+_Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(2, 2 + _OWN)
+
+
+class Tendons(NamedTuple):
+    """Elastic tendons: the stiffness of each in `given` [N/m]; where they are not ideal, how, and their state."""
+
+    stiffness: Any
+    nonideal: Any
+    state: Any
+
+
+def state_rows(tendons: int, coordinates: int) -> int:
+    """Rows of the state of so many tendons in `given` and of a wrist with so many coordinates."""
+    return 2 + _OWN * tendons + coordinates
+
+
+@compiled
+def row_of(t: int, which: int) -> int:
+    """Row of one of a tendon's values: SHARE, PLAY, LOST or SLIPPED."""
+    return _OWN * t + which
+
+
+@compiled
+def travel(segment: Any, theta: Any) -> Any:
+    """By how much both sides' paths are shorter than on the straight wrist [m], and the bend [rad]."""
+    zero = 0.0 * segment.length
+    plus, minus, bend = zero, zero, zero
+    for k in range(len(theta)):
+        path_plus, path_minus = lengths(theta[k], segment)
+        plus = plus + segment.length - path_plus
+        minus = minus + segment.length - path_minus
+        bend = bend + abs(theta[k])
+    return plus, minus, bend
+
+
+@compiled
+def _slid(nonideal: Any, state: Any, t: int, x: Any) -> Any:
+    return bristle(state[row_of(t, _Z)], x - state[t % 2], nonideal.presliding)
+
+
+@compiled
+def spool_pull(tendons: Any, given: Any, t: int, x: Any) -> Any:
+    """Pull [N] at its spool of one tendon that is not ideal and has reeled in `given` [m]."""
+    state = tendons.state
+    elongation = (given - x) - tendons.nonideal.tendon_creep * state[row_of(t, _CREPT)]
+    return rounded(state[row_of(t, SHARE)] * tendons.stiffness * maximum(elongation, 0.0 * x))
+
+
+@compiled
+def _pull(tendons: Any, nonideal: Any, given: Any, t: int, x: Any, bend: Any) -> Any:
+    """Of one tendon at the wrist [N]."""
+    if nonideal is None:
+        return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
+    z = _slid(nonideal, tendons.state, t, x)
+    left = capstan(nonideal.friction, nonideal.sheath + bend, z)
+    at_wrist = rounded(spool_pull(tendons, given[t], t, x) * left)
+    return where(nonideal.held > 0.0, given[t], at_wrist)
+
+
+@compiled
+def path_of(tendons: Any, segment: Any, theta: Any) -> Any:
+    """`travel` where it matters."""
+    if tendons is None:
+        zero = 0.0 * segment.length
+        return zero, zero, zero
+    return travel(segment, theta)
+
+
+@compiled
+def pulls_along(tendons: Any, given: Any, path: Any) -> Any:
+    """Pulls [N] of both sides at the wrist at a path (plus, minus, bend); those given where `tendons` is None."""
+    if tendons is None:
+        return given[0], given[1]
+    plus = _pull(tendons, tendons.nonideal, given, 0, path[0], path[2])
+    minus = _pull(tendons, tendons.nonideal, given, 1, path[1], path[2])
+    for t in range(2, len(given), 2):
+        plus = plus + _pull(tendons, tendons.nonideal, given, t, path[0], path[2])
+        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path[1], path[2])
+    return plus, minus
+
+
+@compiled
+def _slope(tendons: Any, nonideal: Any, given: Any, t: int, x: Any, bend: Any, speed: Any) -> Any:
+    """By how much the pull falls with travel [N/m]."""
+    pull = _pull(tendons, nonideal, given, t, x, bend)
+    if nonideal is None:
+        return where(pull > 0.0, tendons.stiffness, 0.0 * x)
+    z, wrapped = tendons.state[row_of(t, _Z)], nonideal.sheath + bend
+    taut = where(pull > 0.0, tendons.state[row_of(t, SHARE)] * tendons.stiffness, 0.0 * x)
+    elastic = taut * capstan(nonideal.friction, wrapped, z)
+    dragging = pull * nonideal.friction * wrapped * bristle_slope(z, speed, nonideal.presliding)
+    return where(nonideal.held > 0.0, 0.0 * x, elastic + dragging)
+
+
+@compiled
+def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, path: Any, by_theta: Any) -> None:
+    """Add to dr/d(theta) (n, n) what tendons on held spools add: arm_i (-dT/dx) arm_j of each."""
+    if tendons is not None:
+        n, ahead, behind = len(theta), lanes_like(theta), lanes_like(theta)
+        zero = 0.0 * segment.length
+        speed_plus, speed_minus = zero, zero
+        for k in range(n):
+            arm_plus, arm_minus = moment_arms(theta[k], segment)
+            ahead[k] = arm_plus
+            behind[k] = arm_minus
+            speed_plus = speed_plus + arm_plus * omega[k]
+            speed_minus = speed_minus + arm_minus * omega[k]
+        plus, minus = zero, zero
+        for t in range(0, len(given), 2):
+            plus = plus + _slope(tendons, tendons.nonideal, given, t, path[0], path[2], speed_plus)
+            minus = minus + _slope(tendons, tendons.nonideal, given, t + 1, path[1], path[2], speed_minus)
+        for i in range(n):
+            for j in range(n):
+                by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]
+
+
+@compiled
+def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
+    """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
+    limit, stiffness = nonideal.stop / n, nonideal.stop_stiffness * n
+    depth = theta - clip(theta, -limit, limit)
+    zero = 0.0 * theta
+    damped = 1.0 + nonideal.stop_dissipation * where(depth < zero, -omega, omega)
+    touching = where((abs(depth) > zero) & (damped > zero), 1.0 + zero, zero)
+    torque = stiffness * depth * damped * touching
+    return torque, stiffness * damped * touching, stiffness * nonideal.stop_dissipation * abs(depth) * touching
+
+
+@compiled
+def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, r: Any) -> None:
+    """Add to the residual r (n,) what end stops take and what creeping springs give."""
+    if tendons is not None:
+        _yield(tendons.nonideal, tendons.state, segment, theta, omega, row_of(len(given), 2), r)
+
+
+@compiled
+def _yield(nonideal: Any, state: Any, segment: Any, theta: Any, omega: Any, springs: int, r: Any) -> None:
+    if nonideal is not None:
+        for k in range(len(theta)):
+            torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
+            r[k] = r[k] + torque - nonideal.spring_creep * segment.stiffness * state[springs + k]
+
+
+@compiled
+def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    """Add what end stops add to dr/d(theta) and dr/d(rate), (n, n)."""
+    if tendons is not None:
+        _yield_jacobians(tendons.nonideal, theta, omega, by_theta, by_rate)
+
+
+@compiled
+def _yield_jacobians(nonideal: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    if nonideal is not None:
+        for k in range(len(theta)):
+            _, stiffness, damping = _contact(nonideal, len(theta), theta[k], omega[k])
+            by_theta[k, k] = by_theta[k, k] + stiffness
+            by_rate[k, k] = by_rate[k, k] + damping
+
+
+@compiled
+def settle(tendons: Any, theta: Any, given: Any, path: Any) -> None:
+    """Take the state over to the end of a step, at coordinates theta with this path."""
+    if tendons is not None:
+        _settle(tendons.nonideal, tendons.state, theta, given, path)
+
+
+@compiled
+def _settle(nonideal: Any, state: Any, theta: Any, given: Any, path: Any) -> None:
+    if nonideal is not None:
+        for t in range(len(given)):
+            state[row_of(t, _Z)] = _slid(nonideal, state, t, path[t % 2])
+            stretch, at = maximum(given[t] - path[t % 2], 0.0 * path[2]), row_of(t, _CREPT)
+            state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
+        state[0] = path[0]
+        state[1] = path[1]
+        for k in range(len(theta)):
+            at = row_of(len(given), 2) + k
+            state[at] = theta[k] + nonideal.spring_keep * (state[at] - theta[k])
