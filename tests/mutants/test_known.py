@@ -20,6 +20,6 @@ def test_each_change_is_another_program_that_python_reads_and_its_tests_are_ther
     assert all(Path(ROOT, each.partition("::")[0]).exists() for each in mutant.tests)
 
 
-def test_the_list_is_the_24_by_hand_and_40_drawn_of_which_few_are_equivalent() -> None:
-    assert len({each.name for each in MUTANTS}) == len(MUTANTS) == 64
+def test_no_change_stands_there_twice_and_few_are_equivalent() -> None:
+    assert len({each.name for each in MUTANTS}) == len(MUTANTS) >= 71
     assert sum(bool(each.equivalent) for each in MUTANTS) <= 8
