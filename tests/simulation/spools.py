@@ -58,7 +58,7 @@ def _spooled(
         for i in range(n):
             row[0] = row[0] + q[i]
             row[1] = row[1] + rate[i]
-        row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[2]
+        row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[3]
         alive = advance_or_stop(segment, q, rate, given, tendons, h + zero, alive)
 
 
@@ -70,18 +70,16 @@ def spooled(
     wrist: WristParameters | None = None,
     h: float = 1e-3,
     n: int = 4,
-    start: Array | None = None,
     rate: Array | None = None,
     force: float = 0.0,
 ) -> Spooled:
-    """From straight, or angles `start` (n,), where both sides' spools have reeled in (T, 2) [m], in steps of h [s]."""
+    """From straight, where both sides' spools have reeled in (T, 2) [m], in steps of h [s]."""
     values = np.array(nonideal_of(plant or TrueWrist(), actuator, facts or TrueActuator(), h))
-    q = np.zeros(n) if start is None else start
     memory, out = (
-        unmoved(np.array(reeled[0]), np.zeros(2), np.zeros(2), np.zeros(n)),
+        unmoved(np.array(reeled[0]), np.zeros(3), np.zeros(2), np.zeros(n)),
         np.empty((len(reeled), len(Spooled._fields))),
     )
-    state = np.concatenate([q, np.zeros(n) if rate is None else rate])
+    state = np.concatenate([np.zeros(n), np.zeros(n) if rate is None else rate])
     parameters = segments(wrist or WristParameters(), n, (0.0, force))
     stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness
     _spooled(parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, out, h, (0,) * n)

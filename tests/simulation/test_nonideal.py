@@ -91,7 +91,7 @@ def test_in_slip_a_tendon_pulls_by_the_capstan() -> None:
 def _element(travels: Any, exponent: float, presliding: float, begin: float, out: Any) -> None:
     z = begin + 0.0 * rows_of(travels)[0]
     for k in range(travels.shape[0]):
-        z = bristle(z, rows_of(travels)[k], presliding + 0.0 * z)
+        z = bristle(z, rows_of(travels)[k], 1.0 / presliding + 0.0 * z)
         row = rows_of(out[k])
         row[0], row[1] = z, capstan(exponent + 0.0 * z, 1.0 + 0.0 * z, z)
 

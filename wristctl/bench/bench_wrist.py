@@ -71,7 +71,7 @@ class BenchWrist:
         self._stepper, self._spools = stepper_of(settings), spool_state_of(settings)
         self._state = np.zeros(2 * self._n)
         self._axes = np.arange(AXES)
-        self._tendons = unmoved(self._spools.reeled, np.zeros(2), np.zeros(AXES), self._state[: self._n])
+        self._tendons = unmoved(self._spools.reeled, np.zeros(3), np.zeros(AXES), self._state[: self._n])
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
@@ -153,7 +153,7 @@ class BenchWrist:
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
         own = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
-        self._tendons = unmoved(self._spools.reeled[axes], np.zeros(2), np.zeros(AXES), self._state[: self._n])
+        self._tendons = unmoved(self._spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[: self._n])
         of_tendons(self._tendons, AXES)[:] = own
         self._axes = axes
 

@@ -92,7 +92,7 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
     spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h))
-    advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(2), np.zeros(4), np.zeros(k))
+    advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
     for value, tendon, angle in zip(values, tendons, found, strict=True):
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))

@@ -36,8 +36,7 @@ def clip(x: Any, low: Any, high: Any) -> Any:
 
 @compiled
 def _reduced(y: Any) -> Any:
-    """exp(r) - 1 and 2^k with y = r + k ln 2, |r| <= ln(2)/2; below -44 as at -44."""
-    y = maximum(y, -44.0 + 0.0 * y)
+    """exp(r) - 1 and 2^k with y = r + k ln 2, |r| <= ln(2)/2."""
     k = floor(y * _LOG2_E + 0.5)
     r = (y - k * _LN2_HIGH) - k * _LN2_LOW
     return r + r * r * _exp_rest(r), exp2i(k)
@@ -46,14 +45,14 @@ def _reduced(y: Any) -> Any:
 @compiled
 def expm1_of_negative(y: Any) -> Any:
     """exp(y) - 1 for y <= 0, by Taylor's series within ln(2)/2 of a power of 2; below -44 as at -44."""
-    less, scale = _reduced(y)
+    less, scale = _reduced(maximum(y, -44.0 + 0.0 * y))
     return scale * less + (scale - 1.0)
 
 
 @compiled
-def exp_of_negative(y: Any) -> Any:
-    """exp(y) for y <= 0 to 1 ulp; below -44 as at -44, 8e-20."""
-    less, scale = _reduced(y)
+def exp(y: Any) -> Any:
+    """exp(y) to 1 ulp; beyond +-44 as there."""
+    less, scale = _reduced(clip(y, -44.0 + 0.0 * y, 44.0 + 0.0 * y))
     return scale * (1.0 + less)
 
 

@@ -104,8 +104,9 @@ def batch(
 
     def resting(each: int) -> Array:
         own, lengths = at_the_motors(each)[[0, 2]], model.taut(actual[each], rest[each])
-        given, path = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
-        return unmoved(given, path, given - path, rest[each])
+        given, short = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
+        path = np.append(short, np.abs(rest[each]).sum())
+        return unmoved(given, path, given - short, rest[each])
 
     goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
     values = LoopValues(

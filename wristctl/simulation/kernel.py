@@ -19,7 +19,7 @@ from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_along, tip_angle
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_before, tip_angle
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
@@ -153,7 +153,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
-            time, path = now_tick * period + zero, path_along(tendons, plant, q)
+            time, path = now_tick * period + zero, path_before(tendons, plant, q)
             delivered = wound(drive, winding, given_plus, given_minus)
             reeled = worn(tendons, delivered, (winding.scale * motor[1], winding.scale * motor[3]), time, path)
             acting_plus, acting_minus = pulls_along(tendons, reeled, path)

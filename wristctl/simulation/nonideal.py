@@ -12,7 +12,18 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import where
-from wristctl.wrist.elastic import LOST, OF_A_TENDON, PLAY, SHARE, SLIPPED, Nonideal, row_of, spool_pull, state_rows
+from wristctl.wrist.elastic import (
+    LOST,
+    OF_A_TENDON,
+    PATH,
+    PLAY,
+    SHARE,
+    SLIPPED,
+    Nonideal,
+    row_of,
+    spool_pull,
+    state_rows,
+)
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _FULL_STEPS_PER_TURN = 4
@@ -32,7 +43,7 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
         held=float(not elastic),
         friction=actuator.friction * elastic,
         sheath=actuator.sheath,
-        presliding=actuator.presliding,
+        bristle=1.0 / actuator.presliding,
         tendon_creep=facts.creep * elastic,
         tendon_keep=math.exp(-step / facts.creep_time),
         spring_creep=plant.creep,
@@ -62,18 +73,21 @@ def _time(given: float | None) -> float:
 
 
 def unmoved(given: Array, path: Array, crept: Array, q: Array) -> Array:
-    """The state of tendons that have reeled in `given` (t,) [m] and crept so far (t,) [m], at rest at q (k,)."""
+    """The state of tendons that have reeled in `given` (t,) [m] and crept so far (t,) [m], at rest at q (k,).
+
+    `path` (3,) is both sides' travel there [m] and the bend [rad].
+    """
     state = np.zeros(state_rows(len(given), len(q)))
-    state[:2] = path
+    state[:PATH] = path
     own = of_tendons(state, len(given))
-    own[:, 1], own[:, SHARE - 2], own[:, PLAY - 2] = crept, 1.0, given
+    own[:, 1], own[:, SHARE - PATH], own[:, PLAY - PATH] = crept, 1.0, given
     state[len(state) - len(q) :] = q
     return state
 
 
 def of_tendons(state: Array, count: int) -> Array:
     """A view of a state's rows of so many tendons, (count, rows of each)."""
-    own: Array = state[2 : 2 + len(OF_A_TENDON) * count].reshape(count, -1)
+    own: Array = state[PATH : PATH + len(OF_A_TENDON) * count].reshape(count, -1)
     return own
 
 

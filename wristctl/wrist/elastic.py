@@ -21,13 +21,14 @@ from wristctl.wrist.tendons import lengths, moment_arms
 
 
 class Nonideal(NamedTuple):
-    """What a real wrist has; lanes, SI units. All of it at 0 (`presliding` 1, `stop` inf) gives the ideal's bits."""
+    """What a real wrist has; lanes, SI units. All of it at 0 (`stop` inf) gives the ideal's bits."""
 
     held: Any
     """1 where `given` are pulls [N], held during a step, instead of lengths."""
     friction: Any
     sheath: Any
-    presliding: Any
+    bristle: Any
+    """1/s: what the state of a bristle turns by in a path [1/m]."""
     tendon_creep: Any
     """Share of a tendon's stiffness that relaxes."""
     tendon_keep: Any
@@ -56,10 +57,10 @@ read_nonideal = tuple_of(Nonideal)
 
 OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped")
 """Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in the
-backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows come x of both sides [m], after
-them the springs' psi [rad]."""
-_OWN = len(OF_A_TENDON)
-_Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(2, 2 + _OWN)
+backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows comes the path, x of both sides
+[m] and the bend [rad], after them the springs' psi [rad]."""
+_OWN, PATH = len(OF_A_TENDON), 3
+_Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
 
 
 class Tendons(NamedTuple):
@@ -72,7 +73,7 @@ class Tendons(NamedTuple):
 
 def state_rows(tendons: int, coordinates: int) -> int:
     """Rows of the state of so many tendons in `given` and of a wrist with so many coordinates."""
-    return 2 + _OWN * tendons + coordinates
+    return PATH + _OWN * tendons + coordinates
 
 
 @compiled
@@ -96,7 +97,7 @@ def travel(segment: Any, theta: Any) -> Any:
 
 @compiled
 def _slid(nonideal: Any, state: Any, t: int, x: Any) -> Any:
-    return bristle(state[row_of(t, _Z)], x - state[t % 2], nonideal.presliding)
+    return bristle(state[row_of(t, _Z)], x - state[t % 2], nonideal.bristle)
 
 
 @compiled
@@ -128,6 +129,22 @@ def path_of(tendons: Any, segment: Any, theta: Any) -> Any:
 
 
 @compiled
+def path_at_start(tendons: Any, segment: Any, theta: Any) -> Any:
+    """The same at the start of a step, where it may be known."""
+    if tendons is None:
+        zero = 0.0 * segment.length
+        return zero, zero, zero
+    return _known(tendons.state, segment, theta)
+
+
+@compiled
+def _known(state: Any, segment: Any, theta: Any) -> Any:
+    if state is None:
+        return travel(segment, theta)
+    return state[0], state[1], state[2]
+
+
+@compiled
 def pulls_along(tendons: Any, given: Any, path: Any) -> Any:
     """Pulls [N] of both sides at the wrist at a path (plus, minus, bend); those given where `tendons` is None."""
     if tendons is None:
@@ -149,7 +166,7 @@ def _slope(tendons: Any, nonideal: Any, given: Any, t: int, x: Any, bend: Any, s
     z, wrapped = tendons.state[row_of(t, _Z)], nonideal.sheath + bend
     taut = where(pull > 0.0, tendons.state[row_of(t, SHARE)] * tendons.stiffness, 0.0 * x)
     elastic = taut * capstan(nonideal.friction, wrapped, z)
-    dragging = pull * nonideal.friction * wrapped * bristle_slope(z, speed, nonideal.presliding)
+    dragging = pull * nonideal.friction * wrapped * bristle_slope(z, speed, nonideal.bristle)
     return where(nonideal.held > 0.0, 0.0 * x, elastic + dragging)
 
 
@@ -191,7 +208,7 @@ def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
 def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, r: Any) -> None:
     """Add to the residual r (n,) what end stops take and what creeping springs give."""
     if tendons is not None:
-        _yield(tendons.nonideal, tendons.state, segment, theta, omega, row_of(len(given), 2), r)
+        _yield(tendons.nonideal, tendons.state, segment, theta, omega, row_of(len(given), PATH), r)
 
 
 @compiled
@@ -234,6 +251,7 @@ def _settle(nonideal: Any, state: Any, theta: Any, given: Any, path: Any) -> Non
             state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
         state[0] = path[0]
         state[1] = path[1]
+        state[2] = path[2]
         for k in range(len(theta)):
-            at = row_of(len(given), 2) + k
+            at = row_of(len(given), PATH) + k
             state[at] = theta[k] + nonideal.spring_keep * (state[at] - theta[k])

@@ -195,6 +195,22 @@ def path_along(tendons: Any, plant: Any, q: Any) -> Any:
     return travel(plant, q)
 
 
+@compiled
+def path_before(tendons: Any, plant: Any, q: Any) -> Any:
+    """The same before a step, where it may be known."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return _known(tendons.state, plant, q)
+
+
+@compiled
+def _known(state: Any, plant: Any, q: Any) -> Any:
+    if state is None:
+        return travel(plant, q)
+    return state[0], state[1], state[2]
+
+
 @cache
 def kernel_of(function: Any, model: PlantModel) -> Any:
     """A function of Python as a kernel that moves plants of this model; its cache goes by that one's source too."""

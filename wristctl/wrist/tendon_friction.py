@@ -11,29 +11,27 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import exp_of_negative, expm1_of_negative
+from wristctl.lanes.functions import exp, expm1_of_negative
 from wristctl.lanes.lane import where
 
 
 @compiled
-def bristle(z: Any, travel: Any, presliding: Any) -> Any:
-    """The bristle's state after its tendon has moved by `travel` [m], positive towards the spool."""
+def bristle(z: Any, travel: Any, slope: Any) -> Any:
+    """The bristle's state after its tendon has moved by `travel` [m], positive towards the spool; slope 1/s [1/m]."""
     one = 1.0 + 0.0 * travel
     sign = where(travel < 0.0, -one, one)
-    return z - expm1_of_negative(-abs(travel) / presliding) * (sign - z)
+    return z - expm1_of_negative(-slope * abs(travel)) * (sign - z)
 
 
 @compiled
 def capstan(friction: Any, wrapped: Any, z: Any) -> Any:
     """Pull at the wrist over pull at the spool."""
-    exponent = friction * wrapped * z
-    size = exp_of_negative(-abs(exponent))
-    return where(exponent < 0.0, 1.0 / size, size)
+    return exp(-friction * wrapped * z)
 
 
 @compiled
-def bristle_slope(z: Any, speed: Any, presliding: Any) -> Any:
+def bristle_slope(z: Any, speed: Any, slope: Any) -> Any:
     """dz/dx [1/m] where the tendon moves at this speed; between both directions' where it is at rest."""
     zero = 0.0 * speed
     sign = where(speed > 0.0, 1.0 + zero, where(speed < 0.0, zero - 1.0, zero))
-    return (1.0 - z * sign) / presliding
+    return (1.0 - z * sign) * slope
