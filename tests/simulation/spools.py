@@ -15,7 +15,7 @@ from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import nonideal_of, unmoved, worn
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal, spool_pull, travel
-from wristctl.wrist.plant import advance_or_stop
+from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 

@@ -20,7 +20,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, worn_tendon
 from wristctl.wrist.elastic import Tendons, read_nonideal, spool_pull
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
+from wristctl.wrist.moving import advance_or_stop
+from wristctl.wrist.plant import disturbed, parameters_of, travel
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)

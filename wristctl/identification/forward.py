@@ -17,8 +17,9 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import nonideal_of, unmoved
 from wristctl.wrist.elastic import Nonideal, Tendons, read_nonideal
+from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle
+from wristctl.wrist.plant import PlantModel, kernel_of, parameters_of, tip_angle
 
 _STIFFNESS = len(Nonideal._fields)
 """Row of a tendon's stiffness, before what each has reeled in more."""

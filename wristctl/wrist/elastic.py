@@ -3,8 +3,7 @@
 Each side has one tendon or two alike; `given` holds what they have reeled in [m], (plus, minus) or twice that. Where
 a path is shorter by x a tendon of stiffness k is stretched by e = given - x, pulls k max(e - f psi, 0) at its spool,
 never pushes, and pulls less at the wrist by its friction (tendon_friction). psi is the creep of one Maxwell branch: it
-follows e with a time constant, so that the share f of the stiffness relaxes. Springs creep alike. End stops are that of
-Hunt and Crossley, k d (1 + c d') at a depth d (J. Appl. Mech. 42 (1975) 440), shared by all segments.
+follows e with a time constant, so that the share f of the stiffness relaxes. Springs creep alike (yielding).
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import clip, maximum
+from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import rounded, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like
@@ -190,49 +189,6 @@ def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, path
         for i in range(n):
             for j in range(n):
                 by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]
-
-
-@compiled
-def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
-    """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
-    limit, stiffness = nonideal.stop / n, nonideal.stop_stiffness * n
-    depth = theta - clip(theta, -limit, limit)
-    zero = 0.0 * theta
-    damped = 1.0 + nonideal.stop_dissipation * where(depth < zero, -omega, omega)
-    touching = where((abs(depth) > zero) & (damped > zero), 1.0 + zero, zero)
-    torque = stiffness * depth * damped * touching
-    return torque, stiffness * damped * touching, stiffness * nonideal.stop_dissipation * abs(depth) * touching
-
-
-@compiled
-def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, r: Any) -> None:
-    """Add to the residual r (n,) what end stops take and what creeping springs give."""
-    if tendons is not None:
-        _yield(tendons.nonideal, tendons.state, segment, theta, omega, row_of(len(given), PATH), r)
-
-
-@compiled
-def _yield(nonideal: Any, state: Any, segment: Any, theta: Any, omega: Any, springs: int, r: Any) -> None:
-    if nonideal is not None:
-        for k in range(len(theta)):
-            torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
-            r[k] = r[k] + torque - nonideal.spring_creep * segment.stiffness * state[springs + k]
-
-
-@compiled
-def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    """Add what end stops add to dr/d(theta) and dr/d(rate), (n, n)."""
-    if tendons is not None:
-        _yield_jacobians(tendons.nonideal, theta, omega, by_theta, by_rate)
-
-
-@compiled
-def _yield_jacobians(nonideal: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    if nonideal is not None:
-        for k in range(len(theta)):
-            _, stiffness, damping = _contact(nonideal, len(theta), theta[k], omega[k])
-            by_theta[k, k] = by_theta[k, k] + stiffness
-            by_rate[k, k] = by_rate[k, k] + damping
 
 
 @compiled

@@ -16,10 +16,11 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import path_at_start, path_of, pulls_along, stiffen, yield_, yield_jacobians
+from wristctl.wrist.elastic import path_at_start, path_of, pulls_along, stiffen
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
 from wristctl.wrist.tendons import tendon_torques
+from wristctl.wrist.yielding import yield_, yield_jacobians
 
 
 @compiled

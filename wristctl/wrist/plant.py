@@ -25,11 +25,10 @@ from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import compiled, kernel, spelled_out
-from wristctl.lanes.lane import dot, planar, where
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
-from wristctl.wrist.elastic import settle
 from wristctl.wrist.shape import Backbone
 
 
@@ -123,7 +122,7 @@ def advance(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> 
     """Move coordinates and rates on by h [s] with `given` (plus, minus) held.
 
     These are pulls [N] where `tendons` is None, else what elastic tendons have reeled in [m]: their pulls at any place
-    are `wristctl.wrist.elastic.pulls_along`'s; what else is in them, as end stops, is its `yield_`'s.
+    are `wristctl.wrist.elastic.pulls_along`'s, and end stops are `wristctl.wrist.yielding`'s.
     """
     raise NotImplementedError("compiled code only")
 
@@ -168,47 +167,6 @@ def _by_plant(function: Any) -> None:
 
 for _function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
     _by_plant(_function)
-
-
-@spelled_out
-def advance_or_stop(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any, alive: Any) -> Any:
-    """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
-    before = lanes_like(q)
-    for i in range(len(q)):
-        before[i] = q[i]
-    advance(plant, q, rate, given, tendons, h)
-    zero = 0.0 * alive
-    alive = where(within(plant, q), alive, zero)
-    for i in range(len(q)):
-        q[i] = where(alive > zero, q[i], before[i])
-        rate[i] = where(alive > zero, rate[i], zero)
-    settle(tendons, q, given, path_along(tendons, plant, q))
-    return alive
-
-
-@compiled
-def path_along(tendons: Any, plant: Any, q: Any) -> Any:
-    """A plant's `travel` where it matters."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
-    return travel(plant, q)
-
-
-@compiled
-def path_before(tendons: Any, plant: Any, q: Any) -> Any:
-    """The same before a step, where it may be known."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
-    return _known(tendons.state, plant, q)
-
-
-@compiled
-def _known(state: Any, plant: Any, q: Any) -> Any:
-    if state is None:
-        return travel(plant, q)
-    return state[0], state[1], state[2]
 
 
 @cache

@@ -1,0 +1,52 @@
+"""One step of any plant, with its tendons' state and an end where it leaves what it can be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.lanes.compiled import compiled, spelled_out
+from wristctl.lanes.lane import where
+from wristctl.lanes.rows import lanes_like
+from wristctl.wrist.elastic import settle
+from wristctl.wrist.plant import advance, travel, within
+
+
+@spelled_out
+def advance_or_stop(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any, alive: Any) -> Any:
+    """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
+    before = lanes_like(q)
+    for i in range(len(q)):
+        before[i] = q[i]
+    advance(plant, q, rate, given, tendons, h)
+    zero = 0.0 * alive
+    alive = where(within(plant, q), alive, zero)
+    for i in range(len(q)):
+        q[i] = where(alive > zero, q[i], before[i])
+        rate[i] = where(alive > zero, rate[i], zero)
+    settle(tendons, q, given, path_along(tendons, plant, q))
+    return alive
+
+
+@compiled
+def path_along(tendons: Any, plant: Any, q: Any) -> Any:
+    """A plant's `travel` where it matters."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return travel(plant, q)
+
+
+@compiled
+def path_before(tendons: Any, plant: Any, q: Any) -> Any:
+    """The same before a step, where it may be known."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return _known(tendons.state, plant, q)
+
+
+@compiled
+def _known(state: Any, plant: Any, q: Any) -> Any:
+    if state is None:
+        return travel(plant, q)
+    return state[0], state[1], state[2]
