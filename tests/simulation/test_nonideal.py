@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.simulation.spools import rest_angle, spooled
+from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
@@ -223,6 +224,21 @@ def test_a_step_of_a_millisecond_is_as_good_as_twenty(stiffness: float, sheath: 
     assert np.degrees(np.abs(coarse - fine).max()) < 0.01
 
 
+@pytest.mark.parametrize("sensor", ["ideal", "camera"])
+def test_a_loop_of_ten_milliseconds_needs_nobody_to_choose_its_substeps(sensor: str) -> None:
+    """Stiff tendons, much friction: RMSE within 1 % or 0.001 deg of twenty times the substeps (docs/accuracy.md)."""
+    loop = Loop.model_validate(
+        {
+            "control_period": 1e-2,
+            "actuator": {"level": "tendon", "tendon_stiffness": 1e5, "sheath": 3.0},
+            "sensor": {"level": sensor},
+        }
+    )
+    assert loop.steps == 10
+    own, fine = (loops([each]).metrics["rmse"][0] for each in (loop, loop.model_copy(update={"substeps": 200})))
+    assert abs(own - fine) <= max(0.01 * fine, np.radians(0.001))
+
+
 def test_a_spool_lags_in_its_backlash_and_no_further() -> None:
     path = np.concatenate([np.linspace(0.0, 1e-3, 200), np.linspace(1e-3, 0.0, 200), np.linspace(0.0, 1e-3, 200)])
     done = spooled(antagonists(path), STIFF, TrueActuator(backlash=2e-4))
@@ -290,7 +306,7 @@ def test_a_feature_at_nothing_gives_the_bits_of_the_feature_absent(level: str) -
     """Beside a loop that has them all a loop without any is compiled with them."""
     ideal = LEVELS[level]
     facts = TrueActuator(friction=0.2, sheath=1.0, backlash=1e-4, creep=0.1)
-    other = ideal.model_copy(update={"plant": Plant(creep=0.1, end_stop_deg=20.0, actuator=facts)})
+    other = ideal.model_copy(update={"plant": Plant(creep=0.1, end_stop_deg=32.0, actuator=facts)})
     alone, beside = loops([ideal, ideal]), loops([ideal, other])
     assert alone.samples is not None and beside.samples is not None
     assert alone.samples[0].tobytes() == beside.samples[0].tobytes()
@@ -304,3 +320,9 @@ def test_frames_are_lost_in_bursts_of_the_length_given(burst: float) -> None:
     assert 1.0 - seen.mean() == pytest.approx(0.2, rel=0.1)
     runs = [len(list(each)) for lost, each in itertools.groupby(seen) if lost == 0.0]
     assert np.mean(runs) == pytest.approx(max(burst, 1.25), rel=0.1)
+
+
+def test_an_end_stop_inside_the_references_range_is_refused() -> None:
+    short = LEVELS["ideal"].model_copy(update={"plant": Plant(end_stop_deg=29.0)})
+    with pytest.raises(UserError, match="inside the reference's range, 30 deg"):
+        loops([short])

@@ -22,6 +22,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
 from wristctl.config.load import read_study
+from wristctl.config.plausible import check_lengths
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
 
@@ -73,6 +74,8 @@ def _execute(procedure: Procedure[Any], options: Options, shortcuts: Sequence[st
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)
+    if not options.force:
+        check_lengths(study, origins)
     with listening(options.quiet, options.verbose) as console:
         prepared = prepare(procedure, study, options.out)
         try:

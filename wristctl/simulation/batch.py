@@ -21,7 +21,7 @@ from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
-from wristctl.simulation.worlds import World, bending_limit
+from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -68,6 +68,7 @@ def batch(
     record: bool,
 ) -> Batch:
     """The batch of `rollout`; all worlds have the same structure, timing and frames."""
+    check_stops(worlds, max(float(np.abs(each.theta_ref).max()) for each in motions))
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
     k, level = model.coordinates(n), level_of(loop.actuator)
@@ -96,7 +97,7 @@ def batch(
     def limits(each: int) -> Array:
         world = worlds[each]
         most = world.wrist.tension_limit if world.loop.limits else np.inf
-        return np.array([world.wrist.pretension, most, bending_limit(actual[each])])
+        return np.array([world.wrist.pretension, most, bending_limit(actual[each], world.loop.plant.end_stop_deg)])
 
     def at_the_motors(each: int) -> Array:
         drive = None if level is None else Drive(level, counted[each])

@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from wristctl.config.errors import UserError
 from wristctl.config.keys import unit_of
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator, Sensor, TrueWrist
@@ -44,9 +45,19 @@ class World(NamedTuple):
         return actual
 
 
-def bending_limit(wrist: WristParameters) -> float:
-    """Bending angle [rad] beyond which a wrist has left its range, and its loop has failed."""
-    return math.radians(wrist.range_deg + LEEWAY_DEG)
+def bending_limit(wrist: WristParameters, end_stop_deg: float | None = None) -> float:
+    """Bending angle [rad] beyond which a wrist has left its range or its end stops, and its loop has failed."""
+    return math.radians(max(wrist.range_deg, end_stop_deg or 0.0) + LEEWAY_DEG)
+
+
+def check_stops(worlds: Sequence[World], largest: float) -> None:
+    """UserError where end stops lie inside the range of a reference, which goes to `largest` [rad]."""
+    most = math.degrees(largest)
+    for world in worlds:
+        stop = world.loop.plant.end_stop_deg
+        if stop is not None and stop <= most:
+            what = f"the end stop at {stop:g} deg lies inside the reference's range, {most:.4g} deg"
+            raise UserError(what, "loop.plant.end_stop_deg", "a larger one, or a smaller motion")
 
 
 class Mismatch(NamedTuple):

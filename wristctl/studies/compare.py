@@ -19,6 +19,7 @@ from wristctl.studies.loop_inputs import (
     network_for,
     tuned_gains,
     tuned_on,
+    warn_if_coarse,
     warn_if_it_buckles,
 )
 from wristctl.studies.procedure import Procedure
@@ -105,6 +106,7 @@ def compare(session: Session) -> Compared:
     settings = study.compare
     loops = settings.loops.values()
     warn_if_it_buckles(findings, study.wrist, loops)
+    warn_if_coarse(loops)
     network = network_for(session.inputs, study.wrist, loops)
     check_inverses(settings.inverses, network)
     if settings.tuning is not None:

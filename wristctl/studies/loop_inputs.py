@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.control import Row, SimulateSettings, TuneSettings
 from wristctl.config.errors import UserError
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import LONGEST_STEP, Loop, Reference, steps_within
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument
 from wristctl.config.wrist import WristParameters
@@ -109,6 +109,16 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
     findings.numerics(least_stiffness=least, buckles=least <= 0.0)
     if least <= 0.0:
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)
+
+
+def warn_if_coarse(loops: Iterable[Loop]) -> None:
+    """Warn where configured substeps are longer than elastic tendons allow."""
+    for loop in loops:
+        step = loop.control_period / loop.steps
+        if loop.actuator.level == "tendon" and step > LONGEST_STEP * (1.0 + 1e-9):
+            fewest = steps_within(loop.control_period)
+            told = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
+            log.warning(told, 1e3 * step, fewest)
 
 
 def _gains(given: Run | Tuned) -> Gains:

@@ -17,6 +17,7 @@ from wristctl.studies.loop_inputs import (
     inverses_of,
     network_for,
     tuned_gains,
+    warn_if_coarse,
     warn_if_it_buckles,
     warn_if_outside,
 )
@@ -90,6 +91,7 @@ def simulate(session: Session) -> Simulated:
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist = study.simulate, study.wrist
     warn_if_it_buckles(findings, wrist, [settings.loop])
+    warn_if_coarse([settings.loop])
     network = network_for(session.inputs, wrist, [settings.loop])
     check_inverses(inverses_of([settings.reference]), network)
     with session.progress("compiling and simulating the loop"):

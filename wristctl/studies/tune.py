@@ -11,7 +11,14 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_inverses, identified, inverses_of, network_for, warn_if_it_buckles
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    identified,
+    inverses_of,
+    network_for,
+    warn_if_coarse,
+    warn_if_it_buckles,
+)
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
 from wristctl.studies.study_result import StudyResult
@@ -86,6 +93,7 @@ def tune(session: Session) -> Tuned:
     study = identified(session.study, "tune", session.inputs)
     loops = study.tune.loops.values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
+    warn_if_coarse(loops)
     network = network_for(session.inputs, study.wrist, loops)
     found = search_all(session, study, network)
     rows = [
