@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment
 
 
@@ -26,4 +26,5 @@ COMPUTED_TORQUE = Controller(
         "zeta": Gain("", "damping ratio of the error", 1e-3, 1e3),
     },
     presets={"default": {"w": 50.0, "zeta": 1.0}},
+    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

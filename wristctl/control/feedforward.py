@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Controller
+from wristctl.control.law import Conditions, Controller
 from wristctl.control.model import one_segment
 
 
@@ -14,4 +14,11 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     return load
 
 
-FEEDFORWARD = Controller(name="feedforward", law=law, source="baseline", gains={}, presets={"default": {}})
+FEEDFORWARD = Controller(
+    name="feedforward",
+    law=law,
+    source="baseline",
+    gains={},
+    presets={"default": {}},
+    conditions={"default": Conditions((1e-3, 1e-2), (2e3, 1e5))},
+)

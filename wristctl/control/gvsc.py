@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.control.law import Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import dot, planar, turn
@@ -109,4 +109,5 @@ GVSC = Controller(
     },
     presets={"default": {"Kp": 10.0, "Kd": 0.3}},
     notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
+    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

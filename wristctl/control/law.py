@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 from numba.core import types
@@ -44,6 +44,18 @@ class Gain:
     high: float
 
 
+class Conditions(NamedTuple):
+    """Behind motors, elastic tendons and a camera: where a preset comes to rest (docs/margins.md), ends included.
+
+    At any sheath of up to 3 rad, with up to 0.1 deg of noise, and where tendons are as believed.
+    """
+
+    period: tuple[float, float]
+    """[s]"""
+    tendon_stiffness: tuple[float, float]
+    """Believed, of one tendon [N/m]."""
+
+
 @dataclass(frozen=True)
 class Controller:
     """A named law with its gains; `memory` is the number of values it carries from tick to tick.
@@ -60,9 +72,13 @@ class Controller:
     memory: int = 0
     notes: Mapping[str, str] = field(default_factory=dict)
     """What a reader should know about a preset."""
+    conditions: Mapping[str, Conditions] = field(default_factory=dict)
+    """Of the presets that are made for motors, tendons and a camera too; the others are for tensions as commanded."""
 
     def __post_init__(self) -> None:
-        """ValueError for a preset that does not give every gain and no other."""
+        """ValueError for a preset that does not give every gain and no other, and for conditions of none."""
+        if unknown := set(self.conditions) - set(self.presets):
+            raise ValueError(f"{self.name} has conditions for {', '.join(unknown)}, and no such preset")
         for preset, given in self.presets.items():
             if not isinstance(given, Mapping) or set(given) != set(self.gains):
                 raise ValueError(f"preset {preset} of {self.name} must give {', '.join(self.gains)} by name")

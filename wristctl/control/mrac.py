@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where
@@ -72,7 +72,14 @@ MRAC = Controller(
         "gamma": Gain("1/(J s)", "adaptation gain", 1e-2, 1e4),
         "leak": Gain("1/s", "rate at which parameters return to the model's", 1e-6, 1e0),
     },
-    presets={"default": {"w": 80.0, "lambda": 80.0, "Kd": 0.5, "gamma": 100.0, "leak": 1e-3}},
+    presets={
+        "default": {"w": 80.0, "lambda": 80.0, "Kd": 0.5, "gamma": 100.0, "leak": 1e-3},
+        "stepper": {"w": 13.0, "lambda": 5.2, "Kd": 0.32, "gamma": 31.0, "leak": 7.7e-4},
+    },
     memory=PARAMETERS + len(LOWEST),
-    notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
+    notes={
+        "default": "our design; chosen by trial on the four-segment plant at 1 kHz",
+        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
+    },
+    conditions={"stepper": Conditions((1e-3, 5e-3), (8e3, 1e5))},
 )

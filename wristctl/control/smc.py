@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment
 from wristctl.lanes.functions import tanh
 
@@ -41,5 +41,10 @@ SMC = Controller(
         "exchanged": "hypothesis: P1 and P2 of the printed gains exchanged (C5)",
         "initial": "the paper's start values",
         "stepper": "behind a camera and stepper motors at a period of 5 ms: chosen by trial on the emulated bench",
+    },
+    conditions={
+        "printed": Conditions((1e-3, 1e-2), (2e3, 1e5)),
+        "initial": Conditions((1e-3, 1e-2), (5e3, 1e5)),
+        "stepper": Conditions((1e-3, 1e-2), (5e3, 1e5)),
     },
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment
 from wristctl.lanes.lane import sqrt, where
 
@@ -44,7 +44,14 @@ SUPER_TWISTING = Controller(
         "k2": Gain("rad/s^3", "rate of the twisting term", 1e0, 1e6),
         "tau": Gain("s", "time constant near s = 0", 1e-5, 1e1),
     },
-    presets={"default": {"lambda": 140.0, "k1": 500.0, "k2": 5e4, "tau": 0.0036}},
+    presets={
+        "default": {"lambda": 140.0, "k1": 500.0, "k2": 5e4, "tau": 0.0036},
+        "stepper": {"lambda": 5.4, "k1": 100.0, "k2": 1.4e4, "tau": 0.017},
+    },
     memory=1,
-    notes={"default": "chosen by trial on the four-segment plant at 1 kHz"},
+    notes={
+        "default": "chosen by trial on the four-segment plant at 1 kHz",
+        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
+    },
+    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

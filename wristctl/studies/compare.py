@@ -21,6 +21,7 @@ from wristctl.studies.loop_inputs import (
     tuned_on,
     warn_if_coarse,
     warn_if_it_buckles,
+    warn_outside_conditions,
 )
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
@@ -107,6 +108,7 @@ def compare(session: Session) -> Compared:
     loops = settings.loops.values()
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
+    warn_outside_conditions(settings.rows, loops)
     network = network_for(session.inputs, study.wrist, loops)
     check_inverses(settings.inverses, network)
     if settings.tuning is not None:

@@ -18,6 +18,7 @@ from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import Inputs
 
 if TYPE_CHECKING:
+    from wristctl.control.law import Conditions
     from wristctl.learning.network import Network
     from wristctl.studies.identify import Identified
     from wristctl.studies.train import Trained
@@ -109,6 +110,35 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
     findings.numerics(least_stiffness=least, buckles=least <= 0.0)
     if least <= 0.0:
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)
+
+
+def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
+    """Warn where a preset is not made for a loop with motors, tendons and a camera."""
+    from wristctl.control.table import controller
+
+    real = [each for each in loops if each.actuator.level == "tendon" and each.sensor.level == "camera"]
+    presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
+    for name, preset in sorted(presets):
+        law = controller(name)
+        stated = law.conditions.get(preset)
+        better = ", ".join(law.conditions)
+        if real and stated is None:
+            instead = f"; {better} is" if better else ""
+            log.warning("%s/%s is not made for elastic tendons behind a camera: it may swing%s", name, preset, instead)
+        for loop in real:
+            if stated and (told := _outside(stated, loop)):
+                log.warning("%s/%s was made for %s: it may swing (docs/margins.md)", name, preset, told)
+
+
+def _outside(stated: Conditions, loop: Loop) -> str:
+    (fast, slow), (soft, stiff) = stated
+    told = []
+    if not fast <= loop.control_period <= slow:
+        told.append(f"periods of {1e3 * fast:g} to {1e3 * slow:g} ms, not {1e3 * loop.control_period:g}")
+    believed = loop.actuator.tendon_stiffness
+    if not soft <= believed <= stiff:
+        told.append(f"tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m, not {believed / 1e3:g}")
+    return " and ".join(told)
 
 
 def warn_if_coarse(loops: Iterable[Loop]) -> None:

@@ -20,6 +20,7 @@ from wristctl.studies.loop_inputs import (
     warn_if_coarse,
     warn_if_it_buckles,
     warn_if_outside,
+    warn_outside_conditions,
 )
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
@@ -92,6 +93,7 @@ def simulate(session: Session) -> Simulated:
     settings, wrist = study.simulate, study.wrist
     warn_if_it_buckles(findings, wrist, [settings.loop])
     warn_if_coarse([settings.loop])
+    warn_outside_conditions([settings], [settings.loop])
     network = network_for(session.inputs, wrist, [settings.loop])
     check_inverses(inverses_of([settings.reference]), network)
     with session.progress("compiling and simulating the loop"):

@@ -1,0 +1,83 @@
+"""A preset is quiet where it says so; docs/margins.py tries all of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import logging
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from wristctl.config.choices import CONTROLLERS
+from wristctl.config.control import Row
+from wristctl.config.loop import Loop
+from wristctl.control.law import Conditions
+from wristctl.control.table import controller
+from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.studies.loop_inputs import warn_outside_conditions
+
+PAPERS = ("smc", "pid")
+STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).conditions]
+
+
+@pytest.fixture(scope="module")
+def margins() -> ModuleType:
+    """docs/margins.py"""
+    spec = importlib.util.spec_from_file_location("margins", Path(__file__).parents[2] / "docs" / "margins.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("name", "preset"), STATED)
+def test_a_preset_does_not_swing_at_the_ends_of_its_conditions(margins: ModuleType, name: str, preset: str) -> None:
+    (fast, slow), (soft, _) = controller(name).conditions[preset]
+    for period in {fast, 5e-3, slow}:
+        assert margins.swing(name, preset, margins.loop_of(period, soft, 0.0)) <= LIMIT_CYCLE
+    assert margins.swing(name, preset, margins.loop_of(5e-3, 40e3, 3.0)) <= LIMIT_CYCLE
+
+
+@pytest.mark.parametrize("name", [each for each in CONTROLLERS if each not in PAPERS])
+def test_each_of_our_laws_has_a_preset_for_motors_and_a_camera(name: str) -> None:
+    assert any(
+        fast <= 5e-3 <= slow and soft <= 8e3 and stiff >= 40e3
+        for (fast, slow), (soft, stiff) in controller(name).conditions.values()
+    )
+
+
+def test_a_preset_without_conditions_swings_there(margins: ModuleType) -> None:
+    """The check can come out the other way."""
+    assert margins.swing("super-twisting", "default", margins.loop_of(5e-3, 20e3, 1.0)) > LIMIT_CYCLE
+
+
+@pytest.mark.parametrize(
+    ("row", "loop", "told"),
+    [
+        (("mrac", "stepper"), {"control_period": 5e-3}, None),
+        (("mrac", "stepper"), {"control_period": 1e-2}, "made for periods of 1 to 5 ms, not 10"),
+        (("nc", "default"), {"control_period": 5e-3, "stiffness": 1e4}, "tendons of 20 to 100 kN/m, not 10"),
+        (("smc-tracking", "default"), {}, "not made for elastic tendons behind a camera"),
+        (("smc-tracking", "default"), {"sensor": "ideal"}, None),
+    ],
+)
+def test_a_command_warns_outside_them(
+    caplog: pytest.LogCaptureFixture, row: tuple[str, str], loop: dict[str, float | str], told: str | None
+) -> None:
+    given = Loop.model_validate(
+        {
+            "control_period": loop.get("control_period", 1e-3),
+            "actuator": {"level": "tendon", "tendon_stiffness": loop.get("stiffness", 20e3)},
+            "sensor": {"level": loop.get("sensor", "camera")},
+        }
+    )
+    with caplog.at_level(logging.WARNING, logger="wristctl"):
+        warn_outside_conditions([Row(controller=row[0], gains=row[1])], [given])
+    assert caplog.messages == [] if told is None else told in " ".join(caplog.messages)
+
+
+def test_conditions_of_no_preset_are_refused() -> None:
+    with pytest.raises(ValueError, match="no such preset"):
+        dataclasses.replace(controller("nc"), conditions={"other": Conditions((1e-3, 1e-2), (1e3, 1e4))})
