@@ -18,7 +18,7 @@ from wristctl.simulation.nonideal import worn
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
-from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal
+from wristctl.wrist.elastic import Tendons, pulls_at_start, read_nonideal
 from wristctl.wrist.moving import advance_or_stop, path_before
 from wristctl.wrist.plant import disturbed, parameters_of, tip_angle
 from wristctl.wrist.segments import load_segments
@@ -157,7 +157,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             time, path = now_tick * period + zero, path_before(tendons, plant, q)
             delivered = wound(drive, winding, given_plus, given_minus)
             reeled = worn(tendons, delivered, (winding.scale * motor[1], winding.scale * motor[3]), time, path)
-            acting_plus, acting_minus = pulls_along(tendons, reeled, path)
+            acting_plus, acting_minus = pulls_at_start(tendons, reeled, path)
             saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
             watch_range(sum_, time, angle, bound[2])
             gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)

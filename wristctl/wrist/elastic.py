@@ -108,14 +108,27 @@ def spool_pull(tendons: Any, given: Any, t: int, x: Any) -> Any:
 
 
 @compiled
-def _pull(tendons: Any, nonideal: Any, given: Any, t: int, x: Any, bend: Any) -> Any:
-    """Of one tendon at the wrist [N]."""
+def _at_wrist(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, z: Any) -> Any:
+    """Pull [N] of one tendon whose bristle is in this state."""
+    left = capstan(nonideal.friction, nonideal.sheath + path[2], z)
+    pull = rounded(spool_pull(tendons, given[t], t, path[t % 2]) * left)
+    return where(nonideal.held > 0.0, given[t], pull)
+
+
+@compiled
+def _pull(tendons: Any, nonideal: Any, given: Any, t: int, path: Any) -> Any:
+    x = path[t % 2]
     if nonideal is None:
         return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
-    z = _slid(nonideal, tendons.state, t, x)
-    left = capstan(nonideal.friction, nonideal.sheath + bend, z)
-    at_wrist = rounded(spool_pull(tendons, given[t], t, x) * left)
-    return where(nonideal.held > 0.0, given[t], at_wrist)
+    return _at_wrist(tendons, nonideal, given, t, path, _slid(nonideal, tendons.state, t, x))
+
+
+@compiled
+def _pull_at_start(tendons: Any, nonideal: Any, given: Any, t: int, path: Any) -> Any:
+    x = path[t % 2]
+    if nonideal is None:
+        return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
+    return _at_wrist(tendons, nonideal, given, t, path, tendons.state[row_of(t, _Z)])
 
 
 @compiled
@@ -148,25 +161,36 @@ def pulls_along(tendons: Any, given: Any, path: Any) -> Any:
     """Pulls [N] of both sides at the wrist at a path (plus, minus, bend); those given where `tendons` is None."""
     if tendons is None:
         return given[0], given[1]
-    plus = _pull(tendons, tendons.nonideal, given, 0, path[0], path[2])
-    minus = _pull(tendons, tendons.nonideal, given, 1, path[1], path[2])
-    for t in range(2, len(given), 2):
-        plus = plus + _pull(tendons, tendons.nonideal, given, t, path[0], path[2])
-        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path[1], path[2])
+    plus, minus = 0.0 * path[0], 0.0 * path[0]
+    for t in range(0, len(given), 2):
+        plus = plus + _pull(tendons, tendons.nonideal, given, t, path)
+        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path)
     return plus, minus
 
 
 @compiled
-def _slope(tendons: Any, nonideal: Any, given: Any, t: int, x: Any, bend: Any, speed: Any) -> Any:
-    """By how much the pull falls with travel [N/m]."""
-    pull = _pull(tendons, nonideal, given, t, x, bend)
+def pulls_at_start(tendons: Any, given: Any, path: Any) -> Any:
+    """The same at the start of a step, where no tendon has slid yet."""
+    if tendons is None:
+        return given[0], given[1]
+    plus, minus = 0.0 * path[0], 0.0 * path[0]
+    for t in range(0, len(given), 2):
+        plus = plus + _pull_at_start(tendons, tendons.nonideal, given, t, path)
+        minus = minus + _pull_at_start(tendons, tendons.nonideal, given, t + 1, path)
+    return plus, minus
+
+
+@compiled
+def _slope(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, speed: Any) -> Any:
+    """By how much the pull falls with travel at the start of a step [N/m]."""
+    x = path[t % 2]
     if nonideal is None:
-        return where(pull > 0.0, tendons.stiffness, 0.0 * x)
-    z, wrapped = tendons.state[row_of(t, _Z)], nonideal.sheath + bend
+        return where(given[t] - x > 0.0, tendons.stiffness, 0.0 * x)
+    z, wrapped = tendons.state[row_of(t, _Z)], nonideal.friction * (nonideal.sheath + path[2])
+    pull = spool_pull(tendons, given[t], t, x)
     taut = where(pull > 0.0, tendons.state[row_of(t, SHARE)] * tendons.stiffness, 0.0 * x)
-    elastic = taut * capstan(nonideal.friction, wrapped, z)
-    dragging = pull * nonideal.friction * wrapped * bristle_slope(z, speed, nonideal.bristle)
-    return where(nonideal.held > 0.0, 0.0 * x, elastic + dragging)
+    slope = (taut + pull * wrapped * bristle_slope(z, speed, nonideal.bristle)) * capstan(wrapped, 1.0 + 0.0 * x, z)
+    return where(nonideal.held > 0.0, 0.0 * x, slope)
 
 
 @compiled
@@ -184,8 +208,8 @@ def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, path
             speed_minus = speed_minus + arm_minus * omega[k]
         plus, minus = zero, zero
         for t in range(0, len(given), 2):
-            plus = plus + _slope(tendons, tendons.nonideal, given, t, path[0], path[2], speed_plus)
-            minus = minus + _slope(tendons, tendons.nonideal, given, t + 1, path[1], path[2], speed_minus)
+            plus = plus + _slope(tendons, tendons.nonideal, given, t, path, speed_plus)
+            minus = minus + _slope(tendons, tendons.nonideal, given, t + 1, path, speed_minus)
         for i in range(n):
             for j in range(n):
                 by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]

@@ -16,7 +16,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import path_at_start, path_of, pulls_along, stiffen
+from wristctl.wrist.elastic import path_at_start, path_of, pulls_along, pulls_at_start, stiffen
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
 from wristctl.wrist.tendons import tendon_torques
@@ -64,7 +64,7 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
 
     tangent = chords(theta, segment.length, arc)
     path = path_at_start(tendons, segment, theta)
-    plus, minus = pulls_along(tendons, given, path)
+    plus, minus = pulls_at_start(tendons, given, path)
     tendon_torques(theta, segment, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)
     bias(segment, theta, omega, arc, tangent, pull, a0)
