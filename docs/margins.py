@@ -113,7 +113,7 @@ def draw(worst: dict[tuple[str, str], np.ndarray]) -> None:
     """The map of all presets."""
     figure, axes = plt.subplots(figsize=(9.0, 0.32 * len(worst) + 1.6), layout="constrained")
     values = np.array([np.degrees(each).ravel() for each in worst.values()])
-    image = axes.imshow(values.clip(0.01, 10.0), norm=LogNorm(0.01, 10.0), cmap="RdYlGn_r", aspect="auto")
+    image = axes.imshow(values.clip(0.01, 10.0), norm=LogNorm(0.01, 10.0), cmap="RdYlBu_r", aspect="auto")
     axes.set_yticks(range(len(worst)), [f"{name} / {gains}" for name, gains in worst])
     columns = [f"{k / 1e3:g}" for _ in PERIODS for k in STIFFNESSES]
     axes.set_xticks(range(len(columns)), columns)

@@ -88,3 +88,10 @@ def test_soft_tendons_behind_a_camera_fail_or_swing_by_the_steppers_acceleration
     assert slow.fate.startswith(("FAILED: left its range at", "LIMIT CYCLE: +-"))
     quick = simulate(load_study([], [*SOFT, "simulate.loop.actuator.step_acceleration=400000.0"]))
     assert not quick.failed.any() and quick.metrics["oscillation"][0] < 2.0 * LIMIT_CYCLE
+
+
+def test_a_pull_that_no_tendon_bears_is_told_and_one_that_it_bears_is_not() -> None:
+    row = ["simulate.controller=smc-tracking", "simulate.gains=default", "simulate.reference.kind=step"]
+    free = simulate(load_study([], [*row, "simulate.loop.limits=false"]))
+    assert "NOT PHYSICAL" in free.fate and f"{free.metrics['peak_tension'][0]:.3g} N" in free.fate
+    assert simulate(load_study([], row)).fate == ""

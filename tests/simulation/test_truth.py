@@ -22,6 +22,7 @@ from wristctl.control.response import Controlled, respond
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
+from wristctl.report.truth_table import truth_heading
 from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.kernel import run_blocks
@@ -239,3 +240,19 @@ def test_what_differs_is_listed_with_what_is_believed() -> None:
         "sensor.zero_deg": (0.0, 0.5, "deg"),
     }
     assert mismatches(World(LOOPS["tendon"], WRIST)) == []
+
+
+def test_a_trials_twin_has_all_that_its_bench_has() -> None:
+    tendons = "actuator: {backlash: 1.0e-4, sheath: 2.0}, motors: {holding_torque: 0.9}"
+    bench = f"hw-run.bench={{plant: {{creep: 0.1, end_stop_deg: 48}}, {tendons}}}"
+    plant = load_study([], [bench]).hw_run.loop.plant
+    assert (plant.creep, plant.end_stop_deg, plant.stiffness_scale) == (0.1, 48.0, 0.7)
+    own = plant.actuator
+    assert (own.backlash, own.sheath, own.torque, own.friction) == (1e-4, 2.0, 0.9, None)
+
+
+def test_a_figure_names_what_differs() -> None:
+    plant = Plant(tendon_radius="x1.03", length="x1.1", end_stop_deg=45.0, sensor=TrueSensor(zero_deg=0.5, burst=3.0))
+    told = truth_heading(WRIST, LOOPS["tendon"].model_copy(update={"plant": plant}))
+    assert told == "not as believed: length, tendon_radius, end_stop_deg, burst, 1 more"
+    assert truth_heading(WRIST, LOOPS["tendon"]) == ""

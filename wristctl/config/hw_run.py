@@ -113,9 +113,11 @@ class HwRunSettings(RigSettings):
         """The bench as the plant of a loop: what of its motors and camera is not as believed stands there."""
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
+        motors = TrueActuator.between(self.actuator, self.bench.actuator)
+        own = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
         return Plant(
             **wrist,
-            actuator=TrueActuator.between(self.actuator, self.bench.actuator),
+            actuator=motors.model_copy(update=own),
             sensor=TrueSensor.between(self.sensor, camera),
         )
 

@@ -9,6 +9,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.report.printed_table import Table
 from wristctl.simulation.worlds import World, mismatches
 
+_TOLD = 4
+"""How many a figure's title names."""
+
 
 def truth_tables(wrist: WristParameters, loops: Mapping[str, Loop]) -> list[Table]:
     """A table of what differs in each loop, by its name, before spreads are drawn; none where nothing does."""
@@ -18,6 +21,13 @@ def truth_tables(wrist: WristParameters, loops: Mapping[str, Loop]) -> list[Tabl
         return []
     title = "What the world is and the controller does not know"
     return [Table(title, ("loop", "leaf", "believed", "actual", "unit"), rows)]
+
+
+def truth_heading(wrist: WristParameters, loop: Loop) -> str:
+    """The first of what differs, for over a figure; empty where nothing does."""
+    names = [each.key.rpartition(".")[2] for each in mismatches(World(loop, wrist))]
+    more = [f"{len(names) - _TOLD} more"] if len(names) > _TOLD else []
+    return "not as believed: " + ", ".join(names[:_TOLD] + more) if names else ""
 
 
 def truth_told(wrist: WristParameters, loops: Mapping[str, Loop]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -53,6 +54,8 @@ class Repeated:
     """(R,) when each was last within its range [s]."""
     errors: Array
     """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
+    bears: float = math.inf
+    """Largest tension that a tendon bears [N]."""
 
     @classmethod
     def once(cls, done: Simulation) -> Repeated:
@@ -70,7 +73,18 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: that it failed, or swings; empty where it came to rest, or is not known to."""
+        """In words what became of it: that it failed, swings, or pulls harder than tendons can; else empty."""
+        return "; ".join(each for each in (self._end, self._strain) if each)
+
+    @property
+    def _strain(self) -> str:
+        """What no tendon bears; 1 % more is what a spool's steps and a swing of the wrist may add to the limit."""
+        known = self.metrics.get("peak_tension", np.empty(0))
+        most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
+        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 1.01 * self.bears else ""
+
+    @property
+    def _end(self) -> str:
         if self.failure:
             return f"FAILED: {self.failure}"
         known = self.metrics.get("oscillation", np.empty(0))
@@ -124,7 +138,7 @@ def repeat(
         for lane, k in enumerate(k for k in now for _ in range(rows)):
             plant = plant_of(wrist, loops[k].plant)
             found[lane % rows].add(simulation(outcome, lane, motions[which[lane % rows]], plant, loop.plant.model))
-    return [each.repeated() for each in found]
+    return [each.repeated(wrist.tension_limit) for each in found]
 
 
 class _Gathered:
@@ -145,11 +159,11 @@ class _Gathered:
         if len(self._errors) < _TOGETHER:
             self._errors.append(done.trajectory.error)
 
-    def repeated(self) -> Repeated:
+    def repeated(self, bears: float) -> Repeated:
         assert self._first is not None
         metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
         failed, until = np.array(self._failed), np.array(self._until)
-        return Repeated(self._first, metrics, failed, until, np.array(self._errors))
+        return Repeated(self._first, metrics, failed, until, np.array(self._errors), bears)
 
 
 def simulation(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Simulation:

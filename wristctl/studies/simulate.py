@@ -82,7 +82,7 @@ def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.repetition_figures import error_sizes
-    from wristctl.report.truth_table import truth_tables
+    from wristctl.report.truth_table import truth_heading, truth_tables
     from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
@@ -109,8 +109,9 @@ def simulate(session: Session) -> Simulated:
     title = ", ".join(part for part in (course.label, repeated.fate) if part)
     tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
-        findings.figure("angle", angles, [course])
-        findings.figure("error", errors, [course])
+        world = truth_heading(wrist, settings.loop)
+        findings.figure("angle", angles, [course], heading=world)
+        findings.figure("error", errors, [course], heading=world)
         if len(repeated.failed) > 1:
             findings.figure("error-repetitions", error_sizes, [repeated])
         findings.figure("tensions", tensions, course)
