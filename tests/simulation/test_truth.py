@@ -32,6 +32,7 @@ from wristctl.simulation.rollout import _advance
 from wristctl.simulation.worlds import World, mismatches, plant_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.segments import load_segments
+from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()
@@ -50,6 +51,7 @@ LEAVES: dict[str, dict[str, Any]] = {
     "pulley_radius": {"actuator": {"pulley_radius": "x1.02"}},
     "step_rate": {"actuator": {"step_rate": "x0.02"}},
     "step_acceleration": {"actuator": {"step_acceleration": "x0.1"}},
+    "tilt_deg": {"tilt_deg": 3.0},
     "sheath": {"actuator": {"sheath": 2.0}},
     "presliding": {"actuator": {"presliding": "x4"}},
     "backlash": {"actuator": {"backlash": 1e-4}},
@@ -256,3 +258,11 @@ def test_a_figure_names_what_differs() -> None:
     told = truth_heading(WRIST, LOOPS["tendon"].model_copy(update={"plant": plant}))
     assert told == "not as believed: length, tendon_radius, end_stop_deg, burst, 1 more"
     assert truth_heading(WRIST, LOOPS["tendon"]) == ""
+
+
+def test_a_base_that_leans_lets_the_wrist_hang_to_that_side() -> None:
+    """By 90 deg: gravity is what it would be of a wrist that is held level."""
+    own = plant_of(WRIST, Plant(tilt_deg=90.0))
+    np.testing.assert_allclose(own.gravity, (0.0, 9.81), atol=1e-12)
+    leaning = plant_of(WRIST, Plant(tilt_deg=5.0))
+    assert equilibrium(leaning, 4, (8.0, 8.0)).sum() > 0.01 and plant_of(WRIST, Plant()) == WRIST

@@ -72,6 +72,7 @@ class TrueWrist(Overrides):
     stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
     damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
     tendon_radius: Positive = truth("m", "radius of the circle of tendons")
+    tilt_deg: float = fact(0.0, "deg", "by how much its base leans toward theta > 0, gravity being as believed")
     creep: float = fact(0.0, "", "share of the stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
     end_stop_deg: float | None = fact(None, "deg", "bending angle at which the wrist meets its end stops", gt=0, le=180)

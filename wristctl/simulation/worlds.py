@@ -101,8 +101,17 @@ def plant_of(wrist: WristParameters, plant: TrueWrist) -> WristParameters:
             "stiffness": own.stiffness * plant.stiffness_scale,
             "damping": own.damping * plant.damping_scale,
             "hand_mass": own.hand_mass + plant.payload,
+            "gravity": _leaning(own.gravity, math.radians(plant.tilt_deg)),
         }
     )
+
+
+def _leaning(gravity: tuple[float, float], tilt: float) -> tuple[float, float]:
+    """Gravity in the axes of a base that leans by tilt [rad] toward theta > 0."""
+    if tilt == 0.0:
+        return gravity
+    c, s = math.cos(tilt), math.sin(tilt)
+    return c * gravity[0] + s * gravity[1], c * gravity[1] - s * gravity[0]
 
 
 P = TypeVar("P", bound=TrueWrist)
