@@ -10,13 +10,23 @@ from types import ModuleType
 
 import pytest
 
+from wristctl.cli.operator import TerminalOperator
+from wristctl.cli.progress import Terminal
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.control import Row
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
 from wristctl.config.loop import Loop
 from wristctl.control.law import Conditions
 from wristctl.control.table import controller
 from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.studies.counting import watched
+from wristctl.studies.findings import Findings
+from wristctl.studies.hw_run import hw_run
+from wristctl.studies.inputs import Inputs
 from wristctl.studies.loop_inputs import warn_outside_conditions
+from wristctl.studies.session import Session
+from wristctl.studies.unattended import Unattended
 
 PAPERS = ("smc", "pid")
 STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).conditions]
@@ -76,6 +86,16 @@ def test_a_command_warns_outside_them(
     with caplog.at_level(logging.WARNING, logger="wristctl"):
         warn_outside_conditions([Row(controller=row[0], gains=row[1])], [given])
     assert caplog.messages == [] if told is None else told in " ".join(caplog.messages)
+
+
+def test_real_motors_do_not_move_by_gains_that_may_swing_unless_told_to(capsys: pytest.CaptureFixture[str]) -> None:
+    study = load_study([], ["hw-run.port=/dev/null", "hw-run.rows=[{controller: smc-tracking, gains: default}]"])
+    for operator in (Unattended(), TerminalOperator(Terminal(), True, frozenset({"yes"}))):
+        with pytest.raises(UserError, match="not made for elastic tendons behind a camera") as refused:
+            hw_run(Session(study, Inputs(), Findings(study.seed, None), watched(None), operator))
+        assert refused.value.exit_code == 3
+    TerminalOperator(Terminal(stderr=True), True, frozenset({"force"})).dare("it may swing")
+    assert "it may swing" in capsys.readouterr().err
 
 
 def test_conditions_of_no_preset_are_refused() -> None:

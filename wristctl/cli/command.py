@@ -49,7 +49,8 @@ def study_command(
         raised = frozenset(name for name in flags if given.pop(name))
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
-        _execute(procedure, Options(**given), set_, raised)
+        options = Options(**given)
+        _execute(procedure, options, set_, raised | ({"force"} if options.force else set()))
 
     keys = section_keys(procedure.kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}

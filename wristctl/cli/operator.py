@@ -43,6 +43,12 @@ class TerminalOperator:
             if typer.prompt("Type yes to go on", default="no", show_default=False, err=True) != "yes":
                 raise UserError("nothing was moved further", fix="type yes, or --yes for scripted use", exit_code=3)
 
+    def dare(self, what: str) -> None:
+        """Only with the flag `force`."""
+        if "force" not in self.flags:
+            raise UserError(what, "hw-run.rows", "other gains, or go on with --force", exit_code=3)
+        self.tell(what)
+
     def wait_for(self, what: str) -> None:
         """Waits for Enter."""
         typer.prompt(what, default="", show_default=False, err=True)

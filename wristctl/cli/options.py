@@ -37,7 +37,10 @@ class Options:
         typer.Option("--set", metavar="KEY=VALUE", help="Override one setting: a.b=value."),
     ] = None
     seed: Annotated[int | None, typer.Option("--seed", help="Root of every random stream.")] = None
-    force: Annotated[bool, typer.Option("--force", help="Go on with lengths that were hardly meant in metres.")] = False
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Go on with lengths hardly meant in metres; hw-run: with gains that may swing."),
+    ] = False
     out: Out = Path("results")
     label: Annotated[
         str | None, typer.Option("--label", help="Part of the run's name; by default the study file's.")

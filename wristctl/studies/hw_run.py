@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_row, identified, network_for, tuned_gains, warn_outside_conditions
+from wristctl.studies.loop_inputs import (
+    check_row,
+    identified,
+    network_for,
+    outside_conditions,
+    tuned_gains,
+    warn_outside_conditions,
+)
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rig_description import describe_rig
 from wristctl.studies.session import Session
@@ -57,7 +64,10 @@ def hw_run(session: Session) -> Performed:
     known = replace(session, study=identified(study, "hw-run", session.inputs))
     network = network_for(session.inputs, known.study.wrist, [known.study.hw_run.loop])
     tuned = tuned_gains(session.inputs)
-    warn_outside_conditions(study.hw_run.rows, [study.hw_run.loop])
+    if study.hw_run.port is None:
+        warn_outside_conditions(study.hw_run.rows, [study.hw_run.loop])
+    elif swinging := outside_conditions(study.hw_run.rows, [study.hw_run.loop]):
+        session.operator.dare("; ".join(swinging))
     trials = perform_trials(known, bench, network, tuned)
     tables, twins = trial_tables(known, trials, network, tuned)
     return Performed(study, session.findings, tables, trials, twins)

@@ -112,22 +112,28 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)
 
 
-def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
-    """Warn where a preset is not made for a loop with motors, tendons and a camera."""
+def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
+    """In words each preset that is not made for a loop with motors, tendons and a camera."""
     from wristctl.control.table import controller
 
-    real = [each for each in loops if each.actuator.level == "tendon" and each.sensor.level == "camera"]
+    real, found = [each for each in loops if each.actuator.level == "tendon" and each.sensor.level == "camera"], []
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
         stated = law.conditions.get(preset)
-        better = ", ".join(law.conditions)
         if real and stated is None:
-            instead = f"; {better} is" if better else ""
-            log.warning("%s/%s is not made for elastic tendons behind a camera: it may swing%s", name, preset, instead)
+            instead = f"; {', '.join(law.conditions)} is" if law.conditions else ""
+            found.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
         for loop in real:
             if stated and (told := _outside(stated, loop)):
-                log.warning("%s/%s was made for %s: it may swing (docs/margins.md)", name, preset, told)
+                found.append(f"{name}/{preset} was made for {told}: it may swing (docs/margins.md)")
+    return found
+
+
+def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
+    """Warn of each of them."""
+    for each in outside_conditions(rows, loops):
+        log.warning("%s", each)
 
 
 def _outside(stated: Conditions, loop: Loop) -> str:

@@ -43,6 +43,9 @@ class Operator(Protocol):
     def confirm(self, what: str) -> None:
         """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not."""
 
+    def dare(self, what: str) -> None:
+        """What should not be done on hardware. Raises UserError where nobody has said that it is to be done anyway."""
+
     def wait_for(self, what: str) -> None:
         """Say what is to be done, and come back once it is."""
 

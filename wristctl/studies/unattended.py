@@ -24,6 +24,10 @@ class Unattended:
         """Raises UserError."""
         raise UserError(f"nobody is there to agree to this: {what}", fix="use the command line", exit_code=3)
 
+    def dare(self, what: str) -> None:
+        """Raises UserError."""
+        self.confirm(what)
+
     def wait_for(self, what: str) -> None:
         """Raises UserError."""
         self.confirm(what)
