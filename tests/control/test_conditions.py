@@ -24,7 +24,7 @@ from wristctl.studies.counting import watched
 from wristctl.studies.findings import Findings
 from wristctl.studies.hw_run import hw_run
 from wristctl.studies.inputs import Inputs
-from wristctl.studies.loop_inputs import warn_outside_conditions
+from wristctl.studies.loop_warnings import warn_outside_conditions
 from wristctl.studies.session import Session
 from wristctl.studies.unattended import Unattended
 

@@ -25,9 +25,8 @@ from wristctl.studies.loop_inputs import (
     network_for,
     tuned_gains,
     tuned_on,
-    warn_if_it_buckles,
-    warn_if_outside,
 )
+from wristctl.studies.loop_warnings import warn_if_it_buckles, warn_if_outside
 from wristctl.wrist import statics
 
 STUDY = wristctl.load_study(None)

@@ -13,16 +13,8 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import (
-    check_inverses,
-    check_row,
-    network_for,
-    tuned_gains,
-    tuned_on,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_outside_conditions,
-)
+from wristctl.studies.loop_inputs import check_inverses, check_row, network_for, tuned_gains, tuned_on
+from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult

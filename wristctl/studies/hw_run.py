@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import (
-    check_row,
-    identified,
-    network_for,
-    outside_conditions,
-    tuned_gains,
-    warn_outside_conditions,
-)
+from wristctl.studies.loop_inputs import check_row, identified, network_for, tuned_gains
+from wristctl.studies.loop_warnings import outside_conditions, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rig_description import describe_rig
 from wristctl.studies.session import Session

@@ -10,18 +10,8 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import (
-    check_inverses,
-    check_row,
-    identified,
-    inverses_of,
-    network_for,
-    tuned_gains,
-    warn_if_coarse,
-    warn_if_it_buckles,
-    warn_if_outside,
-    warn_outside_conditions,
-)
+from wristctl.studies.loop_inputs import check_inverses, check_row, identified, inverses_of, network_for, tuned_gains
+from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_if_outside, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult

@@ -11,14 +11,8 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import (
-    check_inverses,
-    identified,
-    inverses_of,
-    network_for,
-    warn_if_coarse,
-    warn_if_it_buckles,
-)
+from wristctl.studies.loop_inputs import check_inverses, identified, inverses_of, network_for
+from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
 from wristctl.studies.study_result import StudyResult
