@@ -6,7 +6,7 @@ STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	clean venv mutants coverage
+	worlds clean venv mutants coverage
 
 run: .venv/run
 	@set -e; \
@@ -60,6 +60,11 @@ bench-peers: .venv/run
 # Everything that docs/benchmarks.md says, measured anew, and the page.
 bench-all: .venv/run
 	$(BIN)/python benchmarks/all.py
+
+# How accurate tendon loops are, and where presets come to rest: docs/accuracy.md, docs/margins.md; fails where a preset swings.
+worlds: .venv/run
+	-$(BIN)/python docs/accuracy.py
+	$(BIN)/python docs/margins.py
 
 # Every command killed, refused and interrupted at all points, crowds of processes, 20,000 runs, a run of every kind
 # repeated, other surroundings and processors.
