@@ -22,7 +22,7 @@ from wristctl.control.response import Controlled, respond
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.report.truth_table import truth_heading
+from wristctl.report.truth_table import truth_heading, truth_tables, truth_told
 from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.kernel import run_blocks
@@ -251,6 +251,18 @@ def test_a_trials_twin_has_all_that_its_bench_has() -> None:
     assert (plant.creep, plant.end_stop_deg, plant.stiffness_scale) == (0.1, 48.0, 0.7)
     own = plant.actuator
     assert (own.backlash, own.sheath, own.torque, own.friction) == (1e-4, 2.0, 0.9, None)
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+def test_every_leaf_is_told_before_and_after_a_run(leaf: str) -> None:
+    plant = load_study([], [f"simulate.loop.plant={json.dumps(LEAVES[leaf])}"]).simulate.loop.plant
+    loops = {"own": LOOPS["tendon"].model_copy(update={"plant": plant})}
+    (table,) = truth_tables(WRIST, loops)
+    told = truth_told(WRIST, loops)
+    names = []
+    for key, each in LEAVES[leaf].items():
+        names += [f"{key}.{name}" for name in each] if isinstance(each, dict) else [key]
+    assert {row[1] for row in table.rows} == set(names) and all(f"own: {name} is" in told for name in names)
 
 
 def test_a_figure_names_what_differs() -> None:
