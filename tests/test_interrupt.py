@@ -75,3 +75,22 @@ def test_a_later_command_of_the_same_process_begins_anew(tmp_path: Path) -> None
     with start_run("simulate", Study(), out=tmp_path) as run:
         pass
     assert run.path.is_dir()
+
+
+def test_a_run_in_another_thread_goes_on_and_takes_nothing_from_the_main_one(tmp_path: Path) -> None:
+    """Only the main thread is interrupted; what it was asked is its own."""
+    made: list[Path] = []
+
+    def another() -> None:
+        with start_run("simulate", Study(), out=tmp_path) as run:
+            made.append(run.path)
+
+    with pytest.raises(KeyboardInterrupt), interrupts():
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        thread = threading.Thread(target=another)
+        thread.start()
+        thread.join()
+        with start_run("simulate", Study(), out=tmp_path):
+            pass
+    assert len(made) == 1 and [each for each in tmp_path.iterdir() if each.is_dir()] == made

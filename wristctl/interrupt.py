@@ -36,7 +36,7 @@ class Interrupts:
 
 
 _around: list[Interrupts] = []
-"""Of the block that is entered, where one is."""
+"""Of the main thread's blocks that are entered, the innermost last."""
 
 
 @contextmanager
@@ -47,6 +47,9 @@ def interrupts() -> Iterator[Interrupts]:
     `sys.unraisablehook`: with `again` for that hook it comes once more. One that a library swallows, as while it is
     imported, is known from `asked`, which a block within a block shares.
     """
+    if threading.current_thread() is not threading.main_thread():
+        yield Interrupts()
+        return
     seen = _around[-1] if _around else Interrupts()
 
     def raised(number: int, frame: FrameType | None) -> None:
