@@ -108,6 +108,26 @@ def test_the_other_side_and_the_other_plane_bend_alike(host_on: HostOn) -> None:
         assert courses[direction] == pytest.approx(sign * courses["ulnar"], abs=1e-6)
 
 
+def test_a_tendon_breaks_in_a_trial_not_while_it_is_homed_and_stays_broken(host_on: HostOn) -> None:
+    """The + side's first; the wrist then bends less, and turned to the other plane and back it is broken still."""
+    broken = StepperActuator(broken_at=0.3)
+    host = host_on(BenchSettings(motors=TAUT, actuator=broken))
+    host.reel(BEND)
+    host.rest(1.0)
+    before = host.bench.truth()
+    assert before.pull[-1].min() > 1.0, "it has been on for longer than 0.3 s"
+    host.bench.begin(host.bench.transport.now(), Disturbances())
+    host.rest(1.0)
+    after = host.bench.truth()
+    assert (after.pull[-1] == 0.0).tolist() == [False, False, True, False]
+    assert after.angle[-1] < before.angle[-1] - 1e-3
+    host.bench.face("flexion")
+    host.bench.face("ulnar")
+    host.bench.begin(host.bench.transport.now(), Disturbances())
+    host.rest(0.2)
+    assert host.bench.truth().pull[-1, 2] == 0.0
+
+
 def test_tendons_only_pull_and_a_slack_one_not_at_all(host_on: HostOn) -> None:
     host = host_on()
     host.reel((-400, -400, 100, 100))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,7 @@ class BenchWrist:
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
-        self.disturb(Disturbances(), 0.0)
+        self.disturb(Disturbances(), math.inf)  # no trial yet: nothing breaks while it is homed
         self._face("ulnar")
 
     @property

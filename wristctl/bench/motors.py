@@ -141,11 +141,9 @@ def follow(
 ) -> int:
     """Advance spools and wrist by a period for each row (tip force, stiffness scale) of `acting`; the edges used up.
 
-    Tendons break and slip so long after `start` [s].
-
     `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on. A row of
-    `out` is what is so at a period's end: coordinates, rates; and what was in its middle, and held throughout: pulls,
-    reeled lengths.
+    `out` is what is so at a period's end: coordinates, rates; and what was in its middle: pulls at the spools, reeled
+    lengths. Tendons break and slip so long after `start` [s].
     """
     undisturbed = parameters_of(hanging.model, rows_of(hanging.values))
     motor, sides = hanging.motor, hanging.sides
