@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller
 from wristctl.lanes.blocks import lanes_of, spread
@@ -79,7 +80,7 @@ def batch(
     rest = np.zeros((len(worlds), k)) if start is None else np.array([start(each) for each in actual])
     actuators = [each.actuator for each in worlds]
     counted = [counted_motor(each.loop.actuator, own) for each, own in zip(worlds, actuators, strict=True)]
-    windings = [_winding(each) for each in worlds]
+    windings = [_winding(each, own) for each, own in zip(worlds, actuators, strict=True)]
     step = period / loop.steps
     nonideals = [
         nonideal_of(each.loop.plant, own, each.loop.plant.actuator, step)
@@ -186,9 +187,9 @@ def _watch(
     return Watch(np.ascontiguousarray(by_block), pictures, turn, observer), frames
 
 
-def _winding(world: World) -> Winding:
+def _winding(world: World, actual: Actuator) -> Winding:
     pull = TENDONS_PER_SIDE * world.wrist.pretension
-    return winding_of(world.loop.actuator, world.actuator, pull, world.loop.plant.actuator.creep)
+    return winding_of(world.loop.actuator, actual, pull, world.loop.plant.actuator.creep)
 
 
 def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:

@@ -56,11 +56,11 @@ def hw_run(session: Session) -> Performed:
 
     study, bench = session.study, session.study.wrist
     known = replace(session, study=identified(study, "hw-run", session.inputs))
-    network = network_for(session.inputs, known.study.wrist, [known.study.hw_run.loop])
-    tuned = tuned_gains(session.inputs)
-    if study.hw_run.port is None:
-        warn_outside_conditions(study.hw_run.rows, [study.hw_run.loop])
-    elif swinging := outside_conditions(study.hw_run.rows, [study.hw_run.loop]):
+    believed = known.study.hw_run
+    network, tuned = network_for(session.inputs, known.study.wrist, [believed.loop]), tuned_gains(session.inputs)
+    if believed.port is None:
+        warn_outside_conditions(believed.rows, [believed.loop])
+    elif swinging := outside_conditions(believed.rows, [believed.loop]):
         session.operator.dare("; ".join(swinging))
     trials = perform_trials(known, bench, network, tuned)
     tables, twins = trial_tables(known, trials, network, tuned)

@@ -44,7 +44,7 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
         law = controller(name)
         stated = law.conditions.get(preset)
         if real and stated is None:
-            instead = f"; {', '.join(law.conditions)} is" if law.conditions else ""
+            instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
             found.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
         for loop in real:
             if stated and (told := _outside(stated, loop)):
