@@ -19,8 +19,8 @@ from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.elastic import Tendons, pulls_at_start, read_nonideal
-from wristctl.wrist.moving import advance_or_stop, path_before
-from wristctl.wrist.plant import disturbed, parameters_of, tip_angle
+from wristctl.wrist.moving import advance_or_stop
+from wristctl.wrist.plant import disturbed, parameters_of, path_before, tip_angle
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 

@@ -116,68 +116,39 @@ def _at_wrist(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, z: Any
 
 
 @compiled
-def _pull(tendons: Any, nonideal: Any, given: Any, t: int, path: Any) -> Any:
+def _as_it_was(nonideal: Any, state: Any, t: int, x: Any) -> Any:
+    return state[row_of(t, _Z)]
+
+
+@compiled
+def _pull(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, bristle_of: Any) -> Any:
     x = path[t % 2]
     if nonideal is None:
         return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
-    return _at_wrist(tendons, nonideal, given, t, path, _slid(nonideal, tendons.state, t, x))
+    return _at_wrist(tendons, nonideal, given, t, path, bristle_of(nonideal, tendons.state, t, x))
 
 
 @compiled
-def _pull_at_start(tendons: Any, nonideal: Any, given: Any, t: int, path: Any) -> Any:
-    x = path[t % 2]
-    if nonideal is None:
-        return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
-    return _at_wrist(tendons, nonideal, given, t, path, tendons.state[row_of(t, _Z)])
-
-
-@compiled
-def path_of(tendons: Any, segment: Any, theta: Any) -> Any:
-    """`travel` where it matters."""
+def _pulls(tendons: Any, given: Any, path: Any, bristle_of: Any) -> Any:
     if tendons is None:
-        zero = 0.0 * segment.length
-        return zero, zero, zero
-    return travel(segment, theta)
-
-
-@compiled
-def path_at_start(tendons: Any, segment: Any, theta: Any) -> Any:
-    """The same at the start of a step, where it may be known."""
-    if tendons is None:
-        zero = 0.0 * segment.length
-        return zero, zero, zero
-    return _known(tendons.state, segment, theta)
-
-
-@compiled
-def _known(state: Any, segment: Any, theta: Any) -> Any:
-    if state is None:
-        return travel(segment, theta)
-    return state[0], state[1], state[2]
+        return given[0], given[1]
+    plus, minus = 0.0 * path[0], 0.0 * path[0]
+    for t in range(0, len(given), 2):
+        plus = plus + _pull(tendons, tendons.nonideal, given, t, path, bristle_of)
+        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path, bristle_of)
+    return plus, minus
 
 
 @compiled
 def pulls_along(tendons: Any, given: Any, path: Any) -> Any:
     """Pulls [N] of both sides at the wrist at a path (plus, minus, bend); those given where `tendons` is None."""
-    if tendons is None:
-        return given[0], given[1]
-    plus, minus = 0.0 * path[0], 0.0 * path[0]
-    for t in range(0, len(given), 2):
-        plus = plus + _pull(tendons, tendons.nonideal, given, t, path)
-        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path)
-    return plus, minus
+    return _pulls(tendons, given, path, _slid)
 
 
 @compiled
 def pulls_at_start(tendons: Any, given: Any, path: Any) -> Any:
     """The same at the start of a step, where no tendon has slid yet."""
-    if tendons is None:
-        return given[0], given[1]
-    plus, minus = 0.0 * path[0], 0.0 * path[0]
-    for t in range(0, len(given), 2):
-        plus = plus + _pull_at_start(tendons, tendons.nonideal, given, t, path)
-        minus = minus + _pull_at_start(tendons, tendons.nonideal, given, t + 1, path)
-    return plus, minus
+    return _pulls(tendons, given, path, _as_it_was)
 
 
 @compiled

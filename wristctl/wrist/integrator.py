@@ -16,9 +16,10 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords, chords
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import path_at_start, path_of, pulls_along, pulls_at_start, stiffen
+from wristctl.wrist.elastic import pulls_along, pulls_at_start, stiffen
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
+from wristctl.wrist.plant import path_along, path_before
 from wristctl.wrist.tendons import tendon_torques
 from wristctl.wrist.yielding import yield_, yield_jacobians
 
@@ -39,7 +40,7 @@ def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any
 @compiled
 def _accelerations(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, mass: Any, a: Any) -> None:
     """-theta'' into `a`, with `mass` to work on."""
-    plus, minus = pulls_along(tendons, given, path_of(tendons, segment, theta))
+    plus, minus = pulls_along(tendons, given, path_along(tendons, segment, theta))
     equation_of_motion(segment, theta, omega, plus, minus, mass, a)
     yield_(tendons, segment, theta, omega, given, a)
     factorise(mass)
@@ -63,7 +64,7 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
     at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
 
     tangent = chords(theta, segment.length, arc)
-    path = path_at_start(tendons, segment, theta)
+    path = path_before(tendons, segment, theta)
     plus, minus = pulls_at_start(tendons, given, path)
     tendon_torques(theta, segment, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)

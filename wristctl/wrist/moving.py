@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.lanes.compiled import compiled, spelled_out
+from wristctl.lanes.compiled import spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import lanes_like
 from wristctl.wrist.elastic import settle
-from wristctl.wrist.plant import advance, travel, within
+from wristctl.wrist.plant import advance, path_along, within
 
 
 @spelled_out
@@ -25,28 +25,3 @@ def advance_or_stop(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: 
         rate[i] = where(alive > zero, rate[i], zero)
     settle(tendons, q, given, path_along(tendons, plant, q))
     return alive
-
-
-@compiled
-def path_along(tendons: Any, plant: Any, q: Any) -> Any:
-    """A plant's `travel` where it matters."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
-    return travel(plant, q)
-
-
-@compiled
-def path_before(tendons: Any, plant: Any, q: Any) -> Any:
-    """The same before a step, where it may be known."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
-    return _known(tendons.state, plant, q)
-
-
-@compiled
-def _known(state: Any, plant: Any, q: Any) -> Any:
-    if state is None:
-        return travel(plant, q)
-    return state[0], state[1], state[2]

@@ -25,7 +25,7 @@ from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import kernel
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.lane import dot, planar
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
@@ -167,6 +167,31 @@ def _by_plant(function: Any) -> None:
 
 for _function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
     _by_plant(_function)
+
+
+@compiled
+def path_along(tendons: Any, plant: Any, q: Any) -> Any:
+    """A plant's `travel` where it matters."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return travel(plant, q)
+
+
+@compiled
+def path_before(tendons: Any, plant: Any, q: Any) -> Any:
+    """The same before a step, where it may be known."""
+    if tendons is None:
+        zero = 0.0 * q[0]
+        return zero, zero, zero
+    return _known(tendons.state, plant, q)
+
+
+@compiled
+def _known(state: Any, plant: Any, q: Any) -> Any:
+    if state is None:
+        return travel(plant, q)
+    return state[0], state[1], state[2]
 
 
 @cache
