@@ -15,6 +15,7 @@ from wristctl.identification.identifiability import widest, width_text
 from wristctl.identification.intervals import condition, promised
 from wristctl.identification.measured_trials import measured_trials
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.identification.unknowns import UNKNOWNS, believed_of
 
 HERE = Path(__file__).parent
 UPRIGHT = WristParameters()
@@ -42,12 +43,10 @@ def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, f
     for number, pose in enumerate(poses):
         wrist = pose.model_copy(update={"stiffness": 0.7 * pose.stiffness})
         truth, rng = RehearsedTruth(wrist, actuator), np.random.default_rng(number)
-        tables = rehearse(pose, truth, [(side, moves) for side in SIDES], 5.0, rng)
+        tables = rehearse(pose, actuator, truth, [(side, moves) for side in SIDES], 5.0, rng)
         length, label = actuator.step_length, f"run {number}"
         trials += measured_trials(label, pose, length, settings.step, *tables, exposure=truth.exposure)
-    start = {name: getattr(wrist, name) for name in ("stiffness", "damping", "tendon_radius")}
-    tendons = {"tendon_stiffness": actuator.tendon_stiffness, "friction": actuator.friction}
-    problem = Problem(trials, start | tendons | {"delay": truth.delay}, settings)
+    problem = Problem(trials, believed_of(wrist, actuator) | {"delay": truth.delay}, settings, actuator)
     slopes, weights = [each / NOISE for each in linearise(problem, problem.begin()).slopes], problem.prior()
     half = promised(problem, slopes)
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
@@ -60,7 +59,7 @@ def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, f
 
 
 def main() -> None:
-    heads = "stiffness", "damping", "tendon stiffness", "friction", "delay", "tendon radius", "condition"
+    heads = *(name.replace("_", " ") for name in UNKNOWNS), "condition"
     lines = [f"| experiment | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
     lines += [f"| {name} | {' | '.join(row(*experiment))} |" for name, experiment in EXPERIMENTS.items()]
     (HERE / "identifiability.md").write_text(

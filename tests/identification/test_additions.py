@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identification.benches import KNOWN, LEVEL, START, UPRIGHT
+from tests.identification.benches import KNOWN, LEVEL, START, TENDONS, UPRIGHT
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification import identifiability
@@ -24,9 +24,6 @@ from wristctl.identification.identifiability import (
     widest,
     width_text,
 )  # fmt: skip
-from wristctl.identification.identifiability import (
-    KNOWN as BELIEVED,
-)
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import UNKNOWNS
@@ -37,6 +34,8 @@ HALF = {
     "damping": 0.1,
     "tendon_stiffness": 0.1,
     "friction": 0.05,
+    "sheath_friction": 0.05,
+    "presliding": 2.0,
     "delay": 1e-3,
     "tendon_radius": 0.1,
 }
@@ -55,14 +54,14 @@ def at(
     half: Mapping[str, float] | None = None, moved: Mapping[str, float] | None = None, condition: float = 10.0
 ) -> dict[str, float]:
     """What is not identified of a fit at its start, but `moved` coordinates, known to half widths HALF but these."""
-    problem = Problem([trial()], START, IdentifySettings())
+    problem = Problem([trial()], START, IdentifySettings(), TENDONS)
     x = problem.begin()
     for name, value in (moved or {}).items():
         x[problem.free.index(name)] = value
     deviation = np.zeros(len(x))
-    deviation[:6] = np.array([(HALF | dict(half or {}))[name] for name in problem.free]) / 1.959964
+    deviation[: len(problem.free)] = np.array([(HALF | dict(half or {}))[name] for name in problem.free]) / 1.959964
     fitted = Fit(problem, x, 1e-3, [np.zeros(95)], [np.zeros((95, len(x)))], 1)
-    return not_identified(fitted, Knowledge(deviation, np.eye(len(x)), condition, 0.0, 95.0))
+    return not_identified(fitted, Knowledge(deviation, np.eye(len(x)), condition, 0.0, 95.0, np.zeros(len(x))))
 
 
 def test_an_interval_may_be_a_quarter_of_the_value_wide_to_either_side() -> None:
@@ -78,7 +77,10 @@ def test_what_is_known_too_badly_is_named_with_its_half_width() -> None:
     for name, limit in (("stiffness", np.log(1.25)), ("friction", 0.1), ("delay", 5e-3)):
         assert at({name: 1.001 * limit}) == pytest.approx({name: 1.001 * limit}, rel=1e-5)
         assert at({name: 0.999 * limit}) == {}
-    assert list(at(condition=1001.0)) == list(UNKNOWNS) and at(condition=999.0) == {}
+    assert (
+        list(at(condition=1001.0)) == [name for name in UNKNOWNS if name != "flexion_ratio"]
+        and at(condition=999.0) == {}
+    )
 
 
 def test_a_value_at_the_edge_of_the_search_is_not_found_but_no_friction_is_friction() -> None:
@@ -134,49 +136,51 @@ def test_the_first_offer_that_is_enough_is_advised_and_else_more_of_the_best() -
     refuse({}, [], 1e9, START)
 
 
-HELD = {name: START[name] for name in UNKNOWNS if name not in ("stiffness", "delay")}
+BELIEVED = {
+    "mass of the hand": "hand_mass", "distance of the hand's centre of mass": "hand_offset",
+    "length of the wrist": "length", "mass of the wrist": "mass",
+}  # fmt: skip
+HELD = {name: START[name] for name in UNKNOWNS if name not in ("stiffness", "delay")} | {"friction": 0.0}
 QUICK = {"fix": HELD, "segments": 1, "step": 5e-3, "clock_error": 0.0}
 
 
 def simulated(wrist: object, truth: dict[str, float]) -> MeasuredTrial:
     """A trial that shows what the model expects at `truth`."""
     blank = trial(wrist)
-    problem = Problem([blank], START | truth, IdentifySettings.model_validate(QUICK))
+    problem = Problem([blank], START | truth, IdentifySettings.model_validate(QUICK), TENDONS)
     course = problem.simulate(blank, [problem.candidate(blank, problem.begin())])[0]
     noise = 2e-4 * np.random.default_rng(0).standard_normal(len(blank.captured))
     return replace(blank, angle=blank.shown(course, truth["delay"]) + noise)
 
 
 def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> None:
-    """The trials fitted again with 1 % more, or in a pose turned by 1 deg; friction makes slopes jump by some 1e-3."""
+    """The trials fitted again with 1 % more, or on a base that leans by 1 deg."""
     truth = {"stiffness": 0.9 * START["stiffness"], "delay": 0.02}
     trials = [simulated(LEVEL, truth), replace(simulated(UPRIGHT, truth), run="b")]
     settings = IdentifySettings.model_validate(QUICK)
-    fitted = fit(Problem(trials, START, settings))
+    fitted = fit(Problem(trials, START, settings, TENDONS))
     assert fitted.values["stiffness"] == pytest.approx(truth["stiffness"], rel=0.03)
     moved = budget(fitted, knowledge(fitted))
-    assert set(moved) == set(BELIEVED)
-    for name in BELIEVED:
+    leaves = {f"1 % more {what}": leaf for what, leaf in BELIEVED.items()} | {"a base that leans by 1 deg": "gravity"}
+    assert set(moved) == set(leaves)
+    for name, leaf in leaves.items():
         changed = []
         for each in trials:
             along, across = each.wrist.gravity
             c, s = np.cos(np.radians(1.0)), np.sin(np.radians(1.0))
-            new = (
-                (along * c - across * s, across * c + along * s)
-                if name == "gravity"
-                else 1.01 * getattr(each.wrist, name)
-            )
-            changed.append(replace(each, wrist=each.wrist.model_copy(update={name: new})))
-        again = fit(Problem(changed, START, settings))
+            leaning = along * c + across * s, across * c - along * s
+            new = leaning if leaf == "gravity" else 1.01 * getattr(each.wrist, leaf)
+            changed.append(replace(each, wrist=each.wrist.model_copy(update={leaf: new})))
+        again = fit(Problem(changed, START, settings, TENDONS))
         for at_, free in enumerate(fitted.problem.free):
             step = again.x[at_] - fitted.x[at_]
-            assert moved[name][free] == pytest.approx(step, rel=0.15, abs=1e-3), (name, free)
+            assert moved[name][free] == pytest.approx(step, rel=0.2, abs=2e-4), (name, free)
 
 
 def test_added_trials_are_reckoned_at_the_start_of_what_is_not_known() -> None:
     """The same widths whatever value a parameter took that the trials do not tell."""
     settings = IdentifySettings.model_validate(QUICK)
-    problem = Problem([simulated(LEVEL, {"stiffness": START["stiffness"], "delay": 0.0})], START, settings)
+    problem = Problem([simulated(LEVEL, {"stiffness": START["stiffness"], "delay": 0.0})], START, settings, TENDONS)
     here = fit(problem)
     x = here.x.copy()
     x[problem.free.index("stiffness")] += 1.0
@@ -201,14 +205,14 @@ def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.M
 
     settings = IdentifySettings.model_validate(QUICK)
     own = simulated(UPRIGHT, {"stiffness": START["stiffness"], "delay": 0.0})
-    problem = Problem([own], START, settings)
+    problem = Problem([own], START, settings, TENDONS)
     found = replace(fit(problem), noise=1e-3)
     monkeypatch.setattr(identifiability, "linearise", spy)
     assert [each.what for each in additions(found, {})] == list(ADDITIONS)
 
     def course(trial: MeasuredTrial) -> np.ndarray:
         wrist = trial.wrist.model_copy(update={"stiffness": found.values["stiffness"]})
-        supposed = SupposedWrist(wrist, START["tendon_stiffness"], START["friction"])
+        supposed = SupposedWrist(wrist, TENDONS)
         bent: np.ndarray = problem.simulate(trial, [supposed])[0]
         return bent
 
@@ -227,7 +231,7 @@ def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.M
 
 def test_an_addition_is_enough_where_it_identifies_every_parameter() -> None:
     settings = IdentifySettings.model_validate(QUICK)
-    fitted = fit(Problem([simulated(LEVEL, {"stiffness": START["stiffness"], "delay": 0.0})], START, settings))
+    fitted = fit(Problem([simulated(LEVEL, {"stiffness": START["stiffness"], "delay": 0.0})], START, settings, TENDONS))
     mixed = 0
     for noise in np.geomspace(1e-4, 1.0, 13):
         for each in additions(replace(fitted, noise=float(noise)), {}):

@@ -33,5 +33,5 @@ def test_a_delay_stays_within_what_a_simulated_camera_may_have() -> None:
 
 
 def test_residuals_that_resemble_their_neighbours_speak_against_the_model() -> None:
-    known = Knowledge(np.ones(1), np.eye(1), 1.0, 0.1, 100.0)
+    known = Knowledge(np.ones(1), np.eye(1), 1.0, 0.1, 100.0, np.zeros(1))
     assert not known.misses_something and replace(known, autocorrelation=0.5).misses_something

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.identification.benches import KNOWN, LEVEL
+from tests.identification.benches import KNOWN, LEVEL, tendons
 from wristctl.arrays import Array
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.wrist.statics import equilibrium
@@ -20,14 +20,14 @@ def held(plus: float, minus: float, steps: int = 200) -> Array:
 def test_a_wrist_is_at_rest_on_its_first_spool_positions() -> None:
     """Level, where gravity bends it: no angle moves while the spools stand."""
     soft = LEVEL.model_copy(update={"stiffness": 0.8})
-    course = angles([SupposedWrist(soft, STIFF, 0.1)], held(2e-4, 2e-4), STEP, 4)[0]
+    course = angles([SupposedWrist(soft, tendons(STIFF, 0.1))], held(2e-4, 2e-4), STEP, 4)[0]
     assert abs(course[0]) > 1e-3 and np.ptp(course) < 0.01 * abs(course[0])
 
 
 def test_the_pull_is_what_a_tendon_is_stretched_by() -> None:
     """Without friction: k times what is reeled in more than the path is shorter by, and never a push."""
     plus, minus = 1.2e-3, 1e-4
-    bent = angles([SupposedWrist(KNOWN, STIFF, 0.0)], held(plus, minus, 600), STEP, 4)[0, -1]
+    bent = angles([SupposedWrist(KNOWN, tendons(STIFF, 0.0))], held(plus, minus, 600), STEP, 4)[0, -1]
     arm = KNOWN.tendon_offset
     pulls = [max(0.0, STIFF * (reeled - sign * arm * bent)) for reeled, sign in ((plus, 1.0), (minus, -1.0))]
     assert bent == pytest.approx(equilibrium(KNOWN, 4, (pulls[0], pulls[1])).sum(), rel=0.02)
@@ -37,7 +37,7 @@ def test_the_pull_is_what_a_tendon_is_stretched_by() -> None:
 def test_mirrored_spools_bend_the_upright_wrist_the_other_way() -> None:
     swing = 1e-3 * np.sin(np.linspace(0.0, 3.0, 200))
     reeled = 3e-4 + np.stack([swing, swing, -swing, -swing], axis=1)
-    candidate = SupposedWrist(KNOWN, STIFF, 0.1)
+    candidate = SupposedWrist(KNOWN, tendons(STIFF, 0.1))
     one, other = (angles([candidate], each, STEP, 4)[0] for each in (reeled, reeled[:, [2, 3, 0, 1]]))
     assert np.abs(one).max() > 0.02
     np.testing.assert_allclose(other, -one, atol=1e-9)
@@ -49,9 +49,9 @@ def test_each_candidate_is_as_it_would_be_alone_and_its_own_tautness_counts_as_r
     reeled = held(6e-4, 2e-4)
     taut = (1e-4, -5e-5, 2e-4, 3e-5)
     candidates = [
-        SupposedWrist(KNOWN, STIFF, 0.1),
-        SupposedWrist(LEVEL, 5e3, 0.0),
-        SupposedWrist(KNOWN, STIFF, 0.1, taut),
+        SupposedWrist(KNOWN, tendons(STIFF, 0.1)),
+        SupposedWrist(LEVEL, tendons(5e3, 0.0)),
+        SupposedWrist(KNOWN, tendons(STIFF, 0.1), taut),
     ]
     together = angles(candidates, reeled, STEP, 4)
     assert together.shape == (3, 200)

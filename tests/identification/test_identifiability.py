@@ -27,7 +27,7 @@ def slow() -> Slow:
 
 def test_slow_upright_moves_tell_neither_scale_nor_damping_and_the_refusal_says_what_would(slow: Slow) -> None:
     fitted, known, lacking = slow
-    assert {"stiffness", "damping", "tendon_stiffness"} <= set(lacking)
+    assert {"stiffness", "damping"} <= set(lacking)
     offered = additions(fitted, lacking)
     assert any(each.enough for each in offered)
     with pytest.raises(UserError, match=r"stiffness.*condition number.*add .*fix\.") as refused:
@@ -59,7 +59,10 @@ def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay()
     trials, _ = logged(3, poses=(LEVEL,), directions=("ulnar",))
     fitted = fit(problem(trials))
     moved = budget(fitted, knowledge(fitted))
-    heavier = {name: moved["hand_mass"][name] + moved["mass"][name] for name in fitted.problem.free}
+    heavier = {
+        name: moved["1 % more mass of the hand"][name] + moved["1 % more mass of the wrist"][name]
+        for name in fitted.problem.free
+    }
     for name in ("stiffness", "damping", "tendon_stiffness"):
         assert heavier[name] == pytest.approx(0.01, rel=0.05)
     assert abs(heavier["delay"]) < 1e-6

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identification.benches import KNOWN, START
+from tests.identification.benches import KNOWN, START, TENDONS
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem
@@ -39,7 +39,7 @@ def trial(frames: int, run: str = "a") -> MeasuredTrial:
 def ended(slopes: list[Array], residuals: list[Array], **settings: object) -> Fit:
     """A fit that ended at its start with these slopes and residuals, each trial a run."""
     given = IdentifySettings.model_validate({"fix": HELD, "clock_error": 0.0} | settings)
-    problem = Problem([trial(len(each), f"run {k}") for k, each in enumerate(slopes)], START, given)
+    problem = Problem([trial(len(each), f"run {k}") for k, each in enumerate(slopes)], START, given, TENDONS)
     return Fit(problem, problem.begin(), NOISE, residuals, slopes, 1)
 
 
@@ -164,7 +164,7 @@ def test_an_interval_lies_about_the_value_in_its_own_unit() -> None:
     fitted = ended([np.ones((40, 8))], [np.ones(40)])
     x = fitted.x.copy()
     x[:3] = 0.2, 0.3, 0.04
-    known = Knowledge(np.array([0.1, 0.01, 0.002, 0, 0, 0, 0, 0]) / 1.959964, np.eye(8), 1.0, 0.0, 1.0)
+    known = Knowledge(np.array([0.1, 0.01, 0.002, 0, 0, 0, 0, 0]) / 1.959964, np.eye(8), 1.0, 0.0, 1.0, np.zeros(8))
     found = replace(fitted, x=x)
     assert interval(found, known, "stiffness") == pytest.approx(tuple(START["stiffness"] * np.exp([0.1, 0.3])))
     assert interval(found, known, "friction") == pytest.approx((0.29, 0.31))

@@ -26,7 +26,7 @@ Tables = tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]
 def rehearsed(
     truth: RehearsedTruth = TRUE, seed: int = 0, moves: Sequence[tuple[DirectionName, Reference]] = MOVES
 ) -> Tables:
-    return rehearse(LEVEL, truth, moves, 5.0, np.random.default_rng(seed))
+    return rehearse(LEVEL, TENDONS, truth, moves, 5.0, np.random.default_rng(seed))
 
 
 def of(table: pd.DataFrame, trial: int, name: str) -> np.ndarray:
@@ -71,7 +71,7 @@ def test_pictures_show_the_true_wrist_a_delay_ago_and_the_markers_zero_of_its_pl
     taut = {"radial": (3e-4, -4e-4, 1e-4, -2e-4), "flexion": (-2e-4, -4e-4, 1e-4, 3e-4)}
     for number, (direction, zero) in enumerate((("radial", 3.0), ("flexion", -5.0))):
         reeled = rehearsal.spools(in_plane(LEVEL, direction), toward(STEPS, direction), TENDONS, 5.0)  # type: ignore[arg-type]
-        own = SupposedWrist(in_plane(SOFT, direction), TENDONS.tendon_stiffness, TENDONS.friction, taut[direction])
+        own = SupposedWrist(in_plane(SOFT, direction), TENDONS, taut[direction])
         course = angles([own], np.repeat(reeled, 2, axis=1), 1e-3, 4)[0]
         then = of(frames, number, "captured") - 0.02
         wanted = np.interp(then, 1e-3 * np.arange(5000), course) + np.radians(zero)

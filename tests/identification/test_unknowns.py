@@ -13,7 +13,7 @@ from tests.values import changeable
 from wristctl.config.identify import Fixed
 from wristctl.config.load import load_study
 from wristctl.identification.identified import identified_yaml, with_identified
-from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
+from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, tendons_of_values
 
 LOGARITHMS = {name for name, each in UNKNOWNS.items() if each.log}
 
@@ -27,15 +27,16 @@ def test_the_table_holds_what_a_study_may_fix_and_all_but_the_delay_is_simulated
 
 
 def test_what_must_be_positive_is_searched_by_factors_as_far_down_as_up() -> None:
-    assert set(UNKNOWNS) - {"friction", "delay"} == LOGARITHMS
+    assert set(UNKNOWNS) - {"friction", "sheath_friction", "delay"} == LOGARITHMS
     for name in LOGARITHMS:
         low, high = UNKNOWNS[name].bounds()
         assert low == pytest.approx(-high) and high > 0.2
         assert UNKNOWNS[name].coordinate(3.0, 3.0) == 0.0
         assert UNKNOWNS[name].value(low, 2.0) == pytest.approx(2.0 * UNKNOWNS[name].low)
-        assert UNKNOWNS[name].tolerance == 1.0, "a relative width"
+        assert UNKNOWNS[name].tolerance == (math.inf if name == "presliding" else 1.0), "a relative width"
     wide = {name: UNKNOWNS[name].high for name in LOGARITHMS}
-    assert wide == {"stiffness": 20.0, "damping": 50.0, "tendon_stiffness": 20.0, "tendon_radius": 1.25}
+    own = {"stiffness": 20.0, "flexion_ratio": 5.0, "damping": 50.0, "tendon_stiffness": 20.0}
+    assert wide == own | {"tendon_radius": 1.25, "presliding": 10.0}
 
 
 def test_friction_and_delay_are_searched_as_they_are() -> None:
@@ -55,7 +56,10 @@ def test_value_and_coordinate_undo_each_other(name: str) -> None:
             assert at == pytest.approx(np.log(value) - np.log(0.9))
 
 
-FOUND = {"stiffness": 0.11, "damping": 0.22, "tendon_radius": 0.033, "tendon_stiffness": 44e3, "friction": 0.055}
+FOUND = {
+    "stiffness": 0.11, "damping": 0.22, "tendon_radius": 0.033, "tendon_stiffness": 44e3, "friction": 0.055,
+    "flexion_ratio": 1.2, "sheath_friction": 0.11, "presliding": 3e-5,
+}  # fmt: skip
 CAMERA = {"frame_rate": 50.0, "delay_frames": 2.5, "noise_deg": 0.07, "dropped": 0.125}
 
 
@@ -66,6 +70,7 @@ def test_what_was_identified_is_a_study_that_simulates_it() -> None:
         changed = with_identified(study, command, text)
         wrist = changed.wrist
         assert (wrist.stiffness, wrist.damping, wrist.tendon_radius) == (0.11, 0.22, 0.033) and changed.seed == 3
+        assert wrist.flexion_ratio == 1.2
         settings = getattr(changed, command)
         loops = [settings.loop] if command == "simulate" else settings.loops.values()
         before = getattr(study, command)
@@ -73,6 +78,7 @@ def test_what_was_identified_is_a_study_that_simulates_it() -> None:
         assert len(loops) == len(old) > 0
         for loop, was in zip(loops, old, strict=True):
             assert (loop.actuator.tendon_stiffness, loop.actuator.friction) == (44e3, 0.055)
+            assert (loop.actuator.sheath, loop.actuator.presliding) == (pytest.approx(2.0), 3e-5)
             assert {name: getattr(loop.sensor, name) for name in CAMERA} == CAMERA
             assert (
                 (loop.actuator.level, loop.sensor.level) == (was.actuator.level, was.sensor.level) == ("ideal", "ideal")
@@ -86,6 +92,13 @@ def test_the_identified_study_itself_has_tendons_and_a_camera(tmp_path: Path) ->
     loop = load_study([file]).simulate.loop
     assert (loop.actuator.level, loop.sensor.level) == ("tendon", "camera")
     assert loop.actuator.friction == 0.055 and loop.sensor.noise_deg == 0.07
+
+
+def test_sheaths_may_have_friction_where_a_bend_adds_none() -> None:
+    """Friction of a straight and of a bent wrist's tendons stay what they were found."""
+    own = tendons_of_values(FOUND | {"friction": 0.0})
+    assert own["friction"] < 1e-6 and own["friction"] * own["sheath"] == pytest.approx(0.11)
+    assert tendons_of_values(FOUND | {"sheath_friction": 0.0})["sheath"] == 0.0
 
 
 def test_what_identification_hands_out_cannot_be_changed() -> None:

@@ -15,7 +15,7 @@ import pytest
 from tests.bench.conftest import TAUT, HostOn, host_on
 from wristctl.config.bench import BenchSettings, WeakenedPlant
 from wristctl.config.loop import DirectionName, Loop, Reference
-from wristctl.config.plant import Actuator, Disturbances, Plant
+from wristctl.config.plant import Actuator, Disturbances, Plant, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
@@ -153,9 +153,10 @@ def test_on_the_bench_it_comes_to_rest_and_the_other_side_is_its_mirror_image(
 
 def test_a_rehearsal_logs_it_as_it_moves(model: PlantModel) -> None:
     """A perfect camera sees the plant's angle; the same move to the other side is its mirror image."""
-    truth = RehearsedTruth(WRIST, Actuator(level="tendon"), 0.0, 0.0, exposure=0.0, dropped=0.0, plant=model.name)
+    own = TrueWrist(model=model.name)
+    truth = RehearsedTruth(WRIST, Actuator(level="tendon"), 0.0, 0.0, exposure=0.0, dropped=0.0, plant=own)
     moves: list[tuple[DirectionName, Reference]] = [("ulnar", Reference()), ("radial", Reference())]
-    log, frames, trials = rehearse(WRIST, truth, moves, 2.0, np.random.default_rng(1))
+    log, frames, trials = rehearse(WRIST, truth.actuator, truth, moves, 2.0, np.random.default_rng(1))
     assert list(trials["direction"]) == ["ulnar", "radial"] and set(frames["verdict"]) == {"ok"}
     there, back = (frames[frames["trial"] == k] for k in range(2))
     assert 0.2 < there["theta"].iloc[-1] < 1.0

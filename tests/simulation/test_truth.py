@@ -25,11 +25,12 @@ from wristctl.lanes.rows import rows_of
 from wristctl.report.truth_table import truth_heading, truth_tables, truth_told
 from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
+from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import _advance
-from wristctl.simulation.worlds import World, mismatches, plant_of
+from wristctl.simulation.worlds import World, facing, mismatches, plant_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.statics import equilibrium
@@ -43,6 +44,7 @@ LOOPS = {
 }
 LEAVES: dict[str, dict[str, Any]] = {
     **{name: {name: "x1.03"} for name in ("length", "mass", "hand_mass", "hand_offset", "stiffness", "damping")},
+    "flexion_ratio": {"flexion_ratio": "x1.15"},
     "tendon_radius": {"tendon_radius": "x1.03"},
     "by value": {"stiffness": 0.5, "tendon_radius": 0.0195},
     "tendon_stiffness": {"actuator": {"tendon_stiffness": "x0.5"}},
@@ -84,6 +86,7 @@ STILL = {
     },
     ("lagged", "step_acceleration"): "motors change their pull at once there, no faster than the steps come",
     ("tendon", "lag"): "a stepper has none",
+    **{(level, "flexion_ratio"): "the motion is in the other plane" for level in ("tendon", "lagged")},
 }
 """Leaves that are of another level, with the reason."""
 COLUMNS = {"theta": 0, "torque_wanted": 2, "tension_plus": 4, "tension_minus": 5, "seen": 8}
@@ -168,6 +171,33 @@ def test_a_leaf_moves_the_wrist_and_the_controller_knows_only_its_frames_and_ste
     for number, name in enumerate(("torque_wanted", "tension_plus", "tension_minus")):
         own_side = again[:, number] / (TENDONS_PER_SIDE if number else 1.0)
         assert own_side.tobytes() == column(actual, name).tobytes()
+
+
+def test_each_plane_has_its_own_truth() -> None:
+    """What is stiffer toward flexion alone is there what is stiffer everywhere, and elsewhere as ever."""
+    loop = LOOPS["tendon"]
+
+    def course(direction: str, **plant: Any) -> bytes:
+        own = loop.model_copy(update={"plant": Plant(**plant)})
+        chosen = {"direction": direction, "loop": own, "horizon": 0.3, "controller": "smc-tracking", "gains": "camera"}
+        study = load_study()
+        done = simulate(study.model_copy(update={"simulate": study.simulate.model_copy(update=chosen)}))
+        return done.first.trajectory.theta.tobytes()
+
+    for flexion, ulnar in (("flexion", "ulnar"), ("extension", "radial")):
+        assert course(flexion, flexion_ratio=1.25) == course(flexion, stiffness="x1.25") != course(flexion)
+        assert course(flexion, flexion_ratio=1.25, stiffness="x0.8") == course(flexion)
+        assert course(ulnar, flexion_ratio=1.25) == course(ulnar)
+
+
+def test_a_plane_is_faced_with_what_is_believed_of_it_and_true_of_it() -> None:
+    believed = WRIST.model_copy(update={"flexion_ratio": 1.5, "gravity": (-3.0, 5.0), "gravity_flexion": -2.0})
+    own, plant = facing(believed, Plant(stiffness="x0.8", flexion_ratio=2.0, length="x1.1", payload=0.1), "extension")
+    assert own.stiffness == pytest.approx(1.5 * WRIST.stiffness) and own.gravity == (-3.0, -2.0)
+    actual = plant_of(own, plant)
+    assert actual.stiffness == pytest.approx(0.8 * 2.0 * WRIST.stiffness) and actual.length == pytest.approx(0.088)
+    assert actual.hand_mass == pytest.approx(0.4) and actual.damping == WRIST.damping and actual.gravity == own.gravity
+    assert facing(believed, plant, "radial") == (believed, plant)
 
 
 def test_what_is_given_as_it_is_believed_changes_no_bit() -> None:

@@ -42,6 +42,18 @@ def test_each_plane_sees_its_own_gravity() -> None:
     assert in_plane(in_plane(wrist, "flexion"), "flexion") == wrist
 
 
+def test_each_plane_has_its_own_stiffness() -> None:
+    """A wrist that is believed stiffer toward flexion moves there as one that is stiffer everywhere."""
+    uneven, stiff = (
+        courses("wrist.flexion_ratio=1.25"),
+        courses(f"wrist.stiffness={1.25 * WristParameters().stiffness}"),
+    )
+    even = courses()
+    for plane, same in (("ulnar", even), ("radial", even), ("flexion", stiff), ("extension", stiff)):
+        np.testing.assert_array_equal(uneven[plane], same[plane])
+    assert in_plane(WristParameters(flexion_ratio=0.8), "flexion").flexion_ratio == 1.25
+
+
 @pytest.mark.parametrize("each", DIRECTIONS.values(), ids=lambda d: d.name)
 def test_tendons_that_pull_lie_on_the_side_of_the_bend(each: Direction) -> None:
     axis = 0 if each.plane == "ulnar" else 1

@@ -19,8 +19,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
-from wristctl.simulation.worlds import drawn, plant_of
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
+from wristctl.simulation.worlds import drawn, facing, plant_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
 from wristctl.wrist.plant import kernel_of
 
 _KEPT = 60_000
@@ -149,7 +149,7 @@ class BenchWrist:
 
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
-        plant = plant_of(in_plane(self._wrist, direction), self._drawn)
+        plant = plant_of(*facing(self._wrist, self._drawn, direction))
         self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second

@@ -17,7 +17,7 @@ from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import Repeated, Simulation, repeat, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.reference import Motion, motion, reference_name, toward
-from wristctl.wrist.directions import in_plane
+from wristctl.simulation.worlds import loop_facing
 from wristctl.wrist.kinematics import Inverse
 
 
@@ -82,10 +82,10 @@ def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
     """What the study's `compare` section asks for: every row follows each course of each of these."""
     chosen = study.compare
     return [
-        Condition(name, loop, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network))
+        Condition(name, own, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network))
         for name, loop in chosen.loops.items()
         for direction in chosen.directions
-        for wrist in [in_plane(study.wrist, direction)]
+        for wrist, own in [loop_facing(study.wrist, loop, direction)]
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from wristctl.config.section import Section, choice, quantity
 
 
@@ -9,9 +11,12 @@ class Fixed(Section):
     """Parameters held at a value instead of found; null: found."""
 
     stiffness: float | None = quantity(None, "N m/rad", "bending stiffness of the whole wrist", gt=0)
+    flexion_ratio: float | None = quantity(None, "", "stiffness toward flexion over that toward ulnar", gt=0)
     damping: float | None = quantity(None, "N m s/rad", "bending damping of the whole wrist", gt=0)
     tendon_stiffness: float | None = quantity(None, "N/m", "stiffness of one tendon", gt=0)
     friction: float | None = quantity(None, "", "capstan friction: coefficient times bend", ge=0)
+    sheath_friction: float | None = quantity(None, "", "sheaths' friction: coefficient times angle", ge=0)
+    presliding: float | None = quantity(None, "m", "path in which friction turns round", gt=0)
     delay: float | None = quantity(None, "s", "how much older a picture is than its time stamp")
     tendon_radius: float | None = quantity(None, "m", "radius of the tendons' circle, the pulley's as known", gt=0)
 
@@ -26,6 +31,10 @@ class IdentifySettings(Section):
     radius_error: float = quantity(
         0.01, "", "how well tendon_radius over pulley_radius is known: relative standard deviation", "assumed", gt=0
     )
+    presliding_error: float = quantity(
+        0.8, "", "how well the path is known in which friction turns round: relative (logarithm's) standard deviation",
+        "assumed: 5-100 um", gt=0,
+    )  # fmt: skip
     zero_error_deg: float = quantity(
         0.1, "deg", "how well the marker's zero is known in each run and plane: standard deviation", "assumed", gt=0
     )
@@ -45,6 +54,11 @@ class IdentifySettings(Section):
     condition_limit: float = quantity(
         1000.0, "", "condition number of the scaled Jacobian beyond which nothing is identified", "assumed", gt=1
     )
+    lack_of_fit: float = quantity(
+        2.0, "", "variance of the residuals over that of the frames' own noise beyond which nothing is identified",
+        "assumed", gt=1,
+    )  # fmt: skip
+    misfit: Literal["refuse", "tell"] = choice("refuse", "what to do with trials that the model does not fit")
 
     @property
     def fixed(self) -> dict[str, float]:

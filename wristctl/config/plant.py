@@ -70,6 +70,7 @@ class TrueWrist(Overrides):
     hand_mass: NotNegative = truth("kg", "mass of the hand")
     hand_offset: NotNegative = truth("m", "hand's centre of mass beyond the last disc")
     stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
+    flexion_ratio: Positive = truth("", "stiffness toward flexion over that toward ulnar")
     damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
     tendon_radius: Positive = truth("m", "radius of the circle of tendons")
     tilt_deg: float = fact(0.0, "deg", "by how much its base leans toward theta > 0, gravity being as believed")

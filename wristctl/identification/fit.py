@@ -6,22 +6,27 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
+from wristctl.config.plant import Actuator
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.measured_trials import MeasuredTrial
-from wristctl.identification.unknowns import SIMULATED, UNKNOWNS
+from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, tendons_of_values
 from wristctl.lanes.cores import cores
 
 _NUDGE, _NUDGE_M = 1e-4, 1e-6
 """Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""
 _MOST = 200
 """Evaluations of one search; 10 to 20 are usual."""
+
+
+_LEAST_NOISE = 1e-6
+"""Of an angle [rad]: what a marker's angle is never better than."""
 
 
 class Coordinate(NamedTuple):
@@ -49,11 +54,15 @@ class Problem:
     trials: Sequence[MeasuredTrial]
     start: Mapping[str, float]
     settings: IdentifySettings
+    actuator: Actuator
+    """As believed: what of the tendons is not found."""
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """The parameters to find."""
-        return tuple(name for name in UNKNOWNS if name not in self.settings.fixed)
+        """The parameters to find; how the planes differ only where there are trials of both."""
+        one_plane = len({trial.plane for trial in self.trials}) == 1
+        held = {*self.settings.fixed, *(["flexion_ratio"] if one_plane else [])}
+        return tuple(name for name in UNKNOWNS if name not in held)
 
     @cached_property
     def coordinates(self) -> dict[Coordinate, int]:
@@ -80,6 +89,7 @@ class Problem:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
         known = {
             "tendon_radius": 1.0 / self.settings.radius_error,
+            "presliding": 1.0 / self.settings.presliding_error,
             ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
             SPOOL: 1.0 / self.settings.spool_error,
         }
@@ -92,19 +102,19 @@ class Problem:
             held[name] = UNKNOWNS[name].value(float(at), self.start[name])
         return {name: held[name] for name in UNKNOWNS}
 
-    def candidate(self, trial: MeasuredTrial, x: Array, **known: Any) -> SupposedWrist:
-        """The trial's wrist and tendons at coordinates x; `known` parameters of the wrist changed."""
+    def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
+        """The trial's wrist and tendons at coordinates x."""
         values = self.values(x)
-        own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")} | known
+        own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
+        if trial.plane == "flexion":
+            own["stiffness"] *= values["flexion_ratio"]
         one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
-        wrist = trial.wrist.model_copy(update=own)
-        believed = {name: self.start[name] for name in ("sheath", "presliding") if name in self.start}
-        taut = one, two, three, four
-        return SupposedWrist(wrist, values["tendon_stiffness"], values["friction"], taut, **believed)
+        tendons = self.actuator.model_copy(update=tendons_of_values(values))
+        return SupposedWrist(trial.wrist.model_copy(update=own), tendons, (one, two, three, four))
 
-    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist]) -> Array:
-        """Angles (count, T) of the candidates in a trial."""
-        return angles(candidates, trial.reeled, self.settings.step, self.settings.segments)
+    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
+        """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""
+        return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
 
 
 _WIDEST = {ZERO: 0.2, SPOOL: 2e-3}
@@ -174,6 +184,15 @@ class Fit:
         return self.problem.values(self.x)
 
 
+def frame_noise(courses: Sequence[Array]) -> float:
+    """Standard deviation of what differs from frame to frame in courses (F,), by their second differences.
+
+    Neither a trend nor what lasts longer than a few frames counts. Medians: quick moves do not either.
+    """
+    second = np.concatenate([np.diff(each, 2) for each in courses])
+    return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))
+
+
 def fit(problem: Problem) -> Fit:
     """The coordinates of least squares, with what is known beforehand counting by its own standard deviation.
 
@@ -183,7 +202,7 @@ def fit(problem: Problem) -> Fit:
     known = weights > 0.0
     bounds = problem.bounds()
     x = np.clip(problem.begin(), *bounds)
-    noise, weighed = np.deg2rad(0.1), np.inf
+    noise, weighed = max(frame_noise([trial.angle for trial in problem.trials]), _LEAST_NOISE), np.inf
     last: tuple[Array, Linearisation] | None = None
 
     def at(x: Array) -> Linearisation:

@@ -29,25 +29,16 @@ SETTLE = 0.5
 
 
 class SupposedWrist(NamedTuple):
-    """A wrist and its tendons as they may be: stiffness of one tendon [N/m], its friction (coefficient, the sheath's
-    angle [rad] and presliding [m]).
+    """A wrist and its tendons as they may be, and what else they may do.
 
     `taut` is what each tendon has reeled in more [m] than its spool's count says: two of the + side, two of the -.
     """
 
     wrist: WristParameters
-    tendon_stiffness: float
-    friction: float
+    tendons: Actuator
     taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    sheath: float = Actuator().sheath
-    presliding: float = Actuator().presliding
-
-
-def _nonideal(candidate: SupposedWrist, h: float) -> Nonideal:
-    own = Actuator(
-        level="tendon", friction=candidate.friction, sheath=candidate.sheath, presliding=candidate.presliding
-    )
-    return nonideal_of(TrueWrist(), own, TendonFacts(), h)
+    plant: TrueWrist = TrueWrist()
+    facts: TendonFacts = TendonFacts()
 
 
 class Reeled(NamedTuple):
@@ -89,7 +80,8 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     A candidate that bends a segment beyond a full turn stays where it was.
     """
     values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
-    own = [np.array([*_nonideal(each, h), each.tendon_stiffness, *each.taut]) for each in candidates]
+    nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h) for each in candidates]
+    own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
     tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
     spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h))

@@ -15,17 +15,21 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
+from wristctl.config.plant import TrueWrist
 from wristctl.config.wording import Setting
 from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
+from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
-from wristctl.identification.unknowns import UNKNOWNS
+from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
+from wristctl.simulation.worlds import plant_of
 
 
 def widest(name: str, settings: IdentifySettings) -> float:
     """Half the widest interval, as a coordinate, with which a parameter counts as identified."""
     unknown = UNKNOWNS[name]
-    return float(np.log1p(settings.widest)) if unknown.log else settings.widest * unknown.tolerance
+    tolerated = settings.widest * unknown.tolerance
+    return float(np.log1p(tolerated)) if unknown.log else tolerated
 
 
 def width_text(name: str, half: float) -> str:
@@ -46,7 +50,7 @@ def not_identified(fit: Fit, known: Knowledge) -> dict[str, float]:
     settings, found = fit.problem.settings, {}
     for at, name in enumerate(fit.problem.free):
         half = float(known.half_widths[at])
-        at_edge = name != "friction" and min(fit.x[at] - low[at], high[at] - fit.x[at]) < 1e-6
+        at_edge = name not in NOT_NEGATIVE and min(fit.x[at] - low[at], high[at] - fit.x[at]) < 1e-6
         if half > widest(name, settings) or at_edge or known.condition > settings.condition_limit:
             found[name] = half
     return found
@@ -110,7 +114,7 @@ def additions(fit: Fit, lacking: Mapping[str, float]) -> list[Addition]:
 def _addition(fit: Fit, x: Array, what: str, move: Added, load: Added) -> Addition:
     moved = [_following(fit.problem, x, move(each), load) for each in fit.problem.trials]
     trials = [*fit.problem.trials, *(replace(each, run=f"{each.run} again") for each in moved)]
-    problem = Problem(trials, fit.problem.start, fit.problem.settings)
+    problem = replace(fit.problem, trials=trials)
     wider = np.zeros(len(problem.coordinates))
     for name, at in fit.problem.coordinates.items():
         wider[problem.coordinates[name]] = x[at]
@@ -151,14 +155,25 @@ def _worst(addition: Addition) -> float:
     return max(half / UNKNOWNS[name].tolerance for name, half in addition.half_widths.items())
 
 
-KNOWN = {
-    "hand_mass": "1 % more mass of the hand",
-    "hand_offset": "1 % more distance of the hand's centre of mass",
-    "length": "1 % more length of the wrist",
-    "mass": "1 % more mass of the wrist",
-    "gravity": "a pose turned by 1 deg",
+def _more(name: str) -> Callable[[SupposedWrist], SupposedWrist]:
+    def changed(each: SupposedWrist) -> SupposedWrist:
+        return each._replace(wrist=each.wrist.model_copy(update={name: 1.01 * getattr(each.wrist, name)}))
+
+    return changed
+
+
+def _turned(each: SupposedWrist) -> SupposedWrist:
+    return each._replace(wrist=plant_of(each.wrist, TrueWrist(tilt_deg=1.0)))
+
+
+KNOWN: dict[str, Callable[[SupposedWrist], SupposedWrist]] = {
+    "1 % more mass of the hand": _more("hand_mass"),
+    "1 % more distance of the hand's centre of mass": _more("hand_offset"),
+    "1 % more length of the wrist": _more("length"),
+    "1 % more mass of the wrist": _more("mass"),
+    "a base that leans by 1 deg": _turned,
 }
-"""What identification takes as known, and by how much it is changed to see what depends on it."""
+"""What identification takes as known, changed to see what depends on it."""
 
 
 def budget(fit: Fit, known: Knowledge) -> dict[str, dict[str, float]]:
@@ -166,11 +181,8 @@ def budget(fit: Fit, known: Knowledge) -> dict[str, dict[str, float]]:
     problem, weights = fit.problem, 1.0 / fit.noise**2
     push = {name: np.zeros(len(fit.x)) for name in KNOWN}
     for trial, slopes in zip(problem.trials, fit.slopes, strict=True):
-        along, across = trial.wrist.gravity
-        turned = along - np.deg2rad(1.0) * across, across + np.deg2rad(1.0) * along
-        changed = {name: turned if name == "gravity" else 1.01 * getattr(trial.wrist, name) for name in KNOWN}
-        candidates = [problem.candidate(trial, fit.x, **{name: value}) for name, value in changed.items()]
-        course = problem.simulate(trial, [problem.candidate(trial, fit.x), *candidates])
+        own = problem.candidate(trial, fit.x)
+        course = problem.simulate(trial, [own, *(change(own) for change in KNOWN.values())])
         expected, *others = (trial.shown(each, fit.values["delay"]) for each in course)
         for name, other in zip(KNOWN, others, strict=True):
             push[name] += weights * slopes.T @ (other - expected)

@@ -8,15 +8,19 @@ from typing import Any
 from wristctl.config.loop import Loop
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
+from wristctl.identification.unknowns import tendons_of_values
 
-_WRIST = ("stiffness", "damping", "tendon_radius")
-_ACTUATOR = ("tendon_stiffness", "friction")
+_WRIST = ("stiffness", "flexion_ratio", "damping", "tendon_radius")
 
 
 def identified_yaml(values: Mapping[str, float], camera: Mapping[str, float]) -> str:
     """A study file: the wrist, and the actuator and sensor of `simulate`, with these parameters."""
     lines = ["wrist:", *(f"  {name}: {values[name]!r}" for name in _WRIST), "simulate:", "  loop:"]
-    lines += ["    actuator:", "      level: tendon", *(f"      {name}: {values[name]!r}" for name in _ACTUATOR)]
+    lines += [
+        "    actuator:",
+        "      level: tendon",
+        *(f"      {name}: {each!r}" for name, each in tendons_of_values(values).items()),
+    ]
     lines += ["    sensor:", "      level: camera", *(f"      {name}: {value!r}" for name, value in camera.items())]
     return "\n".join(lines) + "\n"
 

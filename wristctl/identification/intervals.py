@@ -16,11 +16,13 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
-from wristctl.identification.unknowns import UNKNOWNS
+from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
 
 NORMAL_95 = 1.959964
 ALIKE = 0.2
 """Autocorrelation of neighbouring residuals beyond which the model is said to miss something."""
+_ASSUMED = 0.8
+"""Share of the deviation beforehand that is left where trials tell hardly anything."""
 _LASTING = 30
 """Frames over which small errors are alike: half a second at 60 a second."""
 
@@ -39,6 +41,12 @@ class Knowledge:
     """Of neighbouring residuals."""
     effective: float
     """Independent frames that would tell as much as the residuals do."""
+    before: Array
+    """One over the standard deviations with which coordinates were known beforehand; 0 where nothing was."""
+
+    def assumed(self, at: int) -> bool:
+        """Whether hardly more is known of a coordinate than beforehand."""
+        return bool(self.deviation[at] * self.before[at] > _ASSUMED)
 
     @property
     def half_widths(self) -> Array:
@@ -65,18 +73,27 @@ def knowledge(fit: Fit) -> Knowledge:
     slopes = [each / fit.noise for each in fit.slopes]
     residuals = [each / fit.noise for each in fit.residuals]
     count = sum(map(len, residuals))
-    rho = autocorrelation(residuals)
-    lags = bandwidth(rho, count / len(residuals))
-    information = information_of(slopes, weights)
-    meat = np.diag(weights**2)
-    for slope, residual in zip(slopes, residuals, strict=True):
-        meat = meat + long_run(slope * residual[:, None], lags) * count / max(1, count - len(fit.problem.free))
-    bread = inverse(information)
+    bread, variance = sandwich(slopes, residuals, weights, len(fit.problem.free))
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
     alike = max(1.0, inflation(residuals, _LASTING))
-    deviation = np.sqrt(np.maximum(alike * np.diag(bread), np.diag(bread @ meat @ bread)))
-    deviation = _with_clocks(fit.problem, deviation)
-    return Knowledge(deviation, information, condition(stacked), rho, count / alike)
+    deviation = _with_clocks(fit.problem, np.sqrt(np.maximum(alike * np.diag(bread), np.diag(variance))))
+    information = information_of(slopes, weights)
+    return Knowledge(deviation, information, condition(stacked), autocorrelation(residuals), count / alike, weights)
+
+
+def sandwich(slopes: Sequence[Array], residuals: Sequence[Array], weights: Array, free: int) -> tuple[Array, Array]:
+    """Covariances of coordinates if residuals were independent, and by how they really are alike.
+
+    Slopes and residuals of each trial in standard deviations, one over those of what is known beforehand, and how many
+    coordinates nothing is known of.
+    """
+    count = sum(map(len, residuals))
+    lags = bandwidth(autocorrelation(residuals), count / len(residuals))
+    meat = np.diag(weights**2)
+    for slope, residual in zip(slopes, residuals, strict=True):
+        meat = meat + long_run(slope * residual[:, None], lags) * count / max(1, count - free)
+    bread = inverse(information_of(slopes, weights))
+    return bread, bread @ meat @ bread
 
 
 def promised(problem: Problem, slopes: Sequence[Array]) -> Array:
@@ -147,8 +164,8 @@ def long_run(scores: Array, lags: int) -> Array:
 
 
 def interval(fit: Fit, known: Knowledge, name: str) -> tuple[float, float]:
-    """The 95 % interval of a free parameter in its own unit; friction's ends at 0."""
+    """The 95 % interval of a free parameter in its own unit; friction's end at 0."""
     at = fit.problem.free.index(name)
     half, start, unknown = known.half_widths[at], fit.problem.start[name], UNKNOWNS[name]
     low, high = (unknown.value(fit.x[at] + side * min(half, 50.0), start) for side in (-1.0, 1.0))
-    return (max(low, 0.0) if name == "friction" else low), high
+    return (max(low, 0.0) if name in NOT_NEGATIVE else low), high

@@ -29,7 +29,7 @@ class MeasuredTrial:
 
     label: str
     run: str
-    plane: str
+    direction: str
     wrist: WristParameters
     """As known, gravity in the bending plane."""
     time: Array
@@ -42,6 +42,11 @@ class MeasuredTrial:
     """What they show, (F,) [rad]."""
     exposure: float
     """How long the shutter is open, about the time stamp [s]; the picture shows the mean of that time."""
+
+    @property
+    def plane(self) -> str:
+        """The bending plane."""
+        return DIRECTIONS[self.direction].plane
 
     @property
     def tendons(self) -> tuple[int, int, int, int]:
@@ -85,7 +90,7 @@ def measured_trials(
         if usable.sum() < _FEWEST:
             continue
         trial = MeasuredTrial(
-            f"{label}, trial {number}: {direction}", label, DIRECTIONS[direction].plane, in_plane(wrist, direction),
+            f"{label}, trial {number}: {direction}", label, direction, in_plane(wrist, direction),
             time, np.empty((len(time), 4)), captured[usable], angle[usable], exposure,
         )  # fmt: skip
         steps = own[[f"position_{tendon}" for tendon in trial.tendons]].to_numpy(float)

@@ -14,7 +14,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
 from wristctl.config.loop import DirectionName, Loop, Reference
-from wristctl.config.plant import Actuator
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.identification.forward import SupposedWrist, angles
@@ -35,6 +35,9 @@ _PERIOD, _LOGGED = 1e-3, 5
 """Tick of the simulation [s], and how many of them lie between two rows of the log."""
 
 
+_NOTHING_ELSE, _NOR_OF_TENDONS = TrueWrist(), TendonFacts()
+
+
 @dataclass(frozen=True)
 class RehearsedTruth:
     """What the bench has and its user does not know.
@@ -52,8 +55,11 @@ class RehearsedTruth:
     frame_rate: float = 60.0
     exposure: float = 4e-3
     dropped: float = 0.05
-    plant: str = "pcc"
-    """Name of the plant's model."""
+    plant: TrueWrist = _NOTHING_ELSE
+    """What else its springs do, and the plant's model."""
+    facts: TendonFacts = _NOR_OF_TENDONS
+    """What else its tendons do."""
+    segments: int = Loop().plant_segments
 
 
 @kernel
@@ -78,21 +84,21 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
 
 
 def rehearse(
-    wrist: WristParameters, truth: RehearsedTruth, moves: Sequence[tuple[DirectionName, Reference]], horizon: float,
-    rng: np.random.Generator,
+    wrist: WristParameters, actuator: Actuator, truth: RehearsedTruth,
+    moves: Sequence[tuple[DirectionName, Reference]], horizon: float, rng: np.random.Generator,
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:  # fmt: skip
-    """The tables log, frames and trials of moves, each from rest, by a controller that believes in `wrist`."""
+    """The tables log, frames and trials of moves, each from rest; a controller believes in `wrist` and `actuator`."""
     import pandas as pd
 
     logs, seen, kinds = [], [], []
     for number, (direction, reference) in enumerate(moves):
         side = DIRECTIONS[direction]
-        reeled = spools(in_plane(wrist, direction), toward(reference, direction), truth.actuator, horizon)
-        own, model = _own(truth, direction), PLANTS[truth.plant]
-        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, Loop().plant_segments, model)[0]
+        reeled = spools(in_plane(wrist, direction), toward(reference, direction), actuator, horizon)
+        own, model = _own(truth, direction), PLANTS[truth.plant.model]
+        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, truth.segments, model)[0]
         time = _PERIOD * np.arange(len(angle))
         ticks = slice(None, None, _LOGGED)
-        steps = np.rint(reeled[ticks] / truth.actuator.step_length).astype(int)
+        steps = np.rint(reeled[ticks] / actuator.step_length).astype(int)
         columns = {"trial": number, "time": time[ticks], "counted": time[ticks] + 0.5 * _PERIOD}
         tendons = enumerate(tendons_of(side.plane))
         logs.append(pd.DataFrame(columns | {f"position_{tendon}": steps[:, at // 2] for at, tendon in tendons}))
@@ -113,7 +119,5 @@ def rehearse(
 def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
-    actuator = truth.actuator
     wrist = in_plane(truth.wrist, direction)
-    more = (one, two, three, four), actuator.sheath, actuator.presliding
-    return SupposedWrist(wrist, actuator.tendon_stiffness, actuator.friction, *more)
+    return SupposedWrist(wrist, truth.actuator, (one, two, three, four), truth.plant, truth.facts)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
+
+from wristctl.config.plant import Actuator
+from wristctl.config.wrist import WristParameters
 
 
 class Unknown(NamedTuple):
     """A parameter that identification may find.
 
     `low` and `high` bound the search: factors of the starting value where it is searched in its logarithm, values
-    elsewhere. `tolerance` is the scale of its widest interval: 1 (a relative width) or a value in its own unit.
+    elsewhere. `tolerance` is the scale of its widest interval, relative or in its own unit; infinite where what is
+    known beforehand is always enough.
     """
 
     name: str
@@ -38,14 +43,39 @@ UNKNOWNS = {
     each.name: each
     for each in (
         Unknown("stiffness", "N m/rad", "bending stiffness of the whole wrist", True, 0.05, 20.0, 1.0),
+        Unknown("flexion_ratio", "", "stiffness toward flexion over that toward ulnar", True, 0.2, 5.0, 1.0),
         Unknown("damping", "N m s/rad", "bending damping of the whole wrist", True, 0.02, 50.0, 1.0),
         Unknown("tendon_stiffness", "N/m", "stiffness of one tendon", True, 0.05, 20.0, 1.0),
         Unknown("friction", "", "capstan friction: coefficient times bend", False, 0.0, 2.0, 0.4),
+        Unknown("sheath_friction", "", "sheaths' friction: coefficient times angle", False, 0.0, 4.0, 0.4),
+        Unknown("presliding", "m", "path in which friction turns round", True, 0.1, 10.0, math.inf),
         Unknown("delay", "s", "how much older a picture is than its time stamp", False, -0.05, 0.2, 0.02),
         Unknown("tendon_radius", "m", "radius of the tendons' circle, the pulley's as known", True, 0.8, 1.25, 1.0),
     )
 }
-"""The table of parameters. All but tendon_radius begin without any knowledge beyond the bounds."""
+"""The table of parameters. All but tendon_radius and presliding begin without any knowledge beyond the bounds."""
 
-SIMULATED = ("stiffness", "damping", "tendon_stiffness", "friction", "tendon_radius")
+_LEAST_FRICTION = 1e-9
+"""Coefficient that stands for none, where sheaths have friction."""
+
+
+def tendons_of_values(values: Mapping[str, float]) -> dict[str, float]:
+    """The leaves of an actuator that parameters say: stiffness and friction of its tendons, their sheaths' angle."""
+    friction = max(values["friction"], _LEAST_FRICTION)
+    sheath = values["sheath_friction"] / friction
+    found = {name: values[name] for name in ("tendon_stiffness", "presliding")}
+    return found | {"friction": friction, "sheath": sheath}
+
+
+def believed_of(wrist: WristParameters, actuator: Actuator) -> dict[str, float]:
+    """The parameters as a controller believes them, of a camera whose pictures are as old as their time stamps."""
+    own = {name: getattr(wrist, name) for name in ("stiffness", "flexion_ratio", "damping", "tendon_radius")}
+    tendons = {name: float(getattr(actuator, name)) for name in ("tendon_stiffness", "friction", "presliding")}
+    return own | tendons | {"sheath_friction": actuator.friction * actuator.sheath, "delay": 0.0}
+
+
+NOT_NEGATIVE = ("friction", "sheath_friction")
+"""Those that end at zero, where they may well be."""
+
+SIMULATED = tuple(name for name in UNKNOWNS if name != "delay")
 """Those that the forward model holds; the delay shifts its outcome in time."""

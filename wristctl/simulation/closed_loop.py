@@ -23,8 +23,7 @@ from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation_frequency
 from wristctl.simulation.reference import Motion, motion, reference_name, toward
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.simulation.trajectory import Trajectory
-from wristctl.simulation.worlds import loops_of, plant_of
-from wristctl.wrist.directions import in_plane
+from wristctl.simulation.worlds import loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
 
 _TOGETHER = 64
@@ -223,10 +222,10 @@ def simulate(
     gains are `tuned`. Raises UserError for an unknown controller or preset, a reference out of reach, or a start in
     equilibrium of a wrist that buckles.
     """
-    chosen, loop = study.simulate, study.simulate.loop
+    chosen, draws = study.simulate, Draws(study.seed)
+    wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction)
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    wrist, draws = in_plane(study.wrist, chosen.direction), Draws(study.seed)
     reference = toward(chosen.reference, chosen.direction)
     followed = motion(reference, wrist, chosen.horizon, sample_period(loop.control_period), network)
     start = _equilibrium(loop) if chosen.start == "equilibrium" else None

@@ -16,6 +16,9 @@ from wristctl.config.section import Section
 from wristctl.config.truth import is_unsaid
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
+from wristctl.wrist.directions import in_plane
+
+P = TypeVar("P", bound=TrueWrist)
 
 LEEWAY_DEG = 5.0
 """By how much a wrist may pass its range [deg]."""
@@ -106,15 +109,22 @@ def plant_of(wrist: WristParameters, plant: TrueWrist) -> WristParameters:
     )
 
 
+def facing(wrist: WristParameters, plant: P, direction: str) -> tuple[WristParameters, P]:
+    """A wrist as it is known, and the plant that it is, as this direction's bending plane sees them."""
+    own = in_plane(wrist, direction)
+    if own is wrist:
+        return wrist, plant
+    actual = TrueWrist.between(own, in_plane(plant.of(wrist), direction))
+    leaves = TrueWrist.model_fields.keys() & WristParameters.model_fields.keys()
+    return own, plant.model_copy(update={name: getattr(actual, name) for name in leaves})
+
+
 def _leaning(gravity: tuple[float, float], tilt: float) -> tuple[float, float]:
     """Gravity in the axes of a base that leans by tilt [rad] toward theta > 0."""
     if tilt == 0.0:
         return gravity
     c, s = math.cos(tilt), math.sin(tilt)
     return c * gravity[0] + s * gravity[1], c * gravity[1] - s * gravity[0]
-
-
-P = TypeVar("P", bound=TrueWrist)
 
 
 def drawn(plant: P, stream: Entropy) -> P:
@@ -132,6 +142,12 @@ def drawn(plant: P, stream: Entropy) -> P:
             "payload_spread": 0.0,
         }
     )
+
+
+def loop_facing(wrist: WristParameters, loop: Loop, direction: str) -> tuple[WristParameters, Loop]:
+    """The same of a loop."""
+    own, plant = facing(wrist, loop.plant, direction)
+    return own, loop if plant is loop.plant else loop.model_copy(update={"plant": plant})
 
 
 def loops_of(loop: Loop, streams: Sequence[Entropy]) -> list[Loop]:

@@ -39,11 +39,17 @@ def tendons_of(plane: str) -> tuple[int, int, int, int]:
 
 
 def in_plane(wrist: WristParameters, direction: str) -> WristParameters:
-    """The wrist as its motion in this direction's bending plane sees it: gravity across is that plane's.
+    """The wrist as its motion in this direction's bending plane sees it: stiffness and gravity across are that plane's.
 
-    The cross-section is square, so the planes differ in gravity alone; upright they are the same.
+    The cross-section is square, so the planes differ in these alone. Seen twice it is as before.
     """
     if DIRECTIONS[direction].plane == "ulnar":
         return wrist
     along, ulnar = wrist.gravity
-    return wrist.model_copy(update={"gravity": (along, wrist.gravity_flexion), "gravity_flexion": ulnar})
+    turned = {
+        "gravity": (along, wrist.gravity_flexion),
+        "gravity_flexion": ulnar,
+        "stiffness": wrist.stiffness * wrist.flexion_ratio,
+        "flexion_ratio": 1.0 / wrist.flexion_ratio,
+    }
+    return wrist.model_copy(update=turned)
