@@ -79,6 +79,13 @@ def test_the_search_arrives_from_far_off(factor: float) -> None:
     assert values["delay"] == pytest.approx(truth["delay"], abs=5e-3)
 
 
+def test_a_search_that_believes_in_no_friction_leaves_that_edge() -> None:
+    trials, truth = logged(0, poses=(UPRIGHT,), directions=("ulnar",))
+    known = {name: truth[name] for name in ("damping", "friction", "tendon_radius")}
+    assert problem(trials).start["sheath_friction"] == 0.0
+    assert fit(problem(trials, fix=known)).values["stiffness"] == pytest.approx(truth["stiffness"], rel=0.05)
+
+
 def test_a_parameter_that_is_held_is_not_found_and_helps_the_others() -> None:
     trials, truth = logged(2, poses=(LEVEL,), directions=("ulnar",))
     free, held = fit(problem(trials)), fit(problem(trials, fix={"tendon_radius": truth["tendon_radius"]}))

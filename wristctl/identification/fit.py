@@ -16,11 +16,13 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.measured_trials import MeasuredTrial
-from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, tendons_of_values
+from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, tendons_of_values
 from wristctl.lanes.cores import cores
 
 _NUDGE, _NUDGE_M = 1e-4, 1e-6
 """Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""
+_OFF_THE_EDGE = 0.02
+"""Friction with which a search begins that believes in none."""
 _MOST = 200
 """Evaluations of one search; 10 to 20 are usual."""
 
@@ -73,10 +75,12 @@ class Problem:
         return {each: at for at, each in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
 
     def begin(self) -> Array:
-        """The coordinates at the start."""
+        """The coordinates at the start; at an edge the search would stay there."""
         x = np.zeros(len(self.coordinates))
         for at, name in enumerate(self.free):
             x[at] = UNKNOWNS[name].coordinate(self.start[name], self.start[name])
+            if name in NOT_NEGATIVE:
+                x[at] = max(x[at], _OFF_THE_EDGE)
         return x
 
     def bounds(self) -> tuple[Array, Array]:
