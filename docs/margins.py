@@ -57,10 +57,7 @@ def hunting(name: str, gains: str) -> float:
     motions = [motion(Reference(angle_deg=each), WRIST, 61.0, loop.control_period) for each in TARGETS]
     given, names = np.repeat([gains_of(law, gains)], len(motions), axis=0), [str(each) for each in TARGETS]
     done = repeat(law, given, motions, np.arange(len(motions)), loop, WRIST, names, Draws(0))
-    held = np.array([each.first.trajectory.theta[-round(30.0 / loop.control_period) :] for each in done]).T
-    place = np.linspace(-1.0, 1.0, len(held))
-    left = held - np.polynomial.polynomial.polyval(place, np.polynomial.polynomial.polyfit(place, held, 1)).T
-    return float(np.ptp(left, axis=0).max() / 2.0)
+    return float(np.nanmax([each.metrics["hunting"] for each in done]))
 
 
 def loop_of(period: float, stiffness: float, sheath: float, plant: Plant | None = None) -> Loop:

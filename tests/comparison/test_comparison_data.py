@@ -9,7 +9,7 @@ from wristctl.arrays import Array
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.comparison_data import frame, metrics_of, repetitions_frame, series
 from wristctl.comparison.paper import T2
-from wristctl.simulation.closed_loop import Repeated, Simulation
+from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
 
 SAMPLES = 13

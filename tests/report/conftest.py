@@ -21,7 +21,7 @@ from wristctl.report.trial_figures import errors as trial_errors
 from wristctl.report.trial_figures import tensions as trial_tensions
 from wristctl.report.tuning_figures import convergence, gain_history
 from wristctl.report.wrist_drawing import directions, stroboscope
-from wristctl.simulation.closed_loop import Repeated, Simulation
+from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.tuning.search import Search
 from wristctl.vision.marker import Sighting, SightingVerdict

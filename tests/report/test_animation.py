@@ -20,7 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, start_run
 from wristctl.report.animation import FRAMES, animation
 from wristctl.report.style import colour
-from wristctl.simulation.closed_loop import Repeated
+from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import Trajectory
 
 WRIST = WristParameters()

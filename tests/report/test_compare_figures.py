@@ -14,7 +14,7 @@ from wristctl.comparison.paper import T2
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.repetition_figures import error_sizes
 from wristctl.report.style import WIDTH
-from wristctl.simulation.closed_loop import Repeated
+from wristctl.simulation.repetitions import Repeated
 
 
 def texts(axes: Axes) -> list[str]:

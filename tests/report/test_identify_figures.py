@@ -10,13 +10,17 @@ from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
+from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.fit import Fit, Problem
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.unknowns import UNKNOWNS
 from wristctl.report.identify_figures import angles, correlations, residuals
 
-KNOWN = Knowledge(np.ones(6), np.diag([1.0, 4.0, 9.0, 1.0, 1.0, 1.0]), 123.4, 0.1, 77.7)
+COUNT = len(UNKNOWNS) - 1
+"""Parameters that trials of one plane tell."""
+KNOWN = Knowledge(np.ones(COUNT), np.diag([1.0, 4.0, 9.0, *[1.0] * (COUNT - 3)]), 123.4, 0.1, 77.7, np.zeros(COUNT))
 
 
 def fit(left_over: list[Array], noise: float = 2e-3) -> Fit:
@@ -26,7 +30,7 @@ def fit(left_over: list[Array], noise: float = 2e-3) -> Fit:
         time = np.arange(float(len(each))) / 60.0
         own = "run", "ulnar", WristParameters(), time, np.zeros((len(time), 4))
         trials.append(MeasuredTrial(f"trial {k}", *own, time, np.radians(20.0) * np.sin(time + k), 0.0))
-    return Fit(Problem(trials, {}, IdentifySettings()), np.zeros(0), noise, left_over, [], 1)
+    return Fit(Problem(trials, {}, IdentifySettings(), Actuator(level="tendon")), np.zeros(0), noise, left_over, [], 1)
 
 
 def noise(count: int, frames: int = 40) -> list[Array]:
@@ -114,8 +118,8 @@ def test_the_band_holds_95_in_100_lags_of_white_noise() -> None:
 
 
 def test_correlations_are_those_of_the_parameters_that_were_searched_for() -> None:
-    information = np.eye(6) + 0.3 * np.eye(6, k=1) + 0.3 * np.eye(6, k=-1)
-    known = Knowledge(np.ones(6), information, 123.4, 0.1, 77.7)
+    information = np.eye(COUNT) + 0.3 * np.eye(COUNT, k=1) + 0.3 * np.eye(COUNT, k=-1)
+    known = Knowledge(np.ones(COUNT), information, 123.4, 0.1, 77.7, np.zeros(COUNT))
     one = fit(noise(2))
     names = list(one.problem.free)
     axes, bar = correlations(one, known).axes

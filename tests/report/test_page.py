@@ -22,7 +22,7 @@ from wristctl.records import InputRun, Run, start_run
 from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
 from wristctl.report.comparison_page import several_page
 from wristctl.report.page import page
-from wristctl.simulation.closed_loop import Repeated
+from wristctl.simulation.repetitions import Repeated
 
 HERE = Path(__file__).parent
 KEPT = HERE.parents[1] / "build" / "screenshots"

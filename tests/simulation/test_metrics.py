@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
     time = np.arange(1000.0) * 1e-3
     away = np.where(time < 0.9 - 1e-9, 3e-3, 5e-3)
     wanted = np.tile((0.08, 0.0), (1000, 1))
-    still = {name: np.zeros(1000) for name in ("rate", "theta_ref", "torque_wanted", "torque")}
+    still: dict[str, Any] = {name: np.zeros(1000) for name in ("rate", "theta_ref", "torque_wanted", "torque")}
     course = Trajectory(
         label="", time=time, theta=np.full(1000, 0.12), theta_desired=np.full(1000, 0.10), tip_desired=wanted,
         tip=wanted + away[:, None] * np.array([0.6, -0.8]), segment_theta=np.zeros((1000, 4)),
@@ -114,5 +115,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "tip_rmse_mm": pytest.approx(math.sqrt(0.9 * 9.0 + 0.1 * 25.0)),
         "tip_steady_mm": pytest.approx(5.0),
         "oscillation": pytest.approx(0.0, abs=1e-15),
+        "hunting": pytest.approx(math.nan, nan_ok=True),
+        "observer_consistency": pytest.approx(math.nan, nan_ok=True),
         "outside_domain": 0.25,
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.closed_loop import simulate
-from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation, oscillation_frequency
+from wristctl.simulation.oscillation import LIMIT_CYCLE, hunting, oscillation, oscillation_frequency
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.trajectory import Trajectory
@@ -51,6 +53,22 @@ def test_a_lag_behind_a_sine_is_no_oscillation_and_a_buzz_on_it_is(frequency: fl
     assert oscillation(course(theta, reference)) < 5e-4 < LIMIT_CYCLE
     buzz = 4e-3 * np.sin(2.0 * np.pi * 25.0 * TIME)
     assert oscillation(course(theta + buzz, reference)) == pytest.approx(4e-3, rel=0.2)
+
+
+@pytest.mark.parametrize("period", [5.0, 12.0, 20.0])
+def test_hunting_is_what_a_long_hold_shows_and_one_second_cannot(period: float) -> None:
+    time: Array = np.arange(65_000.0) * 1e-3
+    slow = 2e-3 * np.sin(2.0 * np.pi * time / period)
+    moved = np.minimum(time, 5.0) * 0.1
+    done = replace(course(moved + slow, moved), time=time)
+    assert hunting(done) == pytest.approx(2e-3, rel=0.2) and oscillation(done) < 0.6e-3
+    assert hunting(replace(done, theta=moved + 1e-4 * time)) < 1e-9
+    fading = slow * (time < 30.0)
+    assert hunting(replace(done, theta=moved + fading)) < 1e-9, "the first half of the hold does not count"
+    short = replace(done, time=time[:24_000], theta=(moved + slow)[:24_000], theta_ref=moved[:24_000])
+    assert np.isnan(hunting(short)), "19 s of rest"
+    lost = np.where(time < 60.0, moved, np.nan)
+    assert np.isnan(hunting(replace(done, theta=lost)))
 
 
 def test_of_a_wrist_that_has_failed_or_had_no_second_it_is_not_known() -> None:

@@ -12,8 +12,8 @@ import pytest
 import wristctl
 from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run
-from wristctl.simulation.closed_loop import Repeated, Simulation
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.studies.counting import watched
 from wristctl.studies.findings import Findings

@@ -13,7 +13,7 @@ import wristctl
 from tests.studies.conftest import repeated
 from wristctl.records import start_run
 from wristctl.report.printed_table import Table
-from wristctl.simulation.closed_loop import Simulation
+from wristctl.simulation.repetitions import Simulation
 from wristctl.studies import hw_tables
 from wristctl.studies.counting import watched
 from wristctl.studies.findings import Findings

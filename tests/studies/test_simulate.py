@@ -17,8 +17,8 @@ from wristctl.comparison.statistics import spread
 from wristctl.config.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.simulation import closed_loop
-from wristctl.simulation.closed_loop import Repeated
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import COLUMNS
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.simulate import SIMULATE, Simulated

@@ -113,6 +113,8 @@ METRICS: Choices[Any] = Choices(
         "tip_rmse_mm": "wristctl.simulation.metrics:TIP_RMSE",
         "tip_steady_mm": "wristctl.simulation.metrics:TIP_STEADY",
         "oscillation": "wristctl.simulation.metrics:OSCILLATION",
+        "hunting": "wristctl.simulation.metrics:HUNTING",
+        "observer_consistency": "wristctl.simulation.metrics:OBSERVER",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
     },
 )

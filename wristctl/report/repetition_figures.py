@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from wristctl.comparison.statistics import spread_over_time
 from wristctl.report.style import BLACK, figure, legend_below, line, title
-from wristctl.simulation.closed_loop import Repeated
+from wristctl.simulation.repetitions import Repeated
 
 
 def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:

@@ -19,8 +19,9 @@ from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import readings, schedule
 from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
-from wristctl.simulation.observer import Observer, Schedule, Watch, observer_of
+from wristctl.simulation.observer import Observer, Schedule, Watch
 from wristctl.simulation.reference import Motion
+from wristctl.simulation.stationary_filter import observer_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.plant import PlantModel

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,84 +18,16 @@ from wristctl.control.table import controller, gains_of
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory
-from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation_frequency
 from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
 from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.stationary_filter import expected_error
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
 
 _TOGETHER = 64
 """Rollouts that are recorded at once."""
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """A trajectory with its metrics; `failed` where the wrist left its range, which it was in `until` then [s]."""
-
-    trajectory: Trajectory
-    metrics: dict[str, float]
-    failed: bool
-    until: float
-
-
-@dataclass(frozen=True)
-class Repeated:
-    """The same loop several times, each with noise and a drawn plant of its own."""
-
-    first: Simulation
-    metrics: dict[str, Array]
-    """Of each repetition, (R,)."""
-    failed: NDArray[np.bool_]
-    """(R,)"""
-    until: Array
-    """(R,) when each was last within its range [s]."""
-    errors: Array
-    """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
-    bears: float = math.inf
-    """Largest tension that a tendon bears [N]."""
-
-    @classmethod
-    def once(cls, done: Simulation) -> Repeated:
-        """One simulation."""
-        metrics = {name: np.array([value]) for name, value in done.metrics.items()}
-        return cls(done, metrics, np.array([done.failed]), np.array([done.until]), done.trajectory.error[None])
-
-    @property
-    def failure(self) -> str:
-        """In words how it failed; empty where it did not."""
-        if not self.failed.any():
-            return ""
-        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
-        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
-
-    @property
-    def fate(self) -> str:
-        """In words what became of it: that it failed, swings, or pulls harder than tendons can; else empty."""
-        return "; ".join(each for each in (self._end, self._strain) if each)
-
-    @property
-    def _strain(self) -> str:
-        """What no tendon bears; 1 % more is what a spool's steps and a swing of the wrist may add to the limit."""
-        known = self.metrics.get("peak_tension", np.empty(0))
-        most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
-        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 1.01 * self.bears else ""
-
-    @property
-    def _end(self) -> str:
-        if self.failure:
-            return f"FAILED: {self.failure}"
-        known = self.metrics.get("oscillation", np.empty(0))
-        swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
-        if swing <= LIMIT_CYCLE:
-            return ""
-        rate = oscillation_frequency(self.first.trajectory)
-        return f"LIMIT CYCLE: +-{np.degrees(swing):.2g} deg at {rate:.2g} Hz"
-
-    def labelled(self, label: str) -> Repeated:
-        """The same with this label on its trajectory."""
-        course = replace(self.first.trajectory, label=label)
-        return replace(self, first=replace(self.first, trajectory=course))
 
 
 def repeat(
@@ -120,7 +51,9 @@ def repeat(
     rows, times = len(gains), repetitions if is_random(loop) else 1
     loops = loops_of(loop, [draws.plant(each) for each in range(times)])
     each = max(1, _TOGETHER // rows)
-    found: list[_Gathered] = [_Gathered() for _ in range(rows)]
+    believed = loop.sensor, loop.actuator, wrist, loop.control_period
+    expected = expected_error(*believed) if loop.sensor.level == "camera" else None
+    found: list[Gathered] = [Gathered() for _ in range(rows)]
     for first in range(0, times, each):
         now = range(first, min(first + each, times))
 
@@ -136,45 +69,28 @@ def repeat(
         )  # fmt: skip
         for lane, k in enumerate(k for k in now for _ in range(rows)):
             plant = plant_of(wrist, loops[k].plant)
-            found[lane % rows].add(simulation(outcome, lane, motions[which[lane % rows]], plant, loop.plant.model))
+            row = lane % rows
+            found[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
     return [each.repeated(wrist.tension_limit) for each in found]
 
 
-class _Gathered:
-    """Repetitions of one row as they come."""
-
-    def __init__(self) -> None:
-        self._first: Simulation | None = None
-        self._metrics: list[dict[str, float]] = []
-        self._failed: list[bool] = []
-        self._until: list[float] = []
-        self._errors: list[Array] = []
-
-    def add(self, done: Simulation) -> None:
-        self._first = self._first or done
-        self._metrics.append(done.metrics)
-        self._failed.append(done.failed)
-        self._until.append(done.until)
-        if len(self._errors) < _TOGETHER:
-            self._errors.append(done.trajectory.error)
-
-    def repeated(self, bears: float) -> Repeated:
-        assert self._first is not None
-        metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
-        failed, until = np.array(self._failed), np.array(self._until)
-        return Repeated(self._first, metrics, failed, until, np.array(self._errors), bears)
-
-
-def simulation(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Simulation:
-    """The recorded rollout `index` with all its metrics; `plant` is the wrist as it is, of this plant model."""
-    course = trajectory(outcome, index, followed, plant, model)
+def simulation(
+    outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str, expected: float | None = None
+) -> Simulation:
+    """The recorded rollout `index` with all its metrics; as `trajectory` has it."""
+    course = trajectory(outcome, index, followed, plant, model, expected)
     metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
     failed, until = bool(outcome.failed[index]), float(outcome.until[index])
     return Simulation(course, metrics | of_trajectory(course), failed, until)
 
 
-def trajectory(outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str) -> Trajectory:
-    """The recorded rollout `index` as a Trajectory; `plant` is the wrist as it is, of this plant model."""
+def trajectory(
+    outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str, expected: float | None = None
+) -> Trajectory:
+    """The recorded rollout `index` as a Trajectory; `plant` is the wrist as it is, of this plant model.
+
+    `expected` is the standard deviation of its observer's error by what that believes [rad], None without an observer.
+    """
     coordinates = outcome.coordinates(index)
     return Trajectory(
         label="",
@@ -191,6 +107,8 @@ def trajectory(outcome: Outcome, index: int, followed: Motion, plant: WristParam
         tension=_sides(outcome, "tension", index),
         acting=_sides(outcome, "acting", index),
         seen=outcome.column("seen", index),
+        load=None if expected is None else outcome.column("load", index),
+        expected=math.nan if expected is None else expected,
         outside=followed.outside,
     )
 

@@ -15,7 +15,7 @@ from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import Drive, actuate, read_motor, read_winding, wound
 from wristctl.simulation.nonideal import worn
-from wristctl.simulation.observer import go_on, sense
+from wristctl.simulation.observer import estimated_load, go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.elastic import Tendons, pulls_at_start, read_nonideal
@@ -26,9 +26,10 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 RECORDED = (
     "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
+    "load",
 )  # fmt: skip
-"""Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, and the
-angle that the law sees. theta is nan where the lane has failed."""
+"""Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
+angle that the law sees, and the load that its observer estimates. theta is nan where the lane has failed."""
 
 _ALIVE = SUMS.index("alive")
 _COLUMNS = len(RECORDED)
@@ -172,6 +173,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 row[6] = acting_plus / _SIDE
                 row[7] = acting_minus / _SIDE
                 row[8] = seen
+                row[9] = estimated_load(state.watch, angle)
                 for i in range(n):
                     row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)

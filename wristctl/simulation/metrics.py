@@ -16,7 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
-from wristctl.simulation.oscillation import oscillation
+from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
 
 _LEAST_MOVE = 1e-9
@@ -203,6 +203,16 @@ OSCILLATION = Metric(
     "half the peak-to-peak of the angle over the last second at rest, its trend removed",
     of_trajectory=oscillation,
     heading="oscillation [rad]",
+)
+HUNTING = Metric(
+    "rad",
+    "half the peak-to-peak of the angle over the last half of a hold of at least 20 s, its trend removed",
+    of_trajectory=hunting,
+)
+OBSERVER = Metric(
+    "",
+    "RMS of the observer's error over what it expects by what it believes: 1 where that is so",
+    of_trajectory=lambda course: course.consistency,
 )
 OUTSIDE_DOMAIN = Metric(
     "", "share of the wanted tips outside the network's trained domain", of_trajectory=lambda course: course.outside

@@ -7,21 +7,13 @@ what the motors have delivered since. The gain is the stationary one for the fra
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from wristctl.arrays import Array
-from wristctl.config.plant import Actuator, Sensor
-from wristctl.config.wrist import WristParameters
 from wristctl.control.model import one_segment
-from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import at_rest, drive_of, frictionless_pulls, tendon_stiffness
+from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
-from wristctl.wrist.pcc import PCC
-from wristctl.wrist.segments import load_segments, segments
 
 _ONE = (0,)
 
@@ -129,48 +121,15 @@ def predict(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: 
 
 
 @compiled
+def estimated_load(watch: Any, angle: Any) -> Any:
+    """Load torque [N m] as the observer behind a camera makes it out; nothing where there is none."""
+    if watch is None:
+        return 0.0 * angle
+    return rows_of(watch.observer.now)[2]
+
+
+@compiled
 def go_on(watch: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
     """`predict` behind a camera; nothing where there is none."""
     if watch is not None:
         predict(watch.observer, drive, known, tick, plus, minus, h)
-
-
-@kernel
-def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
-    known, x = load_segments(rows_of(model)), rows_of(state)
-    zero = 0.0 * x[0]
-    propagate(drive, known, x, plus + zero, minus + zero, h)
-
-
-@lru_cache(maxsize=256)
-def stationary_gain(sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float) -> Array:
-    """The Kalman gain (3,) for one frame after another, from the prediction linearised where the wrist is straight."""
-    drive = drive_of(actuator)
-    delivered = at_rest(drive, wrist, PCC, np.zeros(1))[[0, 2]]
-    small = 1e-6
-    states = small * np.eye(4, 3)
-    for state in states:
-        _propagate_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
-    tick = (states[:3] - states[3]).T / small
-    unknown = tick[1, 2]  # rate gained in one period per unit of torque
-    noise = np.diag([0.0, unknown**2 * sensor.torque_noise**2 / period, sensor.load_drift**2 * period])
-    ticks = max(1, round(1.0 / (sensor.frame_rate * period)))
-    frame, between = np.eye(3), np.zeros((3, 3))
-    for _ in range(ticks):
-        frame, between = tick @ frame, tick @ between @ tick.T + noise
-    variance = max(np.deg2rad(sensor.noise_deg) ** 2, 1e-12)
-    covariance, gain = between, np.zeros(3)
-    for _ in range(500):
-        gain = covariance[:, 0] / (covariance[0, 0] + variance)
-        covariance = frame @ (covariance - np.outer(gain, covariance[0])) @ frame.T + between
-    gain.setflags(write=False)
-    return gain
-
-
-def observer_of(
-    sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float, ticks: int, theta: float
-) -> Observer:
-    """A rollout's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
-    start = np.array([theta, 0.0, 0.0])
-    gain = stationary_gain(sensor, actuator, wrist, period).copy()
-    return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1, np.int64))

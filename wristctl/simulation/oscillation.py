@@ -1,4 +1,4 @@
-"""Does a loop come to rest, or does it swing: the oscillation that is left where the reference rests, and how fast.
+"""Does a loop come to rest, or does it swing or hunt: what is left where the reference rests, and how fast it moves.
 
 Half the peak-to-peak of the angle over the last second, its trend removed. Of a reference that never rests it is the
 error's, over the last second or the last two of its periods, with all up to four times its frequency removed.
@@ -18,6 +18,8 @@ LIMIT_CYCLE = np.deg2rad(0.1)
 """Half peak-to-peak [rad] above which a loop is said to swing."""
 WINDOW = 1.0
 """[s]"""
+LONG_HOLD = 20.0
+"""Rest [s] that shows whether a loop hunts."""
 _HARMONICS = 4.0
 _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
@@ -28,6 +30,21 @@ def oscillation(course: Trajectory) -> float:
     """Half the peak-to-peak [rad] that is left at rest; nan where the wrist has failed or there is no time to rest."""
     left = remaining(course)
     return _UNKNOWN if left is None else float(np.ptp(left) / 2.0)
+
+
+def hunting(course: Trajectory) -> float:
+    """Half the peak-to-peak [rad] over the last half of a hold of at least LONG_HOLD; nan where there is none.
+
+    Friction and slow integrals creep with periods of 5 to 20 s, which one second cannot show.
+    """
+    moved = np.flatnonzero(np.diff(course.theta_ref))
+    begun = int(moved[-1]) + 1 if len(moved) else 0
+    held = course.theta[(begun + len(course.theta)) // 2 :]
+    if (len(course.theta) - begun) * _step(course) < LONG_HOLD or not np.isfinite(held).all():
+        return _UNKNOWN
+    place = np.linspace(-1.0, 1.0, len(held))
+    trend = np.polynomial.polynomial.polyfit(place, held, 1)
+    return float(np.ptp(held - np.polynomial.polynomial.polyval(place, trend)) / 2.0)
 
 
 def oscillation_frequency(course: Trajectory) -> float:

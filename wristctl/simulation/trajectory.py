@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "theta": ("rad", "bending angle of the last disc"),
     "rate": ("rad/s", "its rate"),
     "theta_seen": ("rad", "bending angle that the controller sees: behind a camera the observer's"),
+    "load_seen": ("N m", "load torque as the observer estimates it; 0 where there is none"),
     "theta_ref": ("rad", "reference angle that the controller follows"),
     "theta_desired": ("rad", "true wanted angle"),
     "error": ("rad", "theta - theta_ref (E12)"),
@@ -64,6 +66,10 @@ class Trajectory:
     """Tension as it acts on the wrist, (T, 2); None where it is as commanded or cannot be known."""
     seen: Array | None = None
     """Angle that the controller sees, (T,); None where that is theta."""
+    load: Array | None = None
+    """Load torque as the observer estimates it, (T,); None where there is no observer."""
+    expected: float = math.nan
+    """Standard deviation of the observer's error of the angle by what it believes [rad]."""
     outside: float = 0.0
     """Share of the wanted tips outside the domain of the network behind the reference."""
 
@@ -71,6 +77,13 @@ class Trajectory:
     def error(self) -> Array:
         """e = theta - theta_ref (E12), (T,)."""
         return self.theta - self.theta_ref
+
+    @property
+    def consistency(self) -> float:
+        """RMS of the observer's error over what it expects of itself; nan where there is no observer."""
+        if self.seen is None or not self.expected > 0.0:
+            return math.nan
+        return float(np.sqrt(np.mean((self.seen - self.theta) ** 2)) / self.expected)
 
     @cached_property
     def tip_distance(self) -> Array:
@@ -86,6 +99,7 @@ class Trajectory:
             "theta": self.theta,
             "rate": self.rate,
             "theta_seen": self.theta if self.seen is None else self.seen,
+            "load_seen": np.zeros_like(self.theta) if self.load is None else self.load,
             "theta_ref": self.theta_ref,
             "theta_desired": self.theta_desired,
             "error": self.error,

@@ -18,7 +18,7 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.simulation.closed_loop import Simulation
+    from wristctl.simulation.repetitions import Simulation
 
 
 @dataclass(frozen=True, repr=False, eq=False)

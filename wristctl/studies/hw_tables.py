@@ -11,7 +11,7 @@ import pandas as pd
 from wristctl.comparison.paper import EXPERIMENT
 from wristctl.report import trial_figures
 from wristctl.report.printed_table import Table
-from wristctl.simulation.closed_loop import Simulation
+from wristctl.simulation.repetitions import Simulation
 from wristctl.studies.findings import Findings
 from wristctl.studies.session import Session
 from wristctl.trial.trials import Trial

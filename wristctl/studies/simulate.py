@@ -19,7 +19,7 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.simulation.closed_loop import Repeated
+    from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
 
 
@@ -71,6 +71,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
     from wristctl.report.loop_figures import angles, errors, tensions
+    from wristctl.report.observer_figures import consistency
     from wristctl.report.repetition_figures import error_sizes
     from wristctl.report.truth_table import truth_heading, truth_tables
     from wristctl.report.wrist_drawing import stroboscope
@@ -105,6 +106,8 @@ def simulate(session: Session) -> Simulated:
         if len(repeated.failed) > 1:
             findings.figure("error-repetitions", error_sizes, [repeated])
         findings.figure("tensions", tensions, course)
+        if course.load is not None and course.expected > 0.0:
+            findings.figure("observer", consistency, course, heading=world)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     return Simulated(session.study, findings, tables, repeated, failed)
 

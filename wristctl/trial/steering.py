@@ -15,7 +15,8 @@ from wristctl.control.response import Controlled, respond
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import fuse, observer_of, predict
+from wristctl.simulation.observer import fuse, predict
+from wristctl.simulation.stationary_filter import observer_of
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE

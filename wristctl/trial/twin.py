@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from wristctl.config.control import SimulateSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.study import Study
-from wristctl.simulation.closed_loop import Simulation, simulate
+from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.repetitions import Simulation
 from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse
