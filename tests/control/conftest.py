@@ -12,7 +12,7 @@ import pytest
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, now_of, wrist_of
 from wristctl.control.table import controller
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
 from wristctl.wrist.allocation import allocate, reach
 from wristctl.wrist.integrator import step
@@ -33,7 +33,7 @@ ClosedLoop = Callable[..., Course]
 Sine = Callable[..., np.ndarray]
 
 
-@compiled
+@kernel
 def _run(
     law: Any, plant: Any, model: Any, limits: Any, gains: Any, reference: Any, now: Any, memory: Any, state: Any,
     out: Any, period: float, segments: tuple[int, ...],

@@ -11,7 +11,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.gvsc import strain_model
 from wristctl.control.law import wrist_of
 from wristctl.control.model import one_segment
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
@@ -20,7 +20,7 @@ FINE = 32
 POSES = [(-9.81, 0.0), (9.81, 0.0), (0.0, -9.81), (-8.0, 3.0)]
 
 
-@compiled
+@kernel
 def _strain(wrist: Any, theta: Any, out: Any) -> None:
     angle, result = rows_of(theta), rows_of(out)
     result[0], result[1], result[2], result[3] = strain_model(wrist_of(wrist), angle[0])

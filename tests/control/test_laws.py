@@ -15,7 +15,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, wrist_of
 from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
@@ -23,13 +23,13 @@ from wristctl.wrist.segments import segments
 WRIST = WristParameters(gravity=(-8.0, 3.0))
 
 
-@compiled
+@kernel
 def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, torque: Any) -> None:
     result = rows_of(torque)
     result[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
 
 
-@compiled
+@kernel
 def _one_segment(wrist: Any, now: Any, out: Any) -> None:
     row, result = now_of(now), rows_of(out)
     result[0], result[1] = one_segment(wrist_of(wrist), row.theta, row.rate)

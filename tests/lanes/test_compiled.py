@@ -15,6 +15,7 @@ import pytest
 import wristctl
 from wristctl.lanes import compiled as module
 from wristctl.lanes.compiled import TRIED, cache_folder, caching, sources
+from wristctl.lanes.functions import clip
 
 PACKAGE = Path(wristctl.__file__).parent
 CONFIG = ("wristctl.config", "wristctl.records")
@@ -30,9 +31,19 @@ def test_importing_all_compiled_code_leaves_numbas_settings_alone() -> None:
 
 
 def test_a_function_rests_on_what_it_imports_and_on_nothing_else() -> None:
-    names = {file.relative_to(PACKAGE).as_posix() for file in sources(PACKAGE / "simulation" / "kernel.py")}
-    assert {"simulation/kernel.py", "wrist/integrator.py", "wrist/jacobian.py", "lanes/lane.py"} <= names
-    assert not any(name.startswith(("config/", "records/", "vision/", "board/", "cli/")) for name in names)
+    loop, plant = (PACKAGE / "simulation" / "kernel.py", PACKAGE / "wrist" / "pcc.py")
+    names = [{each.relative_to(PACKAGE).as_posix() for each in sources(file)} for file in (loop, plant)]
+    assert {"simulation/kernel.py", "simulation/observer.py", "wrist/elastic.py", "lanes/lane.py"} <= names[0]
+    assert {"wrist/integrator.py", "wrist/jacobian.py", "lanes/lane.py"} <= names[1]
+    assert not any(
+        name.startswith(("config/", "records/", "vision/", "board/", "cli/")) for name in names[0] | names[1]
+    )
+
+
+def test_what_is_for_compiled_code_is_refused_to_python() -> None:
+    """numba would jump to an address that is not there."""
+    with pytest.raises(TypeError, match="clip is for compiled code"):
+        clip(1.0, 2.0, 3.0)
 
 
 def test_another_line_in_an_imported_file_is_another_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import bessel, clip, tanh
 from wristctl.lanes.lane import dot, planar, sqrt, turn
 from wristctl.lanes.rows import rows_of
 from wristctl.lanes.types import LANES
 
 
-@compiled
+@kernel
 def _functions(x: Any, out: Any) -> None:
     row, result = rows_of(x), rows_of(out)
     result[0] = tanh(row[0])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import dot, exp2i, floor, planar, polynomial, rounded, sqrt, turn, where
 from wristctl.lanes.rows import rows_of
@@ -26,7 +26,7 @@ COUNTS = pytest.mark.parametrize("count", [1, LANES, LANES + 3], ids=["alone", "
 _cubic = polynomial((2.0, -1.0, 0.5, 0.25))
 
 
-@compiled
+@kernel
 def _arithmetic(given: Any, out: Any) -> None:
     row, result = rows_of(given), rows_of(out)
     a, b, c, d = row[0], row[1], row[2], row[3]
@@ -52,7 +52,7 @@ def _arithmetic(given: Any, out: Any) -> None:
     result[19] = _cubic(1e-3 * a)
 
 
-@compiled
+@kernel
 def _comparisons(given: Any, out: Any) -> None:
     row, result = rows_of(given), rows_of(out)
     a, b, c = row[0], row[1], row[2]
@@ -65,7 +65,7 @@ def _comparisons(given: Any, out: Any) -> None:
     result[6] = where(a < 2.0, a, b)
 
 
-@compiled
+@kernel
 def _vectors(given: Any, out: Any) -> None:
     row, result = rows_of(given), rows_of(out)
     u, v = planar(row[0], row[1]), planar(row[2], row[3])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.parts import block_of, replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_named, rows_of, square_like
 from wristctl.lanes.types import LANES
@@ -36,7 +36,7 @@ _read, _faster = tuple_of(Motor), replacing("torque")
 _motor_of = rows_named(Motor._fields)
 
 
-@compiled
+@kernel
 def _rows(given: Any, out: Any, segments: Any) -> None:
     row, result = rows_of(given), rows_of(out)
     first, rest = part(row, 1, segments), beyond(row, 3)
@@ -55,7 +55,7 @@ def _rows(given: Any, out: Any, segments: Any) -> None:
     result[7] = float(len(matrix) + len(vectors)) + 0.0 * row[0]
 
 
-@compiled
+@kernel
 def _tuples(given: Any, out: Any) -> None:
     motor, result = _read(rows_of(given)), rows_of(out)
     changed = _faster(motor, (3.0 * motor.torque,))
@@ -64,7 +64,7 @@ def _tuples(given: Any, out: Any) -> None:
     result[2] = _motor_of(given).torque
 
 
-@compiled
+@kernel
 def _add(parts: Any, block: int) -> None:
     own = block_of(parts, block)
     rows_of(own.state)[0] = rows_of(own.state)[0] + own.period * rows_of(own.shared)[0]

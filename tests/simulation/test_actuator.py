@@ -11,7 +11,7 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
 from wristctl.simulation.reference import motion
@@ -23,7 +23,7 @@ WRIST = WristParameters()
 PERIOD, MOVE = 1e-3, Reference()
 
 
-@compiled
+@kernel
 def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float) -> None:
     known, motors = load_segments(rows_of(model)), rows_of(state)
     for tick in range(commands.shape[0]):

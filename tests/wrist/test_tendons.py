@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach, torque_of
 from wristctl.wrist.compiled_model import integrate, terms
@@ -21,7 +21,7 @@ from wristctl.wrist.statics import equilibrium, least_stiffness, stiffness
 WRIST = WristParameters()
 
 
-@compiled
+@kernel
 def _allocate(parameters: Any, asked: Any, out: Any) -> None:
     wrist, row, result = load_segments(rows_of(parameters)), rows_of(asked), rows_of(out)
     result[0], result[1] = reach(row[0], wrist, row[2], row[3])

@@ -17,9 +17,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NoReturn, TypeVar, cast
 
 import numba
+from numba.core.registry import CPUDispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,6 +29,8 @@ TRIED = "0.68"
 
 _KEPT_DAYS = 30.0
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
+_INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of what compiled code alone calls: a way in from Python would be compiled for each of them, and never used."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
 _CONSTANT_FREE = ("wristctl.config", "wristctl.records")
@@ -105,9 +108,22 @@ def caching(file: Path, *others: Path) -> Iterator[bool]:
         numba.config.CACHE_DIR = before
 
 
+class _Inner(CPUDispatcher):
+    """A function without a way in from Python, where numba would jump to nowhere."""
+
+    def __call__(self, *_: Any) -> NoReturn:
+        raise TypeError(f"{self.__name__} is for compiled code: call it in a @kernel")
+
+
+def _inner(function: F, **options: Any) -> F:
+    made = numba.njit(**_OPTIONS, **_INNER, **options)(function)
+    made.__class__ = _Inner
+    return cast(F, made)
+
+
 def compiled(function: F) -> F:
     """Compile for code that is compiled: inlined where it is called, and kept with what calls it."""
-    return cast(F, numba.njit(**_OPTIONS)(function))
+    return _inner(function)
 
 
 def spelled_out(function: F) -> F:
@@ -115,7 +131,7 @@ def spelled_out(function: F) -> F:
 
     For what is called once and holds almost all of its caller: that is then compiled one time less.
     """
-    return cast(F, numba.njit(inline="always", **_OPTIONS)(function))
+    return _inner(function, inline="always")
 
 
 def kernel(function: F, *others: Path) -> F:
