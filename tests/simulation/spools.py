@@ -19,6 +19,21 @@ from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+WRIST = WristParameters()
+STIFF = Actuator(level="tendon", friction=0.1, sheath=1.0)
+HOME = WRIST.pretension / STIFF.tendon_stiffness
+"""What both sides have reeled in at pretension on the straight wrist [m]."""
+
+
+def minimum_jerk(begin: float, end: float, duration: float, h: float = 1e-3) -> np.ndarray:
+    s = np.arange(0.0, duration, h) / duration
+    return begin + (end - begin) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def antagonists(travel: np.ndarray) -> np.ndarray:
+    """Spools (T, 2) that reel in on the + side what they pay out on the other."""
+    return HOME + np.stack([travel, -travel], axis=1)
+
 
 class Spooled(NamedTuple):
     """What it did at the start of each step, (T,) each: bend and rate [rad, rad/s], travel of both sides' tendons [m],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -160,6 +162,15 @@ def test_cameras_of_one_stream_scale_the_same_draws_by_their_own_noise() -> None
     first, second = readings(500, [quiet, loud], [(3, 4)] * 2)
     np.testing.assert_allclose(second[:, 0], 4.0 * first[:, 0], rtol=1e-15)
     assert (first[:, 1] == second[:, 1]).all()
+
+
+@pytest.mark.parametrize("burst", [1.0, 3.0, 12.0])
+def test_frames_are_lost_in_bursts_of_the_length_given(burst: float) -> None:
+    sensor = Sensor(level="camera", dropped=0.2)
+    seen = readings(100_000, [sensor], [(1,)], [burst])[0, :, 1]
+    assert 1.0 - seen.mean() == pytest.approx(0.2, rel=0.1)
+    runs = [len(list(each)) for lost, each in itertools.groupby(seen) if lost == 0.0]
+    assert np.mean(runs) == pytest.approx(max(burst, 1.25), rel=0.1)
 
 
 def test_frames_are_taken_at_the_frame_rate_and_arrive_after_the_delay() -> None:
