@@ -10,7 +10,7 @@ import pytest
 
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.functions import bessel, clip, tanh
+from wristctl.lanes.functions import bessel, clip, exp, expm1_of_negative, tanh
 from wristctl.lanes.lane import dot, planar, sqrt, turn
 from wristctl.lanes.rows import rows_of
 from wristctl.lanes.types import LANES
@@ -29,11 +29,13 @@ def _functions(x: Any, out: Any) -> None:
     p = planar(row[0], 2.0)
     result[6] = dot(turn(p) * p + 2.0 * p, p)
     result[7] = sqrt(abs(row[0]))
+    result[8] = exp(row[0])
+    result[9] = expm1_of_negative(-abs(row[0]))
 
 
 def values(x: np.ndarray) -> np.ndarray:
     blocks = to_blocks(x[:, None])
-    out = np.empty((len(blocks), 8, *blocks.shape[2:]))
+    out = np.empty((len(blocks), 10, *blocks.shape[2:]))
     for block, result in zip(blocks, out, strict=True):
         _functions(block, result)
     return to_rows(out, len(x))
@@ -50,6 +52,26 @@ def test_tanh_is_within_three_ulp() -> None:
     with mpmath.workdps(40):
         assert in_ulp(values(x)[:, 0], [mpmath.tanh(mpmath.mpf(float(v))) for v in x]) <= 3.0
     assert values(np.array([0.0, 1e300, -1e300]))[:, 0].tolist() == [0.0, 1.0, -1.0]
+
+
+EXPONENTS = np.concatenate(
+    [np.linspace(-44.0, 44.0, 3001), np.linspace(-1.05, 1.05, 3001), -np.geomspace(1e-300, 1.0, 1001)]
+)
+
+
+def test_exp_is_within_one_ulp_and_ends_at_its_limits() -> None:
+    with mpmath.workdps(40):
+        assert in_ulp(values(EXPONENTS)[:, 8], [mpmath.exp(mpmath.mpf(float(v))) for v in EXPONENTS]) <= 1.0
+    x = np.array([0.0, 44.0, 45.0, 1e300, -44.0, -45.0, -1e300, np.nan])
+    np.testing.assert_allclose(values(x)[:, 8], np.exp(x.clip(-44.0, 44.0)), rtol=3e-16)
+    assert values(x)[0, 8] == 1.0
+
+
+def test_expm1_of_what_is_negative_is_within_one_and_a_half_ulp_however_small_it_is() -> None:
+    x = -abs(EXPONENTS[EXPONENTS != 0.0])
+    with mpmath.workdps(40):
+        assert in_ulp(values(x)[:, 9], [mpmath.expm1(mpmath.mpf(float(v))) for v in x]) <= 1.5
+    assert values(np.array([0.0, -40.0, -1e300]))[:, 9].tolist() == [0.0, -1.0, -1.0]
 
 
 def test_bessel_functions_are_exact_at_zero_and_to_two_ulp_of_one_up_to_a_full_turn() -> None:
