@@ -10,13 +10,14 @@ from scipy.optimize import brentq, fsolve
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import nonideal_of, unmoved, worn
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal, spool_pull, travel
+from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal, spool_pull
 from wristctl.wrist.moving import advance_or_stop
-from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import kernel_of, parameters_of, travel
+from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()
@@ -51,11 +52,19 @@ class Spooled(NamedTuple):
     z_plus: Array
 
 
-@kernel
 def _spooled(
-    parameters: Any, values: Any, stiffness: float, reeled: Any, state: Any, memory: Any, out: Any, h: float, cut: Any
+    model: Any,
+    parameters: Any,
+    values: Any,
+    stiffness: float,
+    reeled: Any,
+    state: Any,
+    memory: Any,
+    out: Any,
+    h: float,
+    cut: Any,
 ) -> None:
-    segment, n = load_segments(rows_of(parameters)), len(cut)
+    segment, n = parameters_of(model, rows_of(parameters)), len(cut)
     zero = 0.0 * segment.length
     tendons = Tendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory))
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
@@ -97,7 +106,8 @@ def spooled(
     state = np.concatenate([np.zeros(n), np.zeros(n) if rate is None else rate])
     parameters = segments(wrist or WristParameters(), n, (0.0, force))
     stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness
-    _spooled(parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, out, h, (0,) * n)
+    move = kernel_of(_spooled, PCC)
+    move(PCC, parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, out, h, (0,) * n)
     return Spooled(*out.T)
 
 
