@@ -70,6 +70,33 @@ def ready(board: Board) -> Board:
     return board
 
 
+def test_a_jog_and_a_move_end_where_they_were_to_go_and_stand_there(board: Board) -> None:
+    board.enable()
+    assert board.jog((40, -30, 0, 7)).position == (40, -30, 0, 7)
+    board.home()
+    status = board.go_to((-90, 0, 300, 0), 400)
+    assert status.position == (-90, 0, 300, 0) and Flag.MOVING not in status.flags and status.rate == (0, 0, 0, 0)
+
+
+def test_a_jog_that_ends_elsewhere_is_told_of(board: Board, wire: BadWire, monkeypatch: pytest.MonkeyPatch) -> None:
+    ready(board)
+    wait, left = wire.wait, [3]
+
+    def stopped(seconds: float) -> None:
+        left[0] -= 1
+        if not left[0]:
+            board.stop()
+        wait(seconds)
+
+    monkeypatch.setattr(wire, "wait", stopped)
+    with pytest.raises(BoardError, match=r"the axes stand at \(\d+, 0, 0, 0\), not at \(2000, 0, 0, 0\)"):
+        board.go_to((2000, 0, 0, 0), 400)
+    left[0] = -1
+    monkeypatch.setattr(wire, "wait", lambda seconds: wire.chip.reset() if left[0] == -1 else wait(seconds))
+    with pytest.raises(Restarted):
+        board.go_to((2000, 0, 0, 0), 400)
+
+
 def test_connecting_waits_for_a_board_that_is_starting(wire: BadWire) -> None:
     wire.lose = 5
     board = Board(wire)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from typing import Any, cast
 
 import pytest
-import typer
 
+from wristctl.cli import operator
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
 from wristctl.studies.session import Session
@@ -90,12 +90,12 @@ def test_the_panel_tells_the_newest_angle_and_verdict_and_counts_the_trials_that
 def test_the_panel_gives_way_to_a_question_and_comes_back(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     beside = []
 
-    def answered(*_: Any, **__: Any) -> str:
+    def answered(meanwhile: Any) -> str:
         screen.read(0.2)
         beside.append(screen.read(0.5))  # four panels' time
         return "yes"
 
-    monkeypatch.setattr(typer, "prompt", answered)
+    monkeypatch.setattr(operator, "typed_line", answered)
     with screen.operator.watch(TRIALS, screen.session) as take:
         take(row(0, 1.0))
         screen.panel("1.00 deg")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +24,7 @@ def test_a_yes_lets_it_go_on(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     monkeypatch.setattr(sys, "stdin", io.StringIO("yes\n"))
     _operator().confirm("the motors will move")
     out, err = capsys.readouterr()
-    assert out.strip() == "" and err == "the motors will move\nType yes to go on:"
+    assert out.strip() == "" and err == "the motors will move\nType yes to go on: "
 
 
 @pytest.mark.parametrize("typed", ["\n", "no\n", "y\n", "YES\n"])
@@ -32,6 +33,32 @@ def test_anything_else_stops(monkeypatch: pytest.MonkeyPatch, typed: str) -> Non
     with pytest.raises(UserError, match="nothing was moved further") as caught:
         _operator("other").confirm("the motors will move")
     assert caught.value.exit_code == 3
+
+
+def test_what_goes_wrong_while_a_person_thinks_ends_the_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also in the middle of a line; a line that is whole is an answer, be it followed by others."""
+    reading, writing = os.pipe()
+    with open(reading) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        moments: list[int] = []
+
+        def meanwhile() -> None:
+            moments.append(len(moments))
+            if len(moments) == 2:
+                os.write(writing, b"ye")
+            if len(moments) == 4:
+                raise TimeoutError
+
+        with pytest.raises(TimeoutError):
+            _operator().confirm("the motors will move", meanwhile)
+        assert moments == [0, 1, 2, 3]
+        os.write(writing, b"yes\nno\n")
+        _operator().confirm("the motors will move", meanwhile)
+        os.close(writing)
+        for _ in range(2):  # the other line, and then the end
+            with pytest.raises(UserError, match="nothing was moved further"):
+                _operator().confirm("the motors will move", meanwhile)
+    assert moments == [0, 1, 2, 3]
 
 
 def test_with_the_flag_nobody_is_asked(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -72,12 +72,12 @@ def at_zero() -> WristCalibration:
 def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
     """Performs the short experiment, changed, and keeps what stopped it."""
 
-    def run(shown: Callable[[dict[str, Any]], None] | None = None, **changes: Any) -> Done:
+    def run(shown: Callable[[dict[str, Any]], None] | None = None, seed: int = 0, **changes: Any) -> Done:
         settings = settings_of(**changes)
-        bench = VirtualBench(settings.bench, WRIST, 0, settings.markers)
+        bench = VirtualBench(settings.bench, WRIST, seed, settings.markers)
         log = TrialLog(tmp_path, settings.bench.segments, settings.control_period)
         trials = trials_of(settings, np.random.default_rng(0))
-        performed = Experiment(settings, WRIST, trials, log, calibration=at_zero)
+        performed = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed)
         error = None
         try:
             performed.run(EmulatedTestbed(bench, settings, View(), None), shown)

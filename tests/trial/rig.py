@@ -55,6 +55,10 @@ class RigBoard:
         self.told.append(("jog", tuple(map(int, positions))))
         self.position[:] = positions
 
+    def go_to(self, positions: Sequence[int], rate: int) -> Status:
+        self.told.append(("go to", tuple(positions), rate))
+        return self.read()
+
     def home(self, positions: Sequence[int] = (0,) * AXES) -> None:
         self.told.append(("home", tuple(positions)))
 
@@ -69,10 +73,6 @@ class RigBoard:
 
     def enable(self) -> None:
         self.told.append("enable")
-
-    def wait_while(self, flag: Flag, timeout: float) -> Status:
-        self.told.append((flag, timeout))
-        return self.read()
 
     def turn(self, rates: Sequence[float]) -> tuple[tuple[float, ...], Status]:
         """Take the rates over; a period later they have moved the axes."""

@@ -13,7 +13,7 @@ import pytest
 
 from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
-from wristctl.board.messages import Fault, State
+from wristctl.board.messages import Fault, Flag, State
 from wristctl.control.table import controller
 from wristctl.trial.control_loop import ControlLoop, TickTiming
 from wristctl.trial.log import TrialLog
@@ -40,8 +40,13 @@ class Rig:
         self.board, self.marker = board, marker
         self.timing, self.log, self.folder = TickTiming(PERIOD), TrialLog(folder, None, PERIOD), folder
         self.rows: list[dict[str, Any]] = []
+        self.at_rest: list[dict[str, Any]] = []
         chosen = settings_of(**settings)
-        self.loop = ControlLoop(board, marker, chosen, WRIST, "ulnar", signs, self.timing, self.log, self.rows.append)
+        self.loop = ControlLoop(board, marker, chosen, WRIST, "ulnar", signs, self.timing, self.log, self._shown)
+
+    def _shown(self, row: dict[str, Any]) -> None:
+        """A tick of a motion, or one behind it, in which no law is asked."""
+        (self.at_rest if math.isnan(row["torque"]) else self.rows).append(row)
 
     def follow(self, motion: Any, trial: int = -1) -> None:
         self.loop.follow(motion, controller("feedforward"), (), trial)
@@ -71,15 +76,54 @@ def test_ticks_come_at_the_period_on_the_clock(rig_of: RigOf) -> None:
     rig.follow(at_rest(0.2, PERIOD))
     assert [row["clock"] for row in rig.rows] == pytest.approx(100.0 + PERIOD * np.arange(40))
     assert [row["time"] for row in rig.rows] == pytest.approx(PERIOD * np.arange(40))
-    assert rig.loop.next_tick == pytest.approx(100.2) and rig.timing.overruns == 0
-    assert rig.timing.late == pytest.approx([0.0] * 40, abs=1e-9)
+    assert rig.loop.next_tick == pytest.approx(100.2 + PERIOD) and rig.timing.overruns == 0
+    assert rig.timing.late == pytest.approx([0.0] * 41, abs=1e-9)
+
+
+def test_behind_a_motion_ticks_go_on_without_a_rate_until_the_board_says_that_nothing_moves(rig_of: RigOf) -> None:
+    rig = rig_of()
+    turn, since = rig.board.turn, [math.inf]
+
+    def ramps_down(rates: Any) -> Any:
+        if any(rates):
+            since[0], rig.board.flags = math.inf, Flag.MOVING
+        else:
+            since[0] = min(since[0], rig.board.transport.now())
+            if rig.board.transport.now() > since[0] + 0.03:
+                rig.board.flags = Flag(0)
+        return turn(rates)
+
+    rig.board.turn = ramps_down
+    rig.follow(at_rest(0.1, PERIOD), trial=3)
+    assert [what[1] for what in rig.board.told[-8:]] == [(0.0,) * 4] * 8 != [what[1] for what in rig.board.told[-9:-1]]
+    assert [row["trial"] for row in rig.at_rest] == [-1] * 8, "they belong to no trial"
+    assert [row["clock"] for row in rig.at_rest] == pytest.approx(100.1 + PERIOD * np.arange(8))
+    assert (
+        len(rig.table("log")) == 20 and len(rig.table("between")) == 8 == rig.table("between")["tension_1"].isna().sum()
+    )
+
+
+def test_motors_that_do_not_come_to_rest_are_a_reason_to_stop(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.board.flags = Flag.MOVING
+    with pytest.raises(SafetyStop, match=r"the motors do not stand 0\.5 s after a motion"):
+        rig.follow(at_rest(0.1, PERIOD))
+    assert len(rig.at_rest) == pytest.approx(0.5 / PERIOD, abs=2)
+
+
+def test_limits_hold_behind_a_motion_too(rig_of: RigOf) -> None:
+    rig = rig_of()
+    rig.board.flags = Flag.MOVING
+    rig.marker._angle = lambda: 0.0 if len(rig.at_rest) < 10 else math.nan
+    with pytest.raises(SafetyStop, match="no usable marker angle"):
+        rig.follow(at_rest(0.1, PERIOD))
 
 
 def test_a_second_motion_counts_its_own_time(rig_of: RigOf) -> None:
     rig = rig_of()
     rig.follow(at_rest(0.1, PERIOD))
     rig.follow(at_rest(0.1, PERIOD), trial=0)
-    assert rig.rows[20]["time"] == pytest.approx(0.0) and rig.rows[20]["clock"] == pytest.approx(100.1)
+    assert rig.rows[20]["time"] == pytest.approx(0.0) and rig.rows[20]["clock"] == pytest.approx(100.1 + PERIOD)
 
 
 def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: RigOf) -> None:
@@ -94,7 +138,7 @@ def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: R
 
     rig.board.turn = slow
     rig.follow(motion)
-    assert rig.timing.overruns == 2 and len(rig.rows) == 40 - 2
+    assert rig.timing.overruns == 2 and len(rig.rows) == 40 - 2 == len(rig.timing.late) - len(rig.at_rest)
     assert rig.rows[11]["late"] == pytest.approx(0.001) == rig.timing.late[11]
     assert rig.rows[11]["theta_ref"] == motion.theta_ref[13], "it goes on where the reference is by then"
     assert rig.rows[12]["late"] == pytest.approx(0.0, abs=1e-9)
@@ -129,7 +173,7 @@ def test_the_log_has_reference_and_error_of_the_tick(rig_of: RigOf) -> None:
         for name in ("theta_ref", "rate_ref", "acceleration_ref", "theta_desired"):
             assert row[name] == getattr(motion, name)[k]
         assert row["error"] == pytest.approx(row["theta"] - row["theta_ref"])
-    assert len(rig.table("log")) == 40 and rig.table("between").empty
+    assert len(rig.table("log")) == 40 and len(rig.table("between")) == len(rig.at_rest) == 1
 
 
 def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf) -> None:
@@ -146,7 +190,7 @@ def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf)
     assert math.isnan(second["theta_measured"]) and math.isnan(second["captured"]) and second["verdict"] == "no tip"
     assert third["captured"] == pytest.approx(2 * PERIOD - 0.002)
     frames = rig.table("frames")
-    assert frames["number"].tolist() == list(range(20, 30)), "frames of trials alone are listed"
+    assert frames["number"].tolist() == list(range(21, 31)), "frames of trials alone are listed"
     assert (frames["used"] - frames["captured"]).tolist() == pytest.approx([0.002] * 10)
     assert frames["theta"].isna().tolist() == [False, True] + [False] * 8
 
@@ -212,7 +256,7 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
     rig = rig_of()
     rig.follow(at_rest(0.05, PERIOD))
     ahead = 0.5 * PERIOD - 0.33 * 0.003
-    for row, sides in zip(rig.rows, told, strict=True):
+    for row, sides in zip(rig.rows + rig.at_rest, told, strict=True):
         one, two, four, five = (row[f"position_{k}"] + ahead * row[f"sent_{k}"] for k in (1, 2, 4, 5))
         step = SETTINGS.actuator.step_length
         assert sides == pytest.approx((0.5 * step * (four + five), 0.5 * step * (one + two)), abs=1e-12)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tests.trial.rig import Marker, RigBoard
-from wristctl.board.messages import JOG_RATE, Flag, Target
+from wristctl.board.messages import JOG_RATE
 from wristctl.config.hw_run import Homing
 from wristctl.config.plant import Actuator
-from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 
@@ -149,40 +149,4 @@ def test_slackened_tendons_are_paid_out_by_the_pull_each_in_its_sense() -> None:
     board: Any = RigBoard((1, 2, 3, 4))
     assert slacken(board, SPOOLS, Homing(pull=1e-3), (1, -1, 1, -1)) == (1, 2, 3, 4)
     steps = round(1e-3 / SPOOLS.step)
-    assert board.told == [Target((-steps, steps, -steps, steps), (JOG_RATE,) * 4), (Flag.MOVING, 5.0)]
-
-
-# --- reading the marker -----------------------------------------------------------------------------------------------
-
-
-def test_waiting_keeps_the_boards_link_alive() -> None:
-    board: Any = RigBoard()
-    Patience(board).wait(0.1)
-    assert board.transport.now() == pytest.approx(100.1)
-    assert len(board.pings) == pytest.approx(5, abs=1) and max(np.diff(board.pings)) < 0.05
-    Patience(board).wait(0.0)
-    assert board.transport.now() == pytest.approx(100.1)
-
-
-def test_a_reading_is_the_median_of_as_many_usable_frames_as_asked_for() -> None:
-    board: Any = RigBoard()
-    angles = iter([9.0, 0.1, math.nan, 0.5, 0.2, 7.0, 7.0])
-    tracking: Any = Marker(board, lambda: next(angles))
-    assert Patience(board).angle(tracking, 3) == 0.2, "what was seen before does not count"
-    assert next(angles) == 7.0
-
-
-def test_frames_taken_before_the_reading_began_do_not_count() -> None:
-    board: Any = RigBoard()
-    angles = iter([0.0, 1.0, 2.0, 3.0, 4.0])
-    tracking: Any = Marker(board, lambda: next(angles))
-    tracking.delay = 0.03  # at 20 ms between looks: the first comes from before
-    assert Patience(board).angle(tracking, 1) == 2.0
-
-
-def test_a_marker_that_cannot_be_read_for_two_seconds_is_said_with_why() -> None:
-    board: Any = RigBoard()
-    tracking: Any = Marker(board, lambda: math.nan)
-    with pytest.raises(SafetyStop, match=r"could not be read \(no tip\)"):
-        Patience(board).angle(tracking, 1)
-    assert 2.0 < board.transport.now() - 100.0 < 2.1
+    assert board.told == [("go to", (-steps, steps, -steps, steps), JOG_RATE)]

@@ -76,7 +76,7 @@ class BenchWrist:
         self._edges = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
-        self.disturb(Disturbances(), math.inf)  # no trial yet: nothing breaks while it is homed
+        self.begin(Disturbances(), math.inf)  # no trial yet: nothing breaks while it is homed
         self._face("ulnar")
 
     @property
@@ -96,6 +96,11 @@ class BenchWrist:
         if DIRECTIONS[direction].plane != self._plane:
             self._state[:] = 0.0
             self._face(direction)
+
+    def begin(self, disturbances: Disturbances, start: float) -> None:
+        """A trial: what breaks in it, and these disturbances, count from `start` on the board's clock."""
+        self._begun = start
+        self.disturb(disturbances, start)
 
     def disturb(self, disturbances: Disturbances, start: float) -> None:
         """Let these act from here on, in place of others; their times count from `start` on the board's clock."""
@@ -121,7 +126,7 @@ class BenchWrist:
                 self._stepper, self._sides
             )  # fmt: skip
             heard = self._follow(
-                hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._start, out,
+                hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._begun, out,
                 (0,) * self._n
             )  # fmt: skip
             self._edges = self._edges[heard:]

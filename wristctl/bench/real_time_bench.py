@@ -53,6 +53,10 @@ class RealTimeBench:
         """As `Bench.face`."""
         self._ask("face", direction)
 
+    def disturb(self, disturbances: Disturbances, start: float) -> None:
+        """As `Bench.disturb`."""
+        self._ask("disturb", disturbances, start)
+
     def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
         """As `Bench.begin`."""
         self._ask("begin", start, disturbances, noise)

@@ -56,10 +56,15 @@ class Rig:
         self.catch_up()
         self.wrist.face(direction)
 
+    def disturb(self, disturbances: Disturbances, start: float) -> None:
+        """Let these act, their times counted from `start`."""
+        self.catch_up()
+        self.wrist.disturb(disturbances, start)
+
     def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
         """A trial's motion begins at `start`: disturbances, faults and frames of the stream `noise` count from it."""
         self.catch_up()
+        self.wrist.begin(disturbances or Disturbances(), start)
         if noise is not None:
             self.shutter.begin(start, noise)
-        self.wrist.disturb(disturbances or Disturbances(), start)
         self.faults.begin(start)

@@ -68,6 +68,10 @@ class BenchServer:
         """As `Bench.face`."""
         self._rig.wrist.face(direction)
 
+    def disturb(self, disturbances: Disturbances, start: float) -> None:
+        """As `Bench.disturb`."""
+        self._rig.disturb(disturbances, start - self._start)
+
     def begin(self, start: float, disturbances: Disturbances | None, noise: Entropy | None = None) -> None:
         """As `Bench.begin`."""
         self._rig.begin(start - self._start, disturbances, noise)

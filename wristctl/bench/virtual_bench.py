@@ -30,6 +30,10 @@ class VirtualBench:
         """Turn the bench so that this direction's plane is the one that bends and is seen."""
         self._rig.face(direction)
 
+    def disturb(self, disturbances: Disturbances, start: float) -> None:
+        """Let these act from `start` on, beside no trial: faults and the camera's stream go on as they are."""
+        self._rig.disturb(disturbances, start)
+
     def begin(self, start: float, disturbances: Disturbances | None = None, noise: Entropy | None = None) -> None:
         """A trial's motion begins at `start`: disturbances, faults and frames of the stream `noise` count from it."""
         self._rig.begin(start, disturbances, noise)

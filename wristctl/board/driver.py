@@ -31,6 +31,7 @@ from wristctl.board.messages import (
     Result,
     State,
     Status,
+    Target,
 )
 from wristctl.board.transport import Transport
 
@@ -124,9 +125,12 @@ class Board:
         return sent, self.send(Rate(sent))
 
     def jog(self, positions: Sequence[int]) -> Status:
-        """Creep to `positions` (steps) before homing, and wait until the axes stand."""
-        self.send(Jog(_four(positions, int)))
-        return self.wait_while(Flag.MOVING, timeout=30.0)
+        """Creep to `positions` (steps) before homing, and wait until the axes stand there."""
+        return self._arrive(Jog(_four(positions, int)))
+
+    def go_to(self, positions: Sequence[int], rate: int) -> Status:
+        """Go to `positions` (steps) no faster than `rate` (steps/s), and wait until the axes stand there."""
+        return self._arrive(Target(_four(positions, int), (rate, rate, rate, rate)))
 
     def home(self, positions: Sequence[int] = (0,) * AXES) -> Status:
         """Say where the axes stand (steps); positions are trusted from here on."""
@@ -164,7 +168,7 @@ class Board:
             if self.transport.now() > deadline:
                 raise BoardError("firmware", f"still {flag.name} after {timeout:g} s", self.transport.name)
             if status.state == State.FAULT:
-                raise Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
+                raise self.faulted(status)
             self.ping()
             self.transport.wait(self._watchdog / 4)
         return status
@@ -186,6 +190,15 @@ class Board:
         finally:
             self.transport.close()
 
+    def _arrive(self, move: Jog | Target) -> Status:
+        self.send(move)
+        status = self.wait_while(Flag.MOVING, timeout=30.0)
+        if status.position != move.position:
+            self.see_restart()
+            what = f"the axes stand at {status.position}, not at {move.position}"
+            raise BoardError("firmware", what, self.transport.name, "home again")
+        return status
+
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
         answer = self._exchange.ask(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
         result = Result(answer[0])
@@ -193,9 +206,9 @@ class Board:
         content: tuple[Any, ...] = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
         if result == Result.FAULTED:
             status = Status(*content) if kind is Status else self.read()
-            raise Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
+            raise self.faulted(status)
         if result != Result.OK:
-            self._see_restart()
+            self.see_restart()
             raise Refused(self.transport.name, command, result)
         return result, content
 
@@ -210,7 +223,12 @@ class Board:
                     sent, seen = self.traffic.sent, self.traffic.bytes_read
                     raise NoAnswer(self.transport.name, command, sent, seen) from None
 
-    def _see_restart(self) -> None:
+    def faulted(self, status: Status) -> Faulted:
+        """The error that tells of the faults of this status."""
+        return Faulted(self.transport.name, status.faults, self._exchange.silence, self._watchdog)
+
+    def see_restart(self) -> None:
+        """Raises Restarted where the board is no longer the one that we have connected to."""
         if self.hello is None:
             return
         answer = self._exchange.ask(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from wristctl.cli.progress import PLAIN, Terminal
+from wristctl.cli.typed import idle, typed_line
 from wristctl.config.errors import UserError
 from wristctl.studies.session import Session
 
 if TYPE_CHECKING:
     from wristctl.trial.control_loop import Shown
+    from wristctl.trial.patience import Meanwhile
     from wristctl.trial.trials import Trial
 
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
@@ -34,13 +36,14 @@ class TerminalOperator:
         """A text on stderr, also when the command is to be quiet."""
         self.console.print(text, **PLAIN)
 
-    def confirm(self, what: str) -> None:
+    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
         """Asks on the terminal, and takes nothing but yes."""
         with self.console.aside():
             typer.echo(what, err=True)
             if "yes" in self.flags:
                 return
-            if typer.prompt("Type yes to go on", default="no", show_default=False, err=True) != "yes":
+            typer.echo("Type yes to go on: ", nl=False, err=True)
+            if typed_line(meanwhile or idle) != "yes":
                 raise UserError("nothing was moved further", fix="type yes, or --yes for scripted use", exit_code=3)
 
     def dare(self, what: str) -> None:

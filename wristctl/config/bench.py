@@ -87,6 +87,15 @@ class StepperActuator(Actuator, TendonFacts):
     level: Literal["tendon"] = choice("tendon", "the simulation's actuator with motors and elastic tendons")
 
 
+class Person(Section):
+    """Whoever is asked to do something at the emulated rig, as at a real one."""
+
+    takes: float = quantity(10.0, "s", "from a question to its answer", "assumed", ge=0)
+    force: float = quantity(
+        0.0, "N", "with which a wrist that the motors hold is bent to one side and the other meanwhile"
+    )
+
+
 class BenchSettings(Section):
     """The emulated bench."""
 
@@ -95,4 +104,5 @@ class BenchSettings(Section):
     actuator: StepperActuator = StepperActuator()
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
+    person: Person = Person()
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong in each trial")

@@ -13,6 +13,7 @@ from wristctl.studies.inputs import Inputs
 
 if TYPE_CHECKING:
     from wristctl.trial.control_loop import Shown
+    from wristctl.trial.patience import Meanwhile
     from wristctl.trial.trials import Trial
 
 
@@ -40,8 +41,11 @@ class Operator(Protocol):
     def tell(self, text: str) -> None:
         """Show a text that is no part of the result."""
 
-    def confirm(self, what: str) -> None:
-        """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not."""
+    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
+        """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not.
+
+        Until then `meanwhile` is called again and again: what it raises ends the question.
+        """
 
     def dare(self, what: str) -> None:
         """What should not be done on hardware. Raises UserError where nobody has said that it is to be done anyway."""

@@ -11,6 +11,7 @@ from wristctl.studies.session import Session
 
 if TYPE_CHECKING:
     from wristctl.trial.control_loop import Shown
+    from wristctl.trial.patience import Meanwhile
     from wristctl.trial.trials import Trial
 
 
@@ -20,7 +21,7 @@ class Unattended:
     def tell(self, text: str) -> None:
         """Nobody to tell."""
 
-    def confirm(self, what: str) -> None:
+    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
         """Raises UserError."""
         raise UserError(f"nobody is there to agree to this: {what}", fix="use the command line", exit_code=3)
 

@@ -13,7 +13,8 @@ from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.interrupt import undisturbed
 from wristctl.records import Run
 from wristctl.trial.halt import halt
-from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.patience import Patience
 from wristctl.trial.prepare import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import Testbed
@@ -74,10 +75,11 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings) -> WristCalib
     try:
         hello = board.connect()
         try:
-            testbed.face(settings.plane, Patience(board))
+            patience = Patience(board)
+            testbed.face(settings.plane, patience.pulse)
             tracking = testbed.tracking()
-            Patience(board).angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
-            testbed.confirm()
+            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            testbed.confirm(patience.pulse)
             prepare(board, settings)
             zero = find_zero(board, tracking, spools, settings.homing, settings.plane)
             position = slacken(board, spools, settings.homing, zero.signs)

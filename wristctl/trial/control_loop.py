@@ -15,13 +15,14 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
-from wristctl.board.messages import AXES, Fault
+from wristctl.board.messages import AXES, Fault, Flag
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.simulation.reference import Motion
 from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog, of_axes
+from wristctl.trial.patience import InSight, Patience
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, Estimate, Steering
@@ -33,6 +34,11 @@ Shown = Callable[[dict[str, Any]], None]
 _UNDERWAY, _BUSY = 0.33, 6.6e-9
 """Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
 longer [s] that takes for each step/s of all axes together, whose interrupts come first."""
+
+
+_COMING_TO_REST = 0.5
+"""Seconds within which motors at any speed have ramped down."""
+_NO_ANSWER = Answer(math.nan, math.nan, math.nan, math.nan, False)
 
 
 @dataclass
@@ -90,24 +96,44 @@ class ControlLoop:
     ) -> None:  # fmt: skip
         """Follow a motion sampled at the period; its ticks are logged under the number of the trial.
 
+        At its end the motors stand, and the board has said so: that takes some ticks more, which belong to no trial.
         Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
         """
         self._steering.use(controller, gains)
         task, first = Task(motion, trial, self.next_tick, faults or HostFaults(())), self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
-            if (ahead := self.next_tick - self._clock.now()) > 0.0:
-                self._clock.wait(ahead)
             self._tick(task, k)
+        self._come_to_rest(task._replace(trial=-1))
 
-    def _tick(self, task: Task, k: int) -> None:
+    def patience(self) -> Patience:
+        """For waiting between two motions, the wrist in sight."""
+        sight = InSight(self._tracking, self._monitor, self._paths, self._clock.now, self._signs)
+        return Patience(self._board, sight)
+
+    def _come_to_rest(self, task: Task) -> None:
+        deadline = self._clock.now() + _COMING_TO_REST
+        while self._sent.any() or Flag.MOVING in self._status.flags:
+            if self._clock.now() > deadline:
+                raise SafetyStop(f"the motors do not stand {_COMING_TO_REST:g} s after a motion", fix="home again")
+            self._tick(task, None)
+
+    def _tick(self, task: Task, k: int | None) -> None:
+        """One exchange with the board at the motion's sample `k`; None: behind its last, where no law is asked."""
+        if (ahead := self.next_tick - self._clock.now()) > 0.0:
+            self._clock.wait(ahead)
         clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
         seen = self._look(task)
         estimate, position = steering.estimate, self._reeled()
         self._watch(estimate, position, clock, clock - due)
-        reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
-        answer = self._answer(reference, clock - task.begin, task.faults)
-        tension = self._paths.each(answer.plus, answer.minus)
-        target = self._turn(tension, position, *reference[:2])
+        if k is None:
+            reference, answer = (float(motion.theta_ref[-1]), 0.0, 0.0), _NO_ANSWER
+            tension, target = np.full(AXES, math.nan), position
+            self._send(np.zeros(AXES))
+        else:
+            reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
+            answer = self._answer(reference, clock - task.begin, task.faults)
+            tension = self._paths.each(answer.plus, answer.minus)
+            target = self._turn(tension, position, *reference[:2])
         known = {
             "trial": task.trial,
             "time": clock - task.begin,
@@ -117,7 +143,7 @@ class ControlLoop:
             "theta_ref": reference[0],
             "rate_ref": reference[1],
             "acceleration_ref": reference[2],
-            "theta_desired": float(motion.theta_desired[k]),
+            "theta_desired": float(motion.theta_desired[-1 if k is None else k]),
             "error": estimate.theta - reference[0],
             "torque_wanted": answer.torque_wanted,
             "torque": answer.torque,
@@ -168,13 +194,16 @@ class ControlLoop:
         target, moving = self._spools.target(tension, taut), arm * rate_ref / self._spools.step
         # the command acts once the board has read it; by then the one before has moved the spools for a whole period
         gap = target + moving * self._underway - (position + self._sent * self._period)
-        rates = self._signs * self._spools.rate(gap, moving, self._sent, self._period)
+        self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
+        return target
+
+    def _send(self, rates: Array) -> None:
+        """Step rates of the axes, one of which is 0 for none; and what the board then says."""
         began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
         sent, self._status = self._board.turn(rates.tolist())
         self._sent = self._signs * np.array(sent)
         self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
         self._counted = began + self._underway + busy
-        return target
 
     def _go_on(self) -> None:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""

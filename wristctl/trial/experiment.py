@@ -17,9 +17,10 @@ from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown, TickTiming
 from wristctl.trial.halt import Halt, halt
-from wristctl.trial.homing import Patience, Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog
+from wristctl.trial.patience import Patience
 from wristctl.trial.prepare import prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
@@ -120,13 +121,14 @@ class Experiment:
         steering.see(0.0, 0.0)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
-        plane = ""
+        plane, patience = "", Patience(board)
         for trial in self._trials:
             if trial.plane != plane:
-                testbed.face(trial.direction, Patience(board))
+                testbed.face(trial.direction, patience.pulse)
                 loop = self._loop(testbed, board, trial.plane, shown)
                 plane = trial.plane
             self._one(testbed, loop, trial)
+            patience = loop.patience()
 
     def _loop(self, testbed: Testbed, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
         """A loop at rest at zero in this plane; the first one homes the board, others read the slack wrist's marker."""
@@ -136,7 +138,7 @@ class Experiment:
             Patience(board).wait(settings.homing.let_go)
         marker = Patience(board).angle(tracking, 4 * settings.homing.frames)
         if self.zero is None:  # the marker is seen, and nothing moves yet
-            testbed.confirm()
+            testbed.confirm(Patience(board).pulse)
             prepare(board, settings)
             self.zero = self._home(board, tracking, plane)
             marker = self.zero.marker

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from wristctl.board.driver import Board
-from wristctl.board.messages import AXES, JOG_RATE, Flag, Target
+from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import Homing
+from wristctl.trial.patience import Patience
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Spools, on_plus_side
 from wristctl.trial.tracking import Tracking
@@ -28,10 +29,6 @@ log = logging.getLogger(__name__)
 
 _FURTHEST_DEG = 10.0
 """A bend at which homing stops."""
-_PULSE = 0.02
-"""Seconds between two signs of life to the board while waiting."""
-_READING = 2.0
-"""Seconds within which the marker must be read."""
 
 
 @dataclass(frozen=True)
@@ -52,41 +49,11 @@ class Zero:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-class Patience:
-    """Waits and reads the marker while it keeps the board's link alive."""
-
-    def __init__(self, board: Board) -> None:
-        self._board = board
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass."""
-        end = self._board.transport.now() + seconds
-        while (left := end - self._board.transport.now()) > 0.0:
-            self._board.ping()
-            self._board.transport.wait(min(left, _PULSE))
-
-    def angle(self, tracking: Tracking, frames: int) -> float:
-        """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
-        found: list[float] = []
-        tracking.look()
-        began, verdict = self._board.transport.now(), "no frame"
-        while len(found) < frames:
-            self.wait(_PULSE)
-            for seen in tracking.look():
-                verdict = str(seen.verdict)
-                if seen.time >= began and math.isfinite(seen.theta):
-                    found.append(seen.theta)
-            if self._board.transport.now() - began > _READING:
-                fix = "see that the camera sees both markers, sharp and well lit"
-                raise SafetyStop(f"the marker's angle could not be read ({verdict})", "homing", fix)
-        return float(np.median(found))
-
-
 class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
     def __init__(self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, plane: str) -> None:
-        self._board, self._tracking, self._patience, self._settings = board, tracking, Patience(board), settings
+        self._board, self._tracking, self._settings = board, tracking, settings
         self._plus = on_plus_side(plane)
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
@@ -94,7 +61,7 @@ class _Finder:
         self._start = board.read().position
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
-        self.straight = self._patience.angle(tracking, 4 * settings.frames)
+        self.straight = Patience(board).angle(tracking, 4 * settings.frames)
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
         """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
@@ -141,8 +108,9 @@ class _Finder:
 
     def _bent(self, axis: int) -> float:
         """Angle [rad] from straight. Raises SafetyStop where it is too large."""
-        self._patience.wait(self._settings.rest)
-        bend = self._patience.angle(self._tracking, self._settings.frames) - self.straight
+        patience = Patience(self._board)
+        patience.wait(self._settings.rest)
+        bend = patience.angle(self._tracking, self._settings.frames) - self.straight
         if abs(bend) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
             what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
@@ -168,8 +136,7 @@ def slacken(board: Board, spools: Spools, settings: Homing, signs: Sequence[int]
     """Let the tendons of a homed wrist go, so that nothing holds it; where the motors then stand [steps]."""
     reeled = -round(settings.pull / spools.step)
     one, two, four, five = (reeled * sign for sign in signs)
-    board.send(Target((one, two, four, five), (JOG_RATE, JOG_RATE, JOG_RATE, JOG_RATE)))
-    return board.wait_while(Flag.MOVING, timeout=5.0).position
+    return board.go_to((one, two, four, five), JOG_RATE).position
 
 
 def find_zero(

@@ -48,31 +48,48 @@ class Monitor:
 
     def see(self, seen: Seen) -> None:
         """Judge what was measured. A late tick comes first: what it sees is late as well."""
-        limits, angle = self._limits, seen.estimate.theta
+        limits = self._limits
         if seen.late > limits.late:
             what = f"a tick came {1e3 * seen.late:.0f} ms late"
             raise SafetyStop(what, fix="close other programs, or a longer control_period")
         if not all(map(math.isfinite, seen.estimate)):
             raise SafetyStop("the observer's estimate is not a number", fix="see the frames in data/frames.csv")
-        if abs(angle) > math.radians(limits.angle_deg):
-            fix = "gentler gains or reference, or widen safety.angle_deg"
-            raise SafetyStop(f"angle {math.degrees(angle):.1f} deg beyond +-{limits.angle_deg:g} deg", fix=fix)
+        self._angle(seen.estimate.theta)
         if abs(seen.estimate.rate) > limits.rate:
             fix = "gentler gains or reference, or widen safety.rate"
             raise SafetyStop(f"rate {seen.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
         if seen.age > limits.stale:
             what = f"no usable marker angle for {1e3 * seen.age:.0f} ms (newest frame: {seen.verdict})"
             raise SafetyStop(what, fix="see that nothing covers the markers, and the camera's light and focus")
-        pulling = float(self._spools.tension(seen.position, seen.taut).max())
-        if pulling > limits.tension:
-            fix = "something holds the wrist, or the zero positions are wrong: home again"
-            raise SafetyStop(f"tension of about {pulling:.0f} N beyond {limits.tension:g} N", fix=fix)
+        self._pull(seen.position, seen.taut)
         reeled = float(np.abs(seen.position).max()) * self._spools.step
         if reeled > limits.travel:
             fix = "a smaller reference, or widen safety.travel"
             raise SafetyStop(f"a spool {1e3 * reeled:.1f} mm from zero, beyond {1e3 * limits.travel:g} mm", fix=fix)
         if seen.state != State.ENABLED:
             raise SafetyStop(f"the board is {seen.state.name}, not ENABLED", fix="home again")
+
+    def standing(self, theta: float, position: Array, taut: Array) -> None:
+        """Judge a wrist whose motors stand by one marker angle [rad]; position and taut as of `Seen`."""
+        self._angle(theta)
+        self._pull(position, taut)
+
+    @property
+    def stale(self) -> float:
+        """Seconds for which the marker may be out of sight."""
+        return self._limits.stale
+
+    def _angle(self, theta: float) -> None:
+        limit = self._limits.angle_deg
+        if abs(theta) > math.radians(limit):
+            fix = "gentler gains or reference, or widen safety.angle_deg"
+            raise SafetyStop(f"angle {math.degrees(theta):.1f} deg beyond +-{limit:g} deg", fix=fix)
+
+    def _pull(self, position: Array, taut: Array) -> None:
+        pulling, limit = float(self._spools.tension(position, taut).max()), self._limits.tension
+        if pulling > limit:
+            fix = "something holds the wrist, or the zero positions are wrong: home again"
+            raise SafetyStop(f"tension of about {pulling:.0f} N beyond {limit:g} N", fix=fix)
 
     def answer(self, answer: Answer) -> None:
         """Judge what the law wants."""

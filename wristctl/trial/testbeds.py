@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import numpy as np
@@ -13,19 +12,19 @@ from wristctl.bench.real_time_bench import RealTimeBench, connect
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.transport import Transport, open_transport
 from wristctl.config.hw_run import RigSettings
-from wristctl.config.plant import Disturbances
+from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
-from wristctl.trial.homing import Patience
+from wristctl.trial.patience import Meanwhile
 from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
 from wristctl.vision.camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
 
-_PULSE = 0.02
+Ask = Callable[[str, Meanwhile], None]
+"""Tells the operator what to do, and returns once it is done; has moments pass meanwhile, and raises what they raise.
 
-Ask = Callable[[str], None]
-"""Tells the operator what to do, and returns once it is done. Raises UserError where the operator declines."""
+Raises UserError where the operator declines."""
 
 
 BEFORE_MOTION = (
@@ -40,14 +39,14 @@ class Testbed(Protocol):
     emulated: bool
     transport: Transport
 
-    def confirm(self) -> None:
-        """Have a person agree to the first motion, where there is something to be hurt. Raises UserError."""
+    def confirm(self, meanwhile: Meanwhile) -> None:
+        """Have a person agree to the first motion. Raises UserError, and what `meanwhile` raises."""
 
     def tracking(self) -> Tracking:
         """The camera with a fresh tracker."""
 
-    def face(self, direction: str, patience: Patience) -> None:
-        """Turn the wrist so that this direction's plane is the one that bends and is seen."""
+    def face(self, direction: str, meanwhile: Meanwhile) -> None:
+        """Have the wrist turned so that this direction's plane is the one that bends and is seen."""
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """A trial's motion starts at `start` on the transport's clock; what is drawn of it comes from this stream."""
@@ -71,8 +70,9 @@ class EmulatedTestbed:
         self.transport: Transport = bench.transport
         self._tracking: Tracking | None = None
 
-    def confirm(self) -> None:
-        """Nobody is near."""
+    def confirm(self, meanwhile: Meanwhile) -> None:
+        """It is agreed to after a while."""
+        self._person(meanwhile)
 
     def tracking(self) -> Tracking:
         """The rendered camera with a fresh tracker."""
@@ -83,8 +83,9 @@ class EmulatedTestbed:
         self._tracking = kind(self._bench.camera, tracker, self._keep)
         return self._tracking
 
-    def face(self, direction: str, patience: Patience) -> None:
-        """Turn the bench."""
+    def face(self, direction: str, meanwhile: Meanwhile) -> None:
+        """It is turned after a while."""
+        self._person(meanwhile)
         self._bench.face(direction)
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
@@ -95,6 +96,18 @@ class EmulatedTestbed:
         """What the emulated wrist did since then."""
         truth = self._bench.truth(since)
         return np.column_stack([truth.time - since, truth.theta, truth.angle, truth.pull])
+
+    def _person(self, meanwhile: Meanwhile) -> None:
+        """The time that a person takes, who bends a held wrist to one side and then to the other."""
+        person, clock = self._settings.bench.person, self.transport
+        force = person.force if all(self._bench.motion().energised) else 0.0
+        for side in (1.0, -1.0):
+            begin, half = clock.now(), 0.5 * person.takes
+            if force:
+                push = Push(force=side * force, start=0.0, duration=half)
+                self._bench.disturb(Disturbances(push=push), begin)
+            while clock.now() < begin + half:
+                meanwhile()
 
     def close(self) -> None:
         """End the eye and the bench."""
@@ -118,9 +131,9 @@ class RealTestbed:
             raise
         self._tracking: Tracking | None = None
 
-    def confirm(self) -> None:
+    def confirm(self, meanwhile: Meanwhile) -> None:
         """Ask."""
-        self._ask(BEFORE_MOTION)
+        self._ask(BEFORE_MOTION, meanwhile)
 
     def tracking(self) -> Tracking:
         """The camera with a fresh tracker."""
@@ -130,14 +143,10 @@ class RealTestbed:
         self._tracking = ThreadedTracking(self._camera, tracker, self._keep)
         return self._tracking
 
-    def face(self, direction: str, patience: Patience) -> None:
-        """Ask the operator to turn the wrist, while the board's link is kept alive."""
+    def face(self, direction: str, meanwhile: Meanwhile) -> None:
+        """Ask the operator to turn the wrist."""
         what = f"Set the wrist up so that it bends toward {direction} in the camera's picture, both markers in view."
-        with ThreadPoolExecutor(1) as person:
-            answer = person.submit(self._ask, what)
-            while not answer.done():
-                patience.wait(_PULSE)
-            answer.result()
+        self._ask(what, meanwhile)
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """Nobody disturbs a real wrist but a person."""

@@ -1,0 +1,55 @@
+"""Waiting and reading the marker beside a board that stands."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.trial.rig import Marker, RigBoard
+from wristctl.trial.patience import Patience
+from wristctl.trial.safety import SafetyStop
+
+
+def test_waiting_keeps_the_boards_link_alive() -> None:
+    board: Any = RigBoard()
+    Patience(board).wait(0.1)
+    assert board.transport.now() == pytest.approx(100.1)
+    assert len(board.pings) == pytest.approx(5, abs=1) and max(np.diff(board.pings)) < 0.05
+    Patience(board).wait(0.0)
+    assert board.transport.now() == pytest.approx(100.1)
+
+
+def test_a_reading_is_the_median_of_as_many_usable_frames_as_asked_for() -> None:
+    board: Any = RigBoard()
+    angles = iter([9.0, 0.1, math.nan, 0.5, 0.2, 7.0, 7.0])
+    tracking: Any = Marker(board, lambda: next(angles))
+    assert Patience(board).angle(tracking, 3) == 0.2, "what was seen before does not count"
+    assert next(angles) == 7.0
+
+
+def test_frames_taken_before_the_reading_began_do_not_count() -> None:
+    board: Any = RigBoard()
+    angles = iter([0.0, 1.0, 2.0, 3.0, 4.0])
+    tracking: Any = Marker(board, lambda: next(angles))
+    tracking.delay = 0.03  # at 20 ms between looks: the first comes from before
+    assert Patience(board).angle(tracking, 1) == 2.0
+
+
+def test_a_marker_that_cannot_be_read_for_two_seconds_is_said_with_why() -> None:
+    board: Any = RigBoard()
+    tracking: Any = Marker(board, lambda: math.nan)
+    with pytest.raises(SafetyStop, match=r"could not be read \(no tip\)"):
+        Patience(board).angle(tracking, 1)
+    assert 2.0 < board.transport.now() - 100.0 < 2.1
+
+
+def test_a_step_that_nobody_has_asked_for_ends_the_wait() -> None:
+    board: Any = RigBoard()
+    patience = Patience(board)
+    patience.pulse()
+    board.position[2] += 1
+    with pytest.raises(SafetyStop, match=r"moved by \[0, 0, 1, 0\] steps"):
+        patience.pulse()
