@@ -11,10 +11,12 @@ from tests.board.drive_watch import CLOCK, DriveWatch
 from wristctl.board.messages import (
     ANSWER_TO,
     BAUD,
+    BOUND,
     COMMAND_OF,
     ENABLE_KEY,
     LAYOUTS,
     Command,
+    Connect,
     Enable,
     Flag,
     Home,
@@ -70,6 +72,18 @@ class Bench:
         self._line_busy_until = 0
         self._received = b""
         self.run_ms(3)
+        self.connection = 0
+        self.connect()
+
+    def connect(self) -> None:
+        """Begin a connection of our own."""
+        self.connection = (self.do(Command.HELLO).connection + 1) % 2**16
+        self.do(Connect(self.connection))
+
+    def frame(self, command: int, seq: int, payload: bytes = b"", connection: int | None = None) -> bytes:
+        """A command of our connection, or of another, as it goes over the wire."""
+        number = self.connection if connection is None else connection
+        return encode(command, seq, number.to_bytes(2, "little") * (command in BOUND) + payload)
 
     def run(self, cycles: int) -> None:
         self.chip.run(cycles)
@@ -97,7 +111,7 @@ class Bench:
         command = message if isinstance(message, Command) else COMMAND_OF[type(message)]
         payload = b"" if isinstance(message, Command) else LAYOUTS[type(message)].pack(message)
         self._seq = (self._seq + 1) % 256 if seq is None else seq
-        data = encode(command, self._seq, payload)
+        data = self.frame(command, self._seq, payload)
         self.chip.write(data)
         self._line_busy_until = max(self.chip.cycles, self._line_busy_until) + len(data) * 10 * CLOCK // BAUD
         return command, self._seq, self._line_busy_until

@@ -6,7 +6,7 @@ import pytest
 
 from wristctl.board import driver
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.driver import ATTEMPTS, Board, within_reach
+from wristctl.board.driver import ATTEMPTS, Board
 from wristctl.board.emulator.virtual import VirtualTransport
 from wristctl.board.messages import (
     DICTIONARY_HASH,
@@ -19,6 +19,7 @@ from wristctl.board.messages import (
     Result,
     State,
 )
+from wristctl.board.rates import within_reach
 
 PERIOD = 0.005
 

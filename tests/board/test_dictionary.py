@@ -101,9 +101,9 @@ def test_c_structures_have_the_sizes_python_packs(tmp_path: Path) -> None:
 
 
 def test_status_says_its_values_in_their_units() -> None:
-    payload = struct.pack("<IBBBH4i4h", 1_500_000, 1, 0, 5, 97, 1, -2, 3, -4, 10, -20, 30, -40)
+    payload = struct.pack("<IBBBH4i4hB", 1_500_000, 1, 0, 5, 97, 1, -2, 3, -4, 10, -20, 30, -40, 3)
     status = LAYOUTS[Status].unpack(Status, payload)
     assert (status.time, status.watchdog_left) == (1.5, 0.097)
     assert status.state is messages.State.ENABLED
     assert status.flags == messages.Flag.HOMED | messages.Flag.DRIVES_ON
-    assert (status.position, status.rate) == ((1, -2, 3, -4), (10, -20, 30, -40))
+    assert (status.position, status.rate, status.lapses) == ((1, -2, 3, -4), (10, -20, 30, -40), 3)

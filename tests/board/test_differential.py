@@ -52,10 +52,10 @@ def test_firmware_makes_the_same_steps_on_both() -> None:
             bench.wait_for_rest()
             reached.append([drive.position for drive in bench.drives])
         for rate in RATES:
-            bench.do(Rate((rate, -rate, rate / 3, 0.0)))
+            bench.do(Rate((rate, -rate, rate / 3, 0.0), 0.1))
             for _ in range(10):
                 bench.run_ms(50)
-                bench.do(Rate((rate, -rate, rate / 3, 0.0)))
+                bench.do(Rate((rate, -rate, rate / 3, 0.0), 0.1))
         reached.append([drive.position for drive in bench.drives])
         totals.append(np.array(reached))
         chip.close()

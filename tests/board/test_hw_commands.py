@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.board.patience import wait_for
+from wristctl.board.messages import FIRMWARE_VERSION
 from wristctl.cli.app import main
 
 ROOT = Path(__file__).parents[2]
@@ -71,7 +72,11 @@ def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, hw: Type
     done = wait_for(lambda: "no answer" not in (d := hw(*check)).stderr and d)  # which a busy computer may keep back
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert told["port"] == port and told["firmware"] == "1.0.0" and told["state"] == "DISABLED"
+    assert (
+        told["port"] == port
+        and told["firmware"] == ".".join(map(str, FIRMWARE_VERSION))
+        and told["state"] == "DISABLED"
+    )
     assert [each["command"] for each in told["round_trips_s"]] == ["PING", "STATUS"]
     assert told["counters"]["uart_errors"] == 0
 

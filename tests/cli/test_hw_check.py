@@ -19,7 +19,7 @@ from wristctl.board.messages import Command, Counters, Hello, Result, State, Sta
 from wristctl.board.transport import BOOT_TIME
 from wristctl.cli.hw_options import facts_of
 
-HELLO = Hello(2, 0xAB, (1, 2, 3), 9, 0, 4, 1000, 2000)
+HELLO = Hello(2, 0xAB, (1, 2, 3), 9, 0, 4, 1000, 2000, 5)
 COUNTERS = Counters(*range(11, 11 + len(Counters._fields)))
 
 

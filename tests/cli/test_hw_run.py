@@ -29,6 +29,9 @@ QUICK = (
 )  # fmt: skip
 
 
+SLOW = ("--set", "sensor={level: camera, frame_rate: 20}")
+
+
 def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call: Call) -> None:
     code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
@@ -154,7 +157,10 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
     ("arguments", "said"),
     [
         (("--set", "rows=[{controller: smc-trackin, gains: stepper}]"), "did you mean 'smc-tracking'?"),
-        (("--set", "safety.late=0.2"), "must be below watchdog"),
+        (("--set", "safety.late=0.2"), "must be below watchdog (0.1 s)"),
+        (("--set", "safety.late=0.095"), "hw-run - fix: safety.late below 0.095, or a longer safety.watchdog"),
+        ((*SLOW, "--set", "control_period=0.04"), "fix: control_period below 0.04, or safety.watchdog above 0.1"),
+        (("--set", "safety={watchdog: 0.04, late: 0.02}"), "hw-run - fix: safety.watchdog above 0.05"),
         (("--set", "positions=stored"), "needs a calibration run"),
         (("--set", "push.force=0", "--set", "without_push=false"), "leave no trial"),
         (("--set", "reference.angle_deg=80"), "beyond the wrist's range"),

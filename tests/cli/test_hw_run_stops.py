@@ -39,7 +39,7 @@ TRIAL = (
     "--set", "rows=[{controller: smc-tracking, gains: stepper}]", "--set", "bench.motors.slack=[0, 0, 0, 0]",
     "--set", "homing.frames=1",
 )  # fmt: skip
-RAMP = {"STOP": 1.0 / 50_000, "watchdog": 1.0 / 400_000, "reset": 0.0}
+RAMP = {"STOP": 1.0 / 50_000, "life": 1.0 / 50_000, "reset": 0.0}
 UPDATE = 2e-3
 """Between two new rates of an axis [s]: a ramp ends with one of these."""
 UNANSWERED = 0.075

@@ -151,8 +151,9 @@ def test_the_message_that_contributing_adds_is_obeyed(sources: Sources) -> None:
     for _ in range(10):
         bench.do(Rate((500.0, 500.0, 500.0, 500.0)))
         bench.run_ms(20)
+    bench.do(Rate((500.0, 500.0, 500.0, 500.0), 0.2))
     for axis, expected in ((2, Result.OK), (4, Result.RANGE)):
-        bench.chip.write(encode(BRAKE, 1, bytes([axis])))
+        bench.chip.write(encode(BRAKE, 1, bench.connection.to_bytes(2, "little") + bytes([axis])))
         bench.run_ms(50)
         ((code, _seq, payload),) = bench.frames()
         assert (code, payload[0]) == (BRAKE | 0x80, expected)

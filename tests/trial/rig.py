@@ -42,11 +42,14 @@ class RigBoard:
         self.state, self.faults, self.flags = State.ENABLED, Fault(0), Flag(0)
         self.round_trip = self.takes = 0.003
         self.pings: list[float] = []
+        self.lapses = 0
+        self.lives: list[float] = []
         self.hello: Any = SimpleNamespace(boot_nonce=7)
 
     def read(self) -> Status:
         position: Any = tuple(int(each) for each in np.rint(self.position))
-        return Status(self.transport.now(), self.state, self.faults, self.flags, 0.1, position, (0, 0, 0, 0))
+        at, still = self.transport.now(), (0, 0, 0, 0)
+        return Status(at, self.state, self.faults, self.flags, 0.1, position, still, self.lapses)
 
     def ping(self) -> None:
         self.pings.append(self.transport.now())
@@ -74,8 +77,9 @@ class RigBoard:
     def enable(self) -> None:
         self.told.append("enable")
 
-    def turn(self, rates: Sequence[float]) -> tuple[tuple[float, ...], Status]:
+    def turn(self, rates: Sequence[float], life: float) -> tuple[tuple[float, ...], Status]:
         """Take the rates over; a period later they have moved the axes."""
+        self.lives.append(life)
         self.sent = np.rint(rates)
         self.told.append(("turn", tuple(rates)))
         self.transport.wait(self.takes)

@@ -84,14 +84,14 @@ def test_behind_a_motion_ticks_go_on_without_a_rate_until_the_board_says_that_no
     rig = rig_of()
     turn, since = rig.board.turn, [math.inf]
 
-    def ramps_down(rates: Any) -> Any:
+    def ramps_down(rates: Any, life: float) -> Any:
         if any(rates):
             since[0], rig.board.flags = math.inf, Flag.MOVING
         else:
             since[0] = min(since[0], rig.board.transport.now())
             if rig.board.transport.now() > since[0] + 0.03:
                 rig.board.flags = Flag(0)
-        return turn(rates)
+        return turn(rates, life)
 
     rig.board.turn = ramps_down
     rig.follow(at_rest(0.1, PERIOD), trial=3)
@@ -131,10 +131,10 @@ def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: R
     motion, held = back(0.02, 0.1, 0.1, PERIOD), [0]
     turn = rig.board.turn
 
-    def slow(rates: Any) -> Any:
+    def slow(rates: Any, life: float) -> Any:
         held[0] += 1
         rig.board.transport.wait(0.013 if held[0] == 11 else 0.0)
-        return turn(rates)
+        return turn(rates, life)
 
     rig.board.turn = slow
     rig.follow(motion)
@@ -148,13 +148,30 @@ def test_a_tick_that_is_too_late_is_a_reason_to_stop(rig_of: RigOf) -> None:
     rig = rig_of(safety={"late": 0.02, "stale": 1.0})
     turn = rig.board.turn
 
-    def hangs(rates: Any) -> Any:
+    def hangs(rates: Any, life: float) -> Any:
         rig.board.transport.wait(0.026 if len(rig.rows) == 5 else 0.0)
-        return turn(rates)
+        return turn(rates, life)
 
     rig.board.turn = hangs
     with pytest.raises(SafetyStop, match="a tick came 24 ms late"):
         rig.follow(at_rest(0.2, PERIOD))
+
+
+def test_step_rates_live_for_two_and_a_half_periods_and_lapsed_ones_are_counted(rig_of: RigOf) -> None:
+    for period, life in ((5e-3, 0.05), (0.02, 0.05), (0.03, 0.075)):
+        rig = rig_of(control_period=period, safety={"late": 0.01}, sensor={"level": "camera", "frame_rate": 20.0})
+        rig.follow(at_rest(2 * PERIOD, PERIOD))
+        assert set(rig.board.lives) == {life}
+    turn = rig.board.turn
+
+    def lapsing(*given: Any) -> Any:
+        rig.board.lapses += len(rig.rows) in (8, 10, 12)
+        return turn(*given)
+
+    rig.board.turn = lapsing
+    with pytest.raises(SafetyStop, match="step rates came too late"):
+        rig.follow(at_rest(0.5, PERIOD))
+    assert len(rig.rows) == 13
 
 
 def test_lateness_has_quantiles_and_none_without_ticks() -> None:
@@ -212,11 +229,11 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
     rig = rig_of(signs=signs)
     turn, since = rig.board.turn, [100.0, np.zeros(4)]
 
-    def turned(rates: Any) -> Any:
+    def turned(rates: Any, life: float) -> Any:
         now = rig.board.transport.now()
         rig.board.position += since[1] * (now - since[0])
         since[:] = now, np.rint(rates)
-        return turn(rates)
+        return turn(rates, life)
 
     rig.board.turn = turned
     rig.follow(at_rest(0.5, PERIOD))
@@ -234,7 +251,7 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
 def test_positions_are_of_when_the_board_read_the_command_a_third_of_the_round_trip_after(rig_of: RigOf) -> None:
     rig = rig_of()
     rig.follow(at_rest(0.1, PERIOD))
-    after = np.array([row["counted"] - row["time"] for row in rig.rows]) - 0.33 * 0.003
+    after = np.array([row["counted"] - row["time"] for row in rig.rows]) - 0.37 * 0.003
     sent = [sum(abs(row[f"sent_{tendon}"]) for tendon in (1, 2, 4, 5)) for row in rig.rows]
     assert after[0] == pytest.approx(0.0, abs=1e-9) and np.abs(after).max() < 1e-4
     busiest = int(np.argmax(sent[:-1]))
@@ -255,7 +272,7 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
     monkeypatch.setattr(Steering, "predict", heard)
     rig = rig_of()
     rig.follow(at_rest(0.05, PERIOD))
-    ahead = 0.5 * PERIOD - 0.33 * 0.003
+    ahead = 0.5 * PERIOD - 0.37 * 0.003
     for row, sides in zip(rig.rows + rig.at_rest, told, strict=True):
         one, two, four, five = (row[f"position_{k}"] + ahead * row[f"sent_{k}"] for k in (1, 2, 4, 5))
         step = SETTINGS.actuator.step_length

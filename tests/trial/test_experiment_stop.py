@@ -7,7 +7,7 @@ from wristctl.trial.experiment import Stop
 from wristctl.trial.halt import Halt
 from wristctl.trial.safety import SafetyStop
 
-STATUS = Status(1.0, State.FAULT, Fault.LINK, Flag(0), 0.0, (1, 2, 3, 4), (5, 6, 7, 8))
+STATUS = Status(1.0, State.FAULT, Fault.LINK, Flag(0), 0.0, (1, 2, 3, 4), (5, 6, 7, 8), 0)
 
 
 def test_a_stop_tells_what_the_board_last_said() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Answer, Estimate
 
 SPOOLS = spools_of(Actuator(level="tendon"))
-WELL = Seen(Estimate(0.5, 1.0, 0.1), 0.04, "ok", np.full(4, 7.0), np.zeros(4), State.ENABLED, 0.001)
+WELL = Seen(Estimate(0.5, 1.0, 0.1), 0.04, "ok", np.full(4, 7.0), np.zeros(4), State.ENABLED, 0.001, 0, 0.0)
 MONITOR = Monitor(Safety(), SPOOLS)
 
 
@@ -44,6 +45,22 @@ def test_each_limit_stops_by_itself(change: dict[str, Any], said: str) -> None:
     with pytest.raises(SafetyStop) as stopped:
         MONITOR.see(WELL._replace(**change))
     assert said in stopped.value.what and stopped.value.exit_code == 5
+
+
+def lapsing(lapses: Sequence[int], times: Sequence[float]) -> Monitor:
+    monitor = Monitor(Safety(), SPOOLS)
+    for count, time in zip(lapses, times, strict=True):
+        monitor.see(WELL._replace(lapses=count, time=time))
+    return monitor
+
+
+def test_the_third_lapsed_rate_within_a_second_stops() -> None:
+    """Counted from what the board had counted before, and over its count's end."""
+    lapsing((7, 8, 8, 9, 9), (0.0, 0.1, 0.3, 0.6, 0.9))
+    lapsing((254, 255, 0, 1), (0.0, 0.1, 0.8, 1.11))
+    for lapses, times in (((254, 255, 0, 1), (0.0, 0.1, 0.8, 1.09)), ((7, 10), (0.0, 0.1))):
+        with pytest.raises(SafetyStop, match="step rates came too late to the board 3 times in 1 s"):
+            lapsing(lapses, times)
 
 
 def test_a_torque_that_is_no_number_is_never_sent() -> None:

@@ -79,11 +79,15 @@ def c_header(table: MessageTable) -> str:
     whens = dict.fromkeys(entry["when"] for entry in commands.values())
     named = ", ".join(f"WHEN_{when.upper()}{' = 1' * (k == 0)}" for k, when in enumerate(whens))
     lines += ["", f"enum when {{ {named} }}; /* 0: no command has this code */"]
-    lines += ["", "/* X(name, when it is admitted, length of its payload, whether it feeds the watchdog) */"]
+    lines += [
+        "",
+        "/* X(name, when it is admitted, length of its fields, whether it is bound, whether it feeds) */",
+    ]
     lines += ["#define COMMANDS(X) \\"]
     for name, entry in commands.items():
         length = f"sizeof(struct {name.lower()}_command)" if entry["fields"] else "0"
-        lines += [f"  X({name}, WHEN_{entry['when'].upper()}, {length}, {str(entry['feeds']).lower()}) \\"]
+        bound, feeds = (str(entry[each]).lower() for each in ("bound", "feeds"))
+        lines += [f"  X({name}, WHEN_{entry['when'].upper()}, {length}, {bound}, {feeds}) \\"]
     return "\n".join([*lines, "", *_c_handlers(commands), "", *_c_answers(table), "", "#endif", ""])
 
 
@@ -185,9 +189,12 @@ def python_module(table: MessageTable) -> str:
     out += [f"    {name}: Command.{name.upper()}," for name in named]
     out += ["}", "ANSWER_TO: dict[Command, type] = {"]
     out += [f"    Command.{name}: {entry['answer']}," for name, entry in commands.items() if "answer" in entry]
-    out += ["}", "FEEDS_WATCHDOG = frozenset(", "    {"]
-    out += [f"        Command.{name}," for name, entry in commands.items() if entry["feeds"]]
-    return "\n".join([*out, "    }", ")", ""])
+    out += ["}"]
+    for name, mark in (("BOUND", "bound"), ("FEEDS_WATCHDOG", "feeds")):
+        out += [f"{name} = frozenset(", "    {"]
+        out += [f"        Command.{command}," for command, entry in commands.items() if entry[mark]]
+        out += ["    }", ")"]
+    return "\n".join([*out, ""])
 
 
 def _enumeration(unit: str) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
@@ -13,14 +13,14 @@ from wristctl.board.exchange import Exchange, Traffic
 from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
+    BOUND,
     COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
     LAYOUTS,
-    MAX_RATE,
-    TOTAL_RATE,
     Command,
     Configure,
+    Connect,
     Counters,
     Enable,
     Flag,
@@ -33,9 +33,11 @@ from wristctl.board.messages import (
     Status,
     Target,
 )
+from wristctl.board.rates import Axes, four, within_reach
 from wristctl.board.transport import Transport
 
-Axes = tuple[float, float, float, float]
+LEAST_LIFE = Rate._field_defaults["life"]
+"""Seconds for which a step rate lives where nobody says otherwise."""
 
 ATTEMPTS = 3
 """Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
@@ -56,6 +58,7 @@ class Board:
         self.hello: Hello | None = None
         self._exchange = Exchange(transport)
         self._watchdog = Configure().watchdog
+        self._connection = 0
 
     def __enter__(self) -> Self:
         try:
@@ -92,8 +95,11 @@ class Board:
         _protocol, dictionary, *version = _FIRST_OF_HELLO.unpack_from(payload, 1)
         if dictionary != DICTIONARY_HASH:
             raise WrongFirmware(self.transport.name, dictionary, tuple(version), DICTIONARY_HASH)
-        self.hello = LAYOUTS[Hello].unpack(Hello, payload[1:])
-        return self.hello
+        hello = LAYOUTS[Hello].unpack(Hello, payload[1:])
+        self._connection = (hello.connection + 1) & 0xFFFF
+        self._ask(Command.CONNECT, LAYOUTS[Connect].pack(Connect(self._connection)))
+        self.hello = hello
+        return hello
 
     def configure(self, settings: Configure) -> Status:
         """Set ramps, watchdog and what the drives do in a fault; only while disabled."""
@@ -119,22 +125,25 @@ class Board:
         """Feed the watchdog, and nothing else."""
         self._ask(Command.PING, b"")
 
-    def turn(self, rates: Sequence[float]) -> tuple[Axes, Status]:
-        """Turn the axes at `rates` (steps/s), as far as the board can; the rates really sent, and the status."""
+    def turn(self, rates: Sequence[float], life: float = LEAST_LIFE) -> tuple[Axes, Status]:
+        """Turn the axes at `rates` (steps/s), as far as the board can, for `life` s unless another call comes first.
+
+        The rates really sent, and the status.
+        """
         sent = within_reach(rates)
-        return sent, self.send(Rate(sent))
+        return sent, self.send(Rate(sent, life))
 
     def jog(self, positions: Sequence[int]) -> Status:
         """Creep to `positions` (steps) before homing, and wait until the axes stand there."""
-        return self._arrive(Jog(_four(positions, int)))
+        return self._arrive(Jog(four(positions, int)))
 
     def go_to(self, positions: Sequence[int], rate: int) -> Status:
         """Go to `positions` (steps) no faster than `rate` (steps/s), and wait until the axes stand there."""
-        return self._arrive(Target(_four(positions, int), (rate, rate, rate, rate)))
+        return self._arrive(Target(four(positions, int), (rate, rate, rate, rate)))
 
     def home(self, positions: Sequence[int] = (0,) * AXES) -> Status:
         """Say where the axes stand (steps); positions are trusted from here on."""
-        return self.send(Home(_four(positions, int)))
+        return self.send(Home(four(positions, int)))
 
     def stop(self) -> Status:
         """Ramp down to rest; the drives hold."""
@@ -200,6 +209,8 @@ class Board:
         return status
 
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
+        if command in BOUND:
+            payload = self._connection.to_bytes(2, "little") + payload
         answer = self._exchange.ask(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
         result = Result(answer[0])
         kind = ANSWER_TO.get(command)
@@ -234,15 +245,3 @@ class Board:
         answer = self._exchange.ask(Command.HELLO, b"", _START_PATIENCE, ATTEMPTS)
         if LAYOUTS[Hello].unpack(Hello, answer[1:]).boot_nonce != self.hello.boot_nonce:
             raise Restarted(self.transport.name)
-
-
-def within_reach(rates: Sequence[float]) -> Axes:
-    """Rates (steps/s) with each within MAX_RATE, and all scaled down together where they exceed TOTAL_RATE."""
-    single = [max(-MAX_RATE, min(MAX_RATE, float(rate))) for rate in rates]
-    total = sum(map(abs, single))
-    return _four([rate * min(1.0, TOTAL_RATE / total) if total else 0.0 for rate in single], float)
-
-
-def _four(values: Sequence[float], kind: Callable[[float], Any]) -> tuple[Any, Any, Any, Any]:
-    first, second, third, fourth = (kind(value) for value in values)
-    return first, second, third, fourth

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from wristctl.board.layout import Field, Layout
 
-PROTOCOL_VERSION = 1
-FIRMWARE_VERSION = (1, 0, 0)
-DICTIONARY_HASH = 0xB57568A7
+PROTOCOL_VERSION = 2
+FIRMWARE_VERSION = (2, 0, 0)
+DICTIONARY_HASH = 0x7C8ABB38
 BAUD = 250000
 AXES = 4  # 1: step/direction drives
 MAX_RATE = 20000  # steps/s: of one axis
@@ -45,6 +45,7 @@ class Result(IntEnum):
     UNHOMED = 7  # positions are not trusted
     ESTOP_OPEN = 8  # the emergency stop input is open
     MOVING = 9  # an axis is moving
+    CONNECTION = 10  # the command is of another connection
 
 
 class Command(IntEnum):
@@ -56,7 +57,7 @@ class Command(IntEnum):
     COUNTERS = 4  # what went well and wrong on the wire since reset
     ENABLE = 5  # energise the drives (DISABLED to ENABLED)
     DISABLE = 6  # ramp down, then release the drives; positions are no longer trusted. In FAULT: release held drives
-    RATE = 7  # turn each axis at this rate, as far as its soft limit; less than 1 step/s stands still
+    RATE = 7  # turn each axis at this rate for its life at most, then ramp to rest; below 1 step/s stand still
     TARGET = 8  # go to these positions, no faster than these rates; may be changed on the way
     JOG = 9  # creep to these positions at JOG_RATE, without soft limits: the way home, while positions are not trusted
     HOME = 10  # the axes stand at these positions: trust them from here on
@@ -65,6 +66,7 @@ class Command(IntEnum):
     CLEAR = 13  # FAULT to DISABLED; refused while the emergency stop input is open
     CONFIGURE = 14  # ramps, watchdog and what the drives do in a fault; only in DISABLED, kept until reset
     LIMITS = 15  # soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset
+    CONNECT = 16  # a connection begins, the next after HELLO's: bound commands of those before are refused
 
 
 class Fault(IntFlag):
@@ -86,6 +88,7 @@ class Flag(IntFlag):
     ESTOP_OPEN = 8  # the emergency stop input reads pressed
     SETTLING = 16  # drives just energised; motion starts when this clears
     AT_LIMIT = 32  # a soft limit holds some axis back
+    LAPSED = 64  # the last RATE's life is over and no other has come: the axes ramp down, or stand
 
 
 RESULT_MEANING = {
@@ -99,6 +102,7 @@ RESULT_MEANING = {
     Result.UNHOMED: "positions are not trusted",
     Result.ESTOP_OPEN: "the emergency stop input is open",
     Result.MOVING: "an axis is moving",
+    Result.CONNECTION: "the command is of another connection",
 }
 RESULT_FIX = {
     Result.OK: "",
@@ -111,6 +115,7 @@ RESULT_FIX = {
     Result.UNHOMED: "jog to the home position, then home",
     Result.ESTOP_OPEN: "release the button (D41 must be closed to GND)",
     Result.MOVING: "stop and wait until MOVING clears",
+    Result.CONNECTION: "another program has taken the board over: close it, and start again",
 }
 FAULT_MEANING = {
     Fault.LINK: "no command arrived within the watchdog time",
@@ -135,9 +140,10 @@ class Enable(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """Turn each axis at this rate, as far as its soft limit; less than 1 step/s stands still."""
+    """Turn each axis at this rate for its life at most, then ramp to rest; below 1 step/s stand still."""
 
     rate: tuple[float, float, float, float]  # steps/s, -20000 to 20000
+    life: float = 0.05  # s, 0.01 to 0.2
 
 
 class Target(NamedTuple):
@@ -175,6 +181,12 @@ class Limits(NamedTuple):
     highest: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
 
 
+class Connect(NamedTuple):
+    """A connection begins, the next after HELLO's: bound commands of those before are refused."""
+
+    number: int  # 1, 0 to 65535
+
+
 class Hello(NamedTuple):
     """Who the board is."""
 
@@ -186,6 +198,7 @@ class Hello(NamedTuple):
     axes: int  # 1
     max_rate: int  # steps/s
     total_rate: int  # steps/s
+    connection: int  # 1
 
 
 class Status(NamedTuple):
@@ -198,6 +211,7 @@ class Status(NamedTuple):
     watchdog_left: float  # s
     position: tuple[int, int, int, int]  # steps
     rate: tuple[int, int, int, int]  # steps/s
+    lapses: int  # 1
 
 
 class Counters(NamedTuple):
@@ -217,6 +231,7 @@ LAYOUTS: dict[type, Layout] = {
     ),
     Rate: Layout(
         Field("rate", "i", 4, 65536, "steps/s", -20000, 20000, None),
+        Field("life", "B", 1, 1000, "s", 0.01, 0.2, None),
     ),
     Target: Layout(
         Field("position", "i", 4, 1, "steps", -1000000000, 1000000000, None),
@@ -238,6 +253,9 @@ LAYOUTS: dict[type, Layout] = {
         Field("lowest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
         Field("highest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
     ),
+    Connect: Layout(
+        Field("number", "H", 1, 1, "1", 0, 65535, None),
+    ),
     Hello: Layout(
         Field("protocol", "B", 1, 1, "1", None, None, None),
         Field("dictionary", "I", 1, 1, "1", None, None, None),
@@ -247,6 +265,7 @@ LAYOUTS: dict[type, Layout] = {
         Field("axes", "B", 1, 1, "1", None, None, None),
         Field("max_rate", "H", 1, 1, "steps/s", None, None, None),
         Field("total_rate", "H", 1, 1, "steps/s", None, None, None),
+        Field("connection", "H", 1, 1, "1", None, None, None),
     ),
     Status: Layout(
         Field("time", "I", 1, 1000000, "s", None, None, None),
@@ -256,6 +275,7 @@ LAYOUTS: dict[type, Layout] = {
         Field("watchdog_left", "H", 1, 1000, "s", None, None, None),
         Field("position", "i", 4, 1, "steps", None, None, None),
         Field("rate", "h", 4, 1, "steps/s", None, None, None),
+        Field("lapses", "B", 1, 1, "1", None, None, None),
     ),
     Counters: Layout(
         Field("frames", "I", 1, 1, "1", None, None, None),
@@ -274,6 +294,7 @@ COMMAND_OF: dict[type, Command] = {
     Home: Command.HOME,
     Configure: Command.CONFIGURE,
     Limits: Command.LIMITS,
+    Connect: Command.CONNECT,
 }
 ANSWER_TO: dict[Command, type] = {
     Command.HELLO: Hello,
@@ -291,6 +312,19 @@ ANSWER_TO: dict[Command, type] = {
     Command.CONFIGURE: Status,
     Command.LIMITS: Status,
 }
+BOUND = frozenset(
+    {
+        Command.PING,
+        Command.ENABLE,
+        Command.RATE,
+        Command.TARGET,
+        Command.JOG,
+        Command.HOME,
+        Command.CLEAR,
+        Command.CONFIGURE,
+        Command.LIMITS,
+    }
+)
 FEEDS_WATCHDOG = frozenset(
     {
         Command.PING,

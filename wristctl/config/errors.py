@@ -43,6 +43,14 @@ class UserError(Exception):
         return " ".join(" - ".join(part for part in parts if part).split())
 
 
+class Unfitting(ValueError):
+    """Settings of which each may be so, but not beside the others."""
+
+    def __init__(self, what: str, fix: str) -> None:
+        super().__init__(what)
+        self.fix = fix
+
+
 @contextmanager
 def under(path: str) -> Iterator[None]:
     """Let an error of the block, which names a key, say that the key stands below this key path."""

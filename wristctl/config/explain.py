@@ -77,8 +77,10 @@ def _fix(detail: Any) -> str:
         unknown = next((key for key in below if known and key not in known), None)
         whole = f"{'.'.join(map(str, path))}=[{items}]"
         return f"{whole}; for {unknown!r} {meant(unknown, known)}" if unknown else whole
+    if detail["type"] == "value_error":
+        return str(getattr(detail["ctx"]["error"], "fix", ""))
     _, field = field_at(path)
-    if field is None or not field.description or detail["type"] == "value_error":
+    if field is None or not field.description:
         return ""
     unit, default = unit_of(field), repr(field.default)
     expected = f"{field.description} [{unit}]" if unit else field.description

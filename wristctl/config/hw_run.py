@@ -8,10 +8,14 @@ from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.control import Row
+from wristctl.config.errors import Unfitting
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
+
+_LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
+"""Of a step rate on the board: seconds at least, and ticks."""
 
 
 class Homing(Section):
@@ -34,14 +38,15 @@ class Safety(Section):
     tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
     stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
-    late: float = quantity(0.05, "s", "longest delay of one tick; below the watchdog time", "assumed", gt=0)
+    late: float = quantity(0.05, "s", "longest delay of one tick; with its period below the watchdog", "assumed", gt=0)
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")
 
     @model_validator(mode="after")
     def _the_host_notices_first(self) -> Self:
         if self.late >= self.watchdog:
-            raise ValueError(f"late ({self.late} s) must be below watchdog ({self.watchdog} s)")
+            what = f"late ({self.late:g} s) must be below watchdog ({self.watchdog:g} s)"
+            raise Unfitting(what, f"safety.late below {self.watchdog:g}, or a longer safety.watchdog")
         return self
 
 
@@ -107,6 +112,30 @@ class HwRunSettings(RigSettings):
             raise ValueError("sensor.frame_rate is above one frame per control_period")
         if self.positions == "stored" and self.calibration is None:
             raise ValueError("positions: stored needs a calibration run")
+        return self
+
+    @property
+    def rate_life(self) -> float:
+        """Seconds for which the board follows a step rate without another: two ticks may be lost."""
+        return max(_LEAST_LIFE, _LIFE_PERIODS * self.control_period)
+
+    @model_validator(mode="after")
+    def _ticks_before_the_watchdog(self) -> Self:
+        period, limits = self.control_period, self.safety
+        if self.rate_life >= limits.watchdog:
+            what = (
+                f"a step rate lives for {self.rate_life:g} s ({_LIFE_PERIODS:g} times control_period {period:g} s, "
+                f"{_LEAST_LIFE:g} s at least), which must be below safety.watchdog ({limits.watchdog:g} s)"
+            )
+            shorter = f"control_period below {limits.watchdog / _LIFE_PERIODS:g}, or "
+            fix = f"safety.watchdog above {self.rate_life:g}"
+            raise Unfitting(what, (shorter if limits.watchdog > _LEAST_LIFE else "") + fix)
+        if period + limits.late >= limits.watchdog:
+            what = (
+                f"a tick that is late by safety.late ({limits.late:g} s) comes {period + limits.late:g} s after the "
+                f"one before: not below safety.watchdog ({limits.watchdog:g} s)"
+            )
+            raise Unfitting(what, f"safety.late below {limits.watchdog - period:g}, or a longer safety.watchdog")
         return self
 
     def _emulated_world(self) -> Plant:

@@ -16,7 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag
-from wristctl.config.hw_run import RigSettings
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.simulation.reference import Motion
@@ -31,7 +31,7 @@ from wristctl.trial.tracking import Tracking
 Shown = Callable[[dict[str, Any]], None]
 """Takes each tick's row of the log, to show it."""
 
-_UNDERWAY, _BUSY = 0.33, 6.6e-9
+_UNDERWAY, _BUSY = 0.37, 6.6e-9
 """Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
 longer [s] that takes for each step/s of all axes together, whose interrupts come first."""
 
@@ -72,11 +72,12 @@ class ControlLoop:
     """Drives a homed, enabled board in one bending plane; `signs` say which way each motor's positive steps turn."""
 
     def __init__(
-        self, board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
+        self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
         signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None,
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
+        self._life = settings.rate_life
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
         self._monitor = Monitor(settings.safety, self._spools)
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
@@ -177,7 +178,8 @@ class ControlLoop:
         """Raises SafetyStop where the limits are exceeded."""
         age, delay = clock - self._last_usable, late + self._skipped * self._period
         taut, _ = self._paths.taut(estimate.theta)
-        self._monitor.see(Seen(estimate, age, self._verdict, position, taut, self._status.state, delay))
+        status = self._status
+        self._monitor.see(Seen(estimate, age, self._verdict, position, taut, status.state, delay, status.lapses, clock))
 
     def _answer(self, reference: tuple[float, float, float], time: float, faults: HostFaults) -> Answer:
         try:
@@ -200,7 +202,7 @@ class ControlLoop:
     def _send(self, rates: Array) -> None:
         """Step rates of the axes, one of which is 0 for none; and what the board then says."""
         began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
-        sent, self._status = self._board.turn(rates.tolist())
+        sent, self._status = self._board.turn(rates.tolist(), self._life)
         self._sent = self._signs * np.array(sent)
         self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
         self._counted = began + self._underway + busy

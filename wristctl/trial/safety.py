@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,14 @@ class Seen(NamedTuple):
     """Where the tendons are taut at the estimated angle, (4,) [m]."""
     state: State
     late: float
+    lapses: int
+    """Step rates that have outlived their life, as the board counts."""
+    time: float
+    """On the clock [s]."""
+
+
+_LAPSES, _WITHIN = 3, 1.0
+"""So many rates that have outlived their life within so many seconds are too many."""
 
 
 class Monitor:
@@ -45,6 +54,8 @@ class Monitor:
 
     def __init__(self, limits: Safety, spools: Spools) -> None:
         self._limits, self._spools = limits, spools
+        self._lapses: int | None = None
+        self._lapsed: deque[float] = deque(maxlen=_LAPSES)
 
     def see(self, seen: Seen) -> None:
         """Judge what was measured. A late tick comes first: what it sees is late as well."""
@@ -52,6 +63,7 @@ class Monitor:
         if seen.late > limits.late:
             what = f"a tick came {1e3 * seen.late:.0f} ms late"
             raise SafetyStop(what, fix="close other programs, or a longer control_period")
+        self._count_lapses(seen)
         if not all(map(math.isfinite, seen.estimate)):
             raise SafetyStop("the observer's estimate is not a number", fix="see the frames in data/frames.csv")
         self._angle(seen.estimate.theta)
@@ -78,6 +90,14 @@ class Monitor:
     def stale(self) -> float:
         """Seconds for which the marker may be out of sight."""
         return self._limits.stale
+
+    def _count_lapses(self, seen: Seen) -> None:
+        before = seen.lapses if self._lapses is None else self._lapses
+        self._lapses = seen.lapses
+        self._lapsed.extend([seen.time] * ((seen.lapses - before) & 0xFF))
+        if len(self._lapsed) == _LAPSES and seen.time - self._lapsed[0] < _WITHIN:
+            what = f"step rates came too late to the board {_LAPSES} times in {_WITHIN:g} s"
+            raise SafetyStop(what, fix="close other programs, or see that the cable and its plugs are sound")
 
     def _angle(self, theta: float) -> None:
         limit = self._limits.angle_deg

@@ -10,66 +10,68 @@ import pytest
 from tests.board.bench import MS, Bench, encode
 from wristctl.board.dictionary import STRUCT_CODE, WIRE_RANGE, load
 from wristctl.board.layout import Field
-from wristctl.board.messages import COMMAND_OF, ENABLE_KEY, LAYOUTS, Command, Rate, State
+from wristctl.board.messages import BOUND, COMMAND_OF, ENABLE_KEY, LAYOUTS, Command, Rate, State
 
-PAYLOAD_BYTES = dict.fromkeys(Command, 0) | {c: LAYOUTS[m].struct.size for m, c in COMMAND_OF.items()}
+FIELD_BYTES = dict.fromkeys(Command, 0) | {c: LAYOUTS[m].struct.size for m, c in COMMAND_OF.items()}
+PAYLOAD_BYTES = {command: size + 2 * (command in BOUND) for command, size in FIELD_BYTES.items()}
 COUNT_SPAN = {STRUCT_CODE[kind]: span for kind, span in WIRE_RANGE.items()}
 
 
-def sound_frame(rng: random.Random) -> bytes:
-    """Return a frame with a right CRC and a random payload of the right length, but for ENABLE's key."""
+def sound_frame(rng: random.Random, bench: Bench) -> bytes:
+    """A frame with a right CRC and random fields, but for ENABLE's key; mostly of our connection."""
     command = rng.choice(list(Command))
-    payload = rng.randbytes(PAYLOAD_BYTES[command])
+    payload = rng.randbytes(FIELD_BYTES[command])
     if command is Command.ENABLE and payload == ENABLE_KEY.to_bytes(4, "little"):
         payload = bytes(4)
-    return encode(command, rng.randrange(256), payload)
+    other = rng.randrange(2**16) if rng.random() < 0.2 else None
+    return bench.frame(command, rng.randrange(256), payload, other)
 
 
-def garbage(rng: random.Random) -> bytes:
+def garbage(rng: random.Random, bench: Bench) -> bytes:
     return rng.randbytes(rng.randrange(1, 60))
 
 
-def truncated(rng: random.Random) -> bytes:
-    frame = sound_frame(rng)
+def truncated(rng: random.Random, bench: Bench) -> bytes:
+    frame = sound_frame(rng, bench)
     return frame[: rng.randrange(1, len(frame))]
 
 
-def bad_crc(rng: random.Random) -> bytes:
+def bad_crc(rng: random.Random, bench: Bench) -> bytes:
     frame = bytearray(encode(rng.choice(list(Command)), 1, rng.randbytes(4)))
     frame[-2] = frame[-2] % 255 + 1  # never zero, always another value
     return bytes(frame)
 
 
-def flipped_bit(rng: random.Random) -> bytes:
-    frame = bytearray(sound_frame(rng))
+def flipped_bit(rng: random.Random, bench: Bench) -> bytes:
+    frame = bytearray(sound_frame(rng, bench))
     frame[rng.randrange(len(frame))] ^= 1 << rng.randrange(8)
     return bytes(frame)
 
 
-def duplicate(rng: random.Random) -> bytes:
-    return sound_frame(rng) * 2
+def duplicate(rng: random.Random, bench: Bench) -> bytes:
+    return sound_frame(rng, bench) * 2
 
 
-def overlong(rng: random.Random) -> bytes:
+def overlong(rng: random.Random, bench: Bench) -> bytes:
     return b"\0" + bytes(rng.randrange(1, 256) for _ in range(rng.randrange(60, 140))) + b"\0" * rng.randrange(2)
 
 
-def unknown(rng: random.Random) -> bytes:
+def unknown(rng: random.Random, bench: Bench) -> bytes:
     code = rng.choice([0, *range(max(Command) + 1, 256)])
     return encode(code, rng.randrange(256), rng.randbytes(rng.randrange(40)))
 
 
-def wrong_length(rng: random.Random) -> bytes:
+def wrong_length(rng: random.Random, bench: Bench) -> bytes:
     command = rng.choice(list(Command))
     wrong = rng.choice([n for n in range(45) if n != PAYLOAD_BYTES[command]])
     return encode(command, rng.randrange(256), rng.randbytes(wrong))
 
 
-def delimiters(rng: random.Random) -> bytes:
+def delimiters(rng: random.Random, bench: Bench) -> bytes:
     return bytes(rng.randrange(1, 6))
 
 
-BadInput = Callable[[random.Random], bytes]
+BadInput = Callable[[random.Random, Bench], bytes]
 KINDS: tuple[BadInput, ...] = (
     *(garbage, truncated, bad_crc, flipped_bit, duplicate),
     *(overlong, unknown, wrong_length, delimiters),
@@ -89,8 +91,8 @@ def test_each_bad_input_is_followed_by_an_answered_ping_no_step_and_no_enabling(
     rng = random.Random(5)
     for i in range(4_000 * rounds):
         kind = rng.choice(KINDS)
-        bad = kind(rng)
-        bench.chip.write(bad + encode(Command.PING, i % 256))
+        bad = kind(rng, bench)
+        bench.chip.write(bad + bench.frame(Command.PING, i % 256))
         assert answered_ping(bench, i % 256), f"input {i}, {kind.__name__}: {bad.hex()}"
     assert sum(drive.steps for drive in bench.drives) == 0
     assert not any(drive.was_on for drive in bench.drives)
@@ -124,7 +126,7 @@ def test_every_value_out_of_range_is_refused_and_moves_nothing(bench: Bench, rea
     cases = out_of_range_payloads()
     assert len({command for command, _, _ in cases}) == 6  # all with fields but ENABLE, whose key takes all 32 bits
     for i, (command, what, payload) in enumerate(cases):
-        bench.chip.write(encode(command, 1, payload) + encode(Command.PING, i % 256))
+        bench.chip.write(bench.frame(command, 1, payload) + bench.frame(Command.PING, i % 256))
         until = bench.chip.cycles + 20 * MS
         frames: list[tuple[int, int, bytes]] = []
         while len(frames) < 2 and bench.chip.cycles < until:
@@ -145,7 +147,7 @@ def test_noise_between_commands_does_not_disturb_a_motion(bench: Bench) -> None:
         bench.run_ms(5)
     bench.look()
     for _ in range(100):
-        bench.chip.write(rng.choice([garbage, bad_crc, overlong, unknown])(rng))
+        bench.chip.write(rng.choice([garbage, bad_crc, overlong, unknown])(rng, bench))
         bench.do(rate)
     for rises in bench.look():
         assert (rises[-1] - rises[0]) / (len(rises) - 1) == pytest.approx(3_200, abs=1)

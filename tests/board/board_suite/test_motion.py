@@ -92,9 +92,9 @@ def test_flooded_line_costs_answers_but_neither_steps_nor_the_link(bench: Bench,
     rate = Rate(rates)  # type: ignore[arg-type]
     keep_rate(bench, rate, 0.5)
     bench.look()
-    for _ in range(200):
+    for _ in range(400):
         bench.send(rate)
-        bench.run_ms(0.92)  # as long as the frame takes: the line is never silent
+        bench.run_ms(1.08)  # as long as the frame takes: the line is never silent
     for wanted, rises in zip(rates, bench.look(), strict=True):
         if wanted:
             intervals = np.diff(rises) * abs(wanted) / CLOCK

@@ -5,6 +5,7 @@
 #include "safety.h"
 #include "uart.h"
 #include <math.h>
+#include <string.h>
 
 #define RATE_SCALE (1.0f / 65536) /* of RATE on the wire */
 #define FURTHEST 1000000000L      /* the widest LIMITS */
@@ -14,6 +15,15 @@ uint8_t on_hello(void) { return RESULT_OK; }
 uint8_t on_ping(void) { return RESULT_OK; }
 uint8_t on_status(void) { return RESULT_OK; }
 uint8_t on_counters(void) { return RESULT_OK; }
+
+/* The number that bound commands must name. Each start of the board has its own 256. */
+static uint16_t connection;
+
+uint8_t on_connect(const struct connect_command *c) {
+  if (c->number != connection && c->number != (uint16_t)(connection + 1)) return RESULT_CONNECTION;
+  connection = c->number;
+  return RESULT_OK;
+}
 
 uint8_t on_configure(const struct configure_command *c) {
   motion_configure(c->acceleration, c->stop_acceleration);
@@ -43,7 +53,7 @@ uint8_t on_rate(const struct rate_command *c) {
     total += fabsf(rates[i]);
   }
   if (total > TOTAL_RATE) return RESULT_RANGE;
-  for (uint8_t i = 0; i < AXES; i++) motion_go_at(i, rates[i]);
+  motion_turn(rates, c->life);
   return RESULT_OK;
 }
 
@@ -107,30 +117,34 @@ static uint8_t admission(uint8_t when) {
   return RESULT_OK;
 }
 
-static struct { uint8_t length, when, feeds; } const known[] = {
-#define ROW(NAME, WHEN, LENGTH, FEEDS) [COMMAND_##NAME] = {LENGTH, WHEN, FEEDS},
+static struct { uint8_t length, when, bound, feeds; } const known[] = {
+#define ROW(NAME, WHEN, LENGTH, BOUND, FEEDS) [COMMAND_##NAME] = {LENGTH, WHEN, BOUND, FEEDS},
     COMMANDS(ROW)};
 
 static bool is_known(uint8_t code) { return code < sizeof known / sizeof known[0] && known[code].when; }
 
 static uint8_t obey(const struct frame *f) {
   if (!is_known(f->code)) return RESULT_UNKNOWN;
-  if (f->length != known[f->code].length) return RESULT_LENGTH;
+  uint8_t named = known[f->code].bound ? sizeof connection : 0;
+  if (f->length != named + known[f->code].length) return RESULT_LENGTH;
+  if (memcmp(f->payload, &connection, named)) return RESULT_CONNECTION;
   uint8_t result = admission(known[f->code].when);
   if (result != RESULT_OK) return result;
-  result = command_carry_out(f->code, f->payload);
+  result = command_carry_out(f->code, f->payload + named);
   if (result == RESULT_OK && known[f->code].feeds) safety_feed_watchdog();
   return result;
 }
 
 void answer_hello(struct hello_answer *a) {
   *a = (struct hello_answer){PROTOCOL_VERSION, DICTIONARY_HASH, FIRMWARE_VERSION, boot_nonce(),
-                             boot_cause(),     AXES,            MAX_RATE,         TOTAL_RATE};
+                             boot_cause(),     AXES,            MAX_RATE,         TOTAL_RATE,   connection};
 }
 
 void answer_status(struct status_answer *a) {
   *a = (struct status_answer){.time = clock_us(), .state = safety_state(), .faults = safety_faults()};
-  a->flags = safety_flags() | (motion_moving() ? FLAG_MOVING : 0) | (motion_at_limit() ? FLAG_AT_LIMIT : 0);
+  a->flags = safety_flags() | (motion_moving() ? FLAG_MOVING : 0) | (motion_at_limit() ? FLAG_AT_LIMIT : 0) |
+             (motion_lapsed() ? FLAG_LAPSED : 0);
+  a->lapses = motion_lapses();
   a->watchdog_left = safety_watchdog_left_ms();
   for (uint8_t i = 0; i < AXES; i++) {
     a->position[i] = axis_position(i);
@@ -151,6 +165,7 @@ void commands_answer(struct frame *f) {
 }
 
 void commands_init(void) {
+  connection = (uint16_t)boot_nonce() << 8;
   static const int32_t lowest[AXES] = {-FURTHEST, -FURTHEST, -FURTHEST, -FURTHEST};
   static const int32_t highest[AXES] = {FURTHEST, FURTHEST, FURTHEST, FURTHEST};
   motion_set_limits(lowest, highest);

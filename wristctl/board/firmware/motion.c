@@ -25,6 +25,10 @@ static float half_change;     /* of the rate, in one update of planned braking *
 static float arrival_rate;    /* an axis this slow may end its motion from one step to the next */
 static int32_t braking_steps; /* from MAX_RATE, with a margin */
 
+static uint8_t turned_ms, life_ms; /* of motion_turn(); life 0: nothing that could lapse */
+static bool lapsed;
+static uint8_t lapses;
+
 void motion_configure(uint32_t accelerate, uint32_t stop) {
   acceleration = accelerate;
   stop_acceleration = stop;
@@ -49,8 +53,15 @@ bool motion_within_limits(const int32_t *positions) {
   return true;
 }
 
+/* What is asked from here on is no rate, or a fresh one. */
+static void forget_life(void) {
+  life_ms = 0;
+  lapsed = false;
+}
+
 void motion_go_to(uint8_t axis, int32_t position, float top_rate) {
   struct motion *m = &motions[axis];
+  forget_life();
   m->goal = position;
   m->top_rate = top_rate;
   m->to_limit = false;
@@ -63,8 +74,24 @@ void motion_go_at(uint8_t axis, float rate) {
   m->to_limit = m->top_rate >= SLOWEST_RATE;
 }
 
+void motion_turn(const float *rates, uint8_t life) {
+  forget_life();
+  turned_ms = clock_ms();
+  for (uint8_t i = 0; i < AXES; i++) {
+    motion_go_at(i, rates[i]);
+    if (motions[i].top_rate >= SLOWEST_RATE) life_ms = life;
+  }
+}
+
 void motion_stop(void) {
+  forget_life();
   for (uint8_t i = 0; i < AXES; i++) motion_go_at(i, 0);
+}
+
+static void lapse(void) {
+  motion_stop();
+  lapsed = true;
+  lapses++;
 }
 
 static bool has_goal(uint8_t axis) {
@@ -76,6 +103,9 @@ bool motion_moving(void) {
     if (axis_stepping(i) || (safety_state() == STATE_ENABLED && has_goal(i))) return true;
   return false;
 }
+
+bool motion_lapsed(void) { return lapsed; }
+uint8_t motion_lapses(void) { return lapses; }
 
 bool motion_at_limit(void) {
   for (uint8_t i = 0; i < AXES; i++)
@@ -125,6 +155,7 @@ void motion_poll(void) {
   static uint8_t axis;
   if (++axis == AXES) axis = 0;
   uint8_t now = clock_ms(), elapsed = now - motions[axis].updated_ms;
+  if (life_ms && (uint8_t)(now - turned_ms) > life_ms) lapse();
   if (elapsed < UPDATE_MS) return;
   motions[axis].updated_ms = now;
   update(axis, elapsed < LONGEST_UPDATE_MS ? elapsed : LONGEST_UPDATE_MS);
