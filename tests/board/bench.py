@@ -16,10 +16,12 @@ from wristctl.board.messages import (
     ENABLE_KEY,
     LAYOUTS,
     Command,
+    Configure,
     Connect,
     Enable,
     Flag,
     Home,
+    Limits,
     Result,
     Status,
 )
@@ -71,14 +73,21 @@ class Bench:
         self._seq = 0
         self._line_busy_until = 0
         self._received = b""
-        self.run_ms(3)
+        self.run_ms(20)
         self.connection = 0
+        self.configure, self.limits = Configure(), Limits()
         self.connect()
 
     def connect(self) -> None:
         """Begin a connection of our own."""
         self.connection = (self.do(Command.HELLO).connection + 1) % 2**16
         self.do(Connect(self.connection))
+
+    @property
+    def enable(self) -> Enable:
+        """The command, with its key and the check of what the board was told."""
+        told = b"".join(LAYOUTS[type(each)].pack(each) for each in (self.configure, self.limits))
+        return Enable(ENABLE_KEY, binascii.crc_hqx(told, 0xFFFF))
 
     def frame(self, command: int, seq: int, payload: bytes = b"", connection: int | None = None) -> bytes:
         """A command of our connection, or of another, as it goes over the wire."""
@@ -132,7 +141,15 @@ class Bench:
         """Ask, and insist on OK."""
         result, answer = self.ask(message)
         assert result is Result.OK, f"{message}: {result.name}, {answer}"
+        self.heed(message)
         return answer
+
+    def heed(self, message: Command | tuple[Any, ...]) -> None:
+        """What the board has been told of its settings."""
+        if isinstance(message, Configure):
+            self.configure = message
+        elif isinstance(message, Limits):
+            self.limits = message
 
     def status(self) -> Status:
         answer: Status = self.do(Command.STATUS)
@@ -140,7 +157,7 @@ class Bench:
 
     def get_ready(self) -> None:
         """Enable, let the drives settle, and declare this home."""
-        self.do(Enable(ENABLE_KEY))
+        self.do(self.enable)
         while Flag.SETTLING in self.status().flags:
             self.do(Command.PING)
             self.run_ms(10)

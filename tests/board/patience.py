@@ -31,7 +31,7 @@ def patient(transport: Transport) -> Board:
 
     def configured() -> bool:
         try:
-            board.configure(Configure(watchdog=WATCHDOG))
+            board.set_up(Configure(watchdog=WATCHDOG))
         except NoAnswer:
             return False
         return True

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from wristctl.board.check import WIRING_STEPS, move_a_little, round_trips
-from wristctl.board.messages import Command
+from wristctl.board.messages import Command, Configure
 
 
 class Told:
@@ -25,6 +25,9 @@ class Told:
     def read(self) -> None:
         self.told.append("read")
         self.round_trip = next(self.trips)
+
+    def set_up(self, settings: Any) -> None:
+        self.told.append(settings)
 
     def enable(self) -> Any:
         self.told.append("enable")
@@ -55,5 +58,5 @@ def test_one_axis_creeps_a_twentieth_of_a_turn_forward_and_back() -> None:
     board: Any = Told([])
     last: Any = move_a_little(board, 2)
     assert last == "off"
-    assert board.told == ["enable", [10, 20, 30 + 160, 40], [10, 20, 30, 40], "disable"]
+    assert board.told == [Configure(), "enable", [10, 20, 30 + 160, 40], [10, 20, 30, 40], "disable"]
     assert WIRING_STEPS == 200 * 16 // 20

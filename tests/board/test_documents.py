@@ -40,7 +40,7 @@ def test_each_verdict_on_a_frame_is_explained_in_the_trackers_words() -> None:
 
 def test_wiring_names_the_pins_the_firmware_uses() -> None:
     text, pins = (DOCUMENTS / "wiring.md").read_text(), (FIRMWARE / "pins.h").read_text()
-    for port, first in (("A", 22), ("C", 37)):
+    for port, first in (("A", 22), ("C", 37), ("L", 49)):
         for bit in range(8 if port == "A" else 4):
             digital = first + bit if port == "A" else first - bit
             assert f"D{digital} (P{port}{bit})" in text

@@ -15,11 +15,11 @@ from tests.cli.conftest import Call
 from wristctl.board.check import RoundTrips
 from wristctl.board.exchange import Traffic
 from wristctl.board.flashing import IMAGE
-from wristctl.board.messages import Command, Counters, Hello, Result, State, Status
+from wristctl.board.messages import Command, Counters, Hello, Reset, Result, State, Status
 from wristctl.board.transport import BOOT_TIME
 from wristctl.cli.hw_options import facts_of
 
-HELLO = Hello(2, 0xAB, (1, 2, 3), 9, 0, 4, 1000, 2000, 5)
+HELLO = Hello(2, 0xAB, (1, 2, 3), 9, Reset.EXTERNAL | Reset.WARM, 4, 1000, 2000, 5)
 COUNTERS = Counters(*range(11, 11 + len(Counters._fields)))
 
 
@@ -148,3 +148,17 @@ def test_facts_are_named() -> None:
     nameless = SimpleNamespace(name=None)
     told = facts_of({"dictionary": 255, "firmware": (1, 0, 2), "state": State.DISABLED, "flags": nameless, "axes": 4})
     assert told == {"dictionary": "000000ff", "firmware": "1.0.2", "state": "DISABLED", "flags": "none", "axes": 4}
+
+
+@pytest.mark.parametrize(
+    ("cause", "said"),
+    [
+        (Reset.EXTERNAL | Reset.WARM, ("reset line was pulled", "memory has survived")),
+        (Reset.BROWN_OUT, ("the supply has sagged",)),
+        (Reset.WARM, ("hidden by the boot loader", "memory has survived")),
+        (Reset(0), ("hidden by the boot loader",)),
+    ],
+)
+def test_why_the_board_has_started_is_said_in_words(cause: Reset, said: tuple[str, ...]) -> None:
+    told = str(facts_of(HELLO._replace(reset_cause=cause)._asdict())["reset_cause"]).split("; ")
+    assert len(told) == len(said) and all(part in whole for part, whole in zip(said, told, strict=True))

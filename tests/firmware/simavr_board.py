@@ -37,14 +37,15 @@ def _library() -> ctypes.CDLL:
 
 
 class SimavrBoard:
-    """An ATmega2560 at 16 MHz running one Intel hex image in virtual time, its emergency stop input closed."""
+    """An ATmega2560 at 16 MHz running one Intel hex image in virtual time, its inputs closed to GND."""
 
     def __init__(self, image: Path, baud: int = 250_000, start_in_bootloader: bool = False) -> None:
         self._lib = _library()
         self._board = self._lib.board_new(str(image).encode(), baud, start_in_bootloader)
         if not self._board:
             raise ValueError(f"{image} is no Intel hex image")
-        self.drive("G", 0, False)
+        for port, bit in (("G", 0), *(("L", bit) for bit in range(4))):
+            self.drive(port, bit, False)
 
     @property
     def cycles(self) -> int:

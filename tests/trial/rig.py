@@ -68,8 +68,8 @@ class RigBoard:
     def send(self, message: Any) -> None:
         self.told.append(message)
 
-    def configure(self, message: Any) -> None:
-        self.told.append(message)
+    def set_up(self, *messages: Any) -> None:
+        self.told += messages
 
     def clear(self) -> None:
         self.told.append("clear")

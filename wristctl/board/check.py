@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from wristctl.board.driver import Board
-from wristctl.board.messages import Command, Status
+from wristctl.board.messages import Command, Configure, Status
 
 WIRING_STEPS = 160
 """A twentieth of a turn at 1/16 step."""
@@ -33,6 +33,7 @@ def round_trips(board: Board, command: Command, count: int) -> RoundTrips:
 
 def move_a_little(board: Board, axis: int) -> Status:
     """Energise the drives, creep axis `axis` forward by WIRING_STEPS and back, and release them."""
+    board.set_up(Configure())
     start = list(board.enable().position)
     there = [position + WIRING_STEPS * (k == axis) for k, position in enumerate(start)]
     board.jog(there)

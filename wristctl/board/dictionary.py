@@ -22,13 +22,14 @@ C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 WIRE_RANGE = {"u8": (0, 2**8), "u16": (0, 2**16), "u32": (0, 2**32), "i16": (-(2**15), 2**15), "i32": (-(2**31), 2**31)}
 CODES = {"State": "states", "Result": "results", "Command": "commands"}
-BITS = {"Fault": "faults", "Flag": "flags"}
+BITS = {"Fault": "faults", "Flag": "flags", "Reset": "resets"}
 _KINDS = {
     "State": "What the board is doing.",
     "Result": "What it answers to a command.",
     "Command": "What a host may ask.",
     "Fault": "Why it stopped, one bit each.",
     "Flag": "What its status says besides, one bit each.",
+    "Reset": "Why it started, one bit each; a boot loader may have hidden it.",
 }
 MARK = "Made from messages.toml by dictionary.py: change that file, not this one."
 
@@ -174,7 +175,8 @@ def python_module(table: MessageTable) -> str:
         out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):", f'    """{_KINDS[kind]}"""', ""]
         out += [f"    {name} = {_number(entry)}  # {entry['meaning']}" for name, entry in table[group].items()]
     out += ["", ""]
-    for kind, prose in (("Result", "meaning"), ("Result", "fix"), ("Fault", "meaning"), ("Fault", "fix")):
+    told = [(kind, prose) for kind in ("Result", "Fault") for prose in PROSE]
+    for kind, prose in (*told, ("Reset", "meaning")):
         out += [f"{kind.upper()}_{prose.upper()} = {{"]
         for name, entry in table[(CODES | BITS)[kind]].items():
             out += [f"    {kind}.{name}: {json.dumps(entry[prose])},"]
@@ -207,8 +209,8 @@ def _named_tuple(name: str, entry: MessageTable, defaults: MessageTable) -> list
         scalar = _enumeration(unit) or ("float" if scale > 1 else "int")
         default = ""
         if field in defaults:
-            value = defaults[field]["value"]
-            default = f" = {value / scale if scale > 1 else value}"
+            value = defaults[field]["value"] / scale if scale > 1 else defaults[field]["value"]
+            default = f" = ({value},) * {count}" if count > 1 else f" = {value}"
         range_note = f", {span[0]} to {span[1]}" if span else ""
         typed = f"tuple[{', '.join([scalar] * count)}]" if count > 1 else scalar
         out += [f"    {field}: {typed}{default}  # {unit}{range_note}"]

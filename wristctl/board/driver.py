@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
 from wristctl.board.exchange import Exchange, Traffic
+from wristctl.board.framing import crc
 from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
@@ -27,17 +28,15 @@ from wristctl.board.messages import (
     Hello,
     Home,
     Jog,
+    Limits,
     Rate,
     Result,
     State,
     Status,
     Target,
 )
-from wristctl.board.rates import Axes, four, within_reach
+from wristctl.board.rates import LEAST_LIFE, Axes, four, within_reach
 from wristctl.board.transport import Transport
-
-LEAST_LIFE = Rate._field_defaults["life"]
-"""Seconds for which a step rate lives where nobody says otherwise."""
 
 ATTEMPTS = 3
 """Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
@@ -57,7 +56,7 @@ class Board:
         self.transport = transport
         self.hello: Hello | None = None
         self._exchange = Exchange(transport)
-        self._watchdog = Configure().watchdog
+        self._configured, self._limits, self._watchdog = Configure(), Limits(), Configure().watchdog
         self._connection = 0
 
     def __enter__(self) -> Self:
@@ -101,15 +100,17 @@ class Board:
         self.hello = hello
         return hello
 
-    def configure(self, settings: Configure) -> Status:
-        """Set ramps, watchdog and what the drives do in a fault; only while disabled."""
-        status = self.send(settings)
-        self._watchdog = settings.watchdog
-        return status
+    def set_up(self, settings: Configure, limits: Limits | None = None) -> Status:
+        """Set ramps, watchdog, what the drives do in a fault, and soft limits; only while disabled."""
+        self.send(settings)
+        self._configured, self._watchdog = settings, settings.watchdog
+        self._limits = limits or Limits()
+        return self.send(self._limits)
 
     def enable(self) -> Status:
-        """Switch the drives on, and wait until they hold."""
-        self.send(Enable(ENABLE_KEY))
+        """Switch the drives on, and wait until they hold; refused where others have set the board up meanwhile."""
+        told = b"".join(LAYOUTS[type(each)].pack(each) for each in (self._configured, self._limits))
+        self.send(Enable(ENABLE_KEY, crc(told)))
         return self.wait_while(Flag.SETTLING, timeout=2.0)
 
     def read(self) -> Status:

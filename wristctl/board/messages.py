@@ -9,12 +9,13 @@ from wristctl.board.layout import Field, Layout
 
 PROTOCOL_VERSION = 2
 FIRMWARE_VERSION = (2, 0, 0)
-DICTIONARY_HASH = 0x7C8ABB38
+DICTIONARY_HASH = 0x31AF83AA
 BAUD = 250000
 AXES = 4  # 1: step/direction drives
 MAX_RATE = 20000  # steps/s: of one axis
 TOTAL_RATE = 40000  # steps/s: of all axes together: what the step interrupts leave time for
 JOG_RATE = 400  # steps/s: of every axis while positions are not trusted
+ESTOP_MS = 3  # ms: for which the emergency stop input must read open: shorter is noise
 JOG_SPAN = 3200  # steps: furthest a JOG may lie from where the axis is: one turn at 1/16 step
 SETTLE_MS = 200  # ms: from energising a drive to its first step
 HEARTBEAT_MS = 5  # ms: a main loop silent for longer counts as hung
@@ -46,6 +47,8 @@ class Result(IntEnum):
     ESTOP_OPEN = 8  # the emergency stop input is open
     MOVING = 9  # an axis is moving
     CONNECTION = 10  # the command is of another connection
+    ALARM = 11  # an alarm input is open
+    CONFIGURATION = 12  # the board's settings are not those that the host believes
 
 
 class Command(IntEnum):
@@ -55,7 +58,7 @@ class Command(IntEnum):
     PING = 2  # are you there? Keeps the link watchdog fed while nothing moves
     STATUS = 3  # state, positions and rates
     COUNTERS = 4  # what went well and wrong on the wire since reset
-    ENABLE = 5  # energise the drives (DISABLED to ENABLED)
+    ENABLE = 5  # energise the drives, if the check of CONFIGURE's and LIMITS' fields is theirs (DISABLED to ENABLED)
     DISABLE = 6  # ramp down, then release the drives; positions are no longer trusted. In FAULT: release held drives
     RATE = 7  # turn each axis at this rate for its life at most, then ramp to rest; below 1 step/s stand still
     TARGET = 8  # go to these positions, no faster than these rates; may be changed on the way
@@ -77,6 +80,7 @@ class Fault(IntFlag):
     ESTOP_INPUT = 4  # the emergency stop button is pressed or its wire is broken
     HANG = 8  # the board's main loop stood still
     WATCHDOG = 16  # the board's millisecond clock stood still
+    DRIVE = 32  # a drive reports an alarm, has no power, or its alarm wire is broken
 
 
 class Flag(IntFlag):
@@ -89,6 +93,18 @@ class Flag(IntFlag):
     SETTLING = 16  # drives just energised; motion starts when this clears
     AT_LIMIT = 32  # a soft limit holds some axis back
     LAPSED = 64  # the last RATE's life is over and no other has come: the axes ramp down, or stand
+    ALARM = 128  # an alarm input is open: a drive's alarm, no supply, or a broken wire
+
+
+class Reset(IntFlag):
+    """Why it started, one bit each; a boot loader may have hidden it."""
+
+    POWER_ON = 1  # power came on
+    EXTERNAL = 2  # the reset line was pulled: a program has opened the port, or the button was pressed
+    BROWN_OUT = 4  # the supply has sagged: another USB port or cable, and see the wiring of the motors' supply
+    WATCHDOG = 8  # the chip's watchdog
+    JTAG = 16  # a debugger
+    WARM = 128  # memory has survived: the supply was never off
 
 
 RESULT_MEANING = {
@@ -103,6 +119,8 @@ RESULT_MEANING = {
     Result.ESTOP_OPEN: "the emergency stop input is open",
     Result.MOVING: "an axis is moving",
     Result.CONNECTION: "the command is of another connection",
+    Result.ALARM: "an alarm input is open",
+    Result.CONFIGURATION: "the board's settings are not those that the host believes",
 }
 RESULT_FIX = {
     Result.OK: "",
@@ -116,6 +134,8 @@ RESULT_FIX = {
     Result.ESTOP_OPEN: "release the button (D41 must be closed to GND)",
     Result.MOVING: "stop and wait until MOVING clears",
     Result.CONNECTION: "another program has taken the board over: close it, and start again",
+    Result.ALARM: "switch the motors' supply on, see which drive's red lamp blinks; without ALM join the input to GND",
+    Result.CONFIGURATION: "send CONFIGURE and LIMITS again, then enable",
 }
 FAULT_MEANING = {
     Fault.LINK: "no command arrived within the watchdog time",
@@ -123,6 +143,7 @@ FAULT_MEANING = {
     Fault.ESTOP_INPUT: "the emergency stop button is pressed or its wire is broken",
     Fault.HANG: "the board's main loop stood still",
     Fault.WATCHDOG: "the board's millisecond clock stood still",
+    Fault.DRIVE: "a drive reports an alarm, has no power, or its alarm wire is broken",
 }
 FAULT_FIX = {
     Fault.LINK: "see why the host fell silent (cable, load, crash), then clear and home",
@@ -130,13 +151,23 @@ FAULT_FIX = {
     Fault.ESTOP_INPUT: "release the button (D41 must be closed to GND), then clear and home",
     Fault.HANG: "reset the board; report it, with the log: this is a firmware bug",
     Fault.WATCHDOG: "reset the board; report it, with the log: this is a firmware bug",
+    Fault.DRIVE: "see which drive's red lamp blinks, mend that and switch the supply off and on, then clear and home",
+}
+RESET_MEANING = {
+    Reset.POWER_ON: "power came on",
+    Reset.EXTERNAL: "the reset line was pulled: a program has opened the port, or the button was pressed",
+    Reset.BROWN_OUT: "the supply has sagged: another USB port or cable, and see the wiring of the motors' supply",
+    Reset.WATCHDOG: "the chip's watchdog",
+    Reset.JTAG: "a debugger",
+    Reset.WARM: "memory has survived: the supply was never off",
 }
 
 
 class Enable(NamedTuple):
-    """Energise the drives (DISABLED to ENABLED)."""
+    """Energise the drives, if the check of CONFIGURE's and LIMITS' fields is theirs (DISABLED to ENABLED)."""
 
     key: int  # 1, 0 to 4294967295
+    configuration: int  # 1, 0 to 65535
 
 
 class Rate(NamedTuple):
@@ -177,8 +208,8 @@ class Configure(NamedTuple):
 class Limits(NamedTuple):
     """Soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset."""
 
-    lowest: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
-    highest: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
+    lowest: tuple[int, int, int, int] = (-1000000000,) * 4  # steps, -1000000000 to 1000000000
+    highest: tuple[int, int, int, int] = (1000000000,) * 4  # steps, -1000000000 to 1000000000
 
 
 class Connect(NamedTuple):
@@ -194,7 +225,7 @@ class Hello(NamedTuple):
     dictionary: int  # 1
     firmware: tuple[int, int, int]  # 1
     boot_nonce: int  # 1
-    reset_cause: int  # 1
+    reset_cause: Reset  # Reset
     axes: int  # 1
     max_rate: int  # steps/s
     total_rate: int  # steps/s
@@ -228,6 +259,7 @@ class Counters(NamedTuple):
 LAYOUTS: dict[type, Layout] = {
     Enable: Layout(
         Field("key", "I", 1, 1, "1", 0, 4294967295, None),
+        Field("configuration", "H", 1, 1, "1", 0, 65535, None),
     ),
     Rate: Layout(
         Field("rate", "i", 4, 65536, "steps/s", -20000, 20000, None),
@@ -261,7 +293,7 @@ LAYOUTS: dict[type, Layout] = {
         Field("dictionary", "I", 1, 1, "1", None, None, None),
         Field("firmware", "B", 3, 1, "1", None, None, None),
         Field("boot_nonce", "I", 1, 1, "1", None, None, None),
-        Field("reset_cause", "B", 1, 1, "1", None, None, None),
+        Field("reset_cause", "B", 1, 1, "Reset", None, None, Reset),
         Field("axes", "B", 1, 1, "1", None, None, None),
         Field("max_rate", "H", 1, 1, "steps/s", None, None, None),
         Field("total_rate", "H", 1, 1, "steps/s", None, None, None),

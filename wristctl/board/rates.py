@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from wristctl.board.messages import MAX_RATE, TOTAL_RATE
+from wristctl.board.messages import MAX_RATE, TOTAL_RATE, Rate
+
+LEAST_LIFE: float = Rate._field_defaults["life"]
+"""Seconds for which a step rate lives where nobody says otherwise."""
 
 Axes = tuple[float, float, float, float]
 

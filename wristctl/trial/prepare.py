@@ -13,7 +13,7 @@ def prepare(board: Board, settings: RigSettings) -> None:
     limits, spools = settings.safety, spools_of(settings.actuator)
     if board.read().state == State.FAULT:
         board.clear()
-    board.configure(Configure(limits.watchdog, int(limits.hold), round(spools.acceleration)))
     furthest = round(limits.travel / spools.step)
-    board.send(Limits((-furthest,) * 4, (furthest,) * 4))
+    ramps = Configure(limits.watchdog, int(limits.hold), round(spools.acceleration))
+    board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4))
     board.enable()

@@ -94,7 +94,7 @@ def test_nothing_lapses_at_rest_or_on_the_way_to_a_target(bench: Bench) -> None:
     assert bench.wait_for_rest().position == (900, 0, 0, -60)
     bench.do(Command.DISABLE)
     bench.run_ms(60)
-    bench.do(Enable(ENABLE_KEY))
+    bench.do(bench.enable)
     bench.run_ms(90)
     bench.do(Jog((1_000, 0, 0, -60)))
     assert bench.wait_for_rest().position == (1_000, 0, 0, -60)
@@ -112,8 +112,15 @@ def test_a_silent_host_is_found_out_by_the_watchdog_all_the_same(bench: Bench) -
 
 
 COMMANDS: list[Any] = [
-    *(Command.PING, Command.CLEAR, Enable(ENABLE_KEY), Rate((RATE, 0.0, 0.0, 0.0)), Target((9, 9, 9, 9), (100,) * 4)),
-    *(Jog((9, 9, 9, 9)), Home((1, 2, 3, 4)), Configure(watchdog=2.0), Limits((-5,) * 4, (5,) * 4)),
+    *(
+        Command.PING,
+        Command.CLEAR,
+        Enable(ENABLE_KEY, 0),
+        Rate((RATE, 0.0, 0.0, 0.0)),
+        Target((9, 9, 9, 9), (100,) * 4),
+    ),
+    *(Jog((9, 9, 9, 9)), Home((1, 2, 3, 4))),
+    *(Configure(watchdog=2.0), Limits((-5,) * 4, (5,) * 4)),
 ]
 
 

@@ -8,12 +8,10 @@ import pytest
 from tests.board.bench import MS, Bench
 from tests.board.drive_watch import CLOCK
 from wristctl.board.messages import (
-    ENABLE_KEY,
     JOG_RATE,
     JOG_SPAN,
     Command,
     Configure,
-    Enable,
     Flag,
     Home,
     Jog,
@@ -187,7 +185,7 @@ def test_stop_ramps_down_and_stays_enabled_and_homed(bench: Bench) -> None:
 
 
 def test_until_homed_only_slow_short_jogs_move(bench: Bench) -> None:
-    bench.do(Enable(ENABLE_KEY))
+    bench.do(bench.enable)
     assert bench.ask(Rate((100.0, 0.0, 0.0, 0.0)))[0] is Result.UNHOMED
     assert bench.ask(Target((100, 0, 0, 0), (100, 1, 1, 1)))[0] is Result.UNHOMED
     assert bench.ask(Jog((JOG_SPAN + 1, 0, 0, 0)))[0] is Result.RANGE
@@ -201,7 +199,7 @@ def test_until_homed_only_slow_short_jogs_move(bench: Bench) -> None:
 
 
 def test_no_step_comes_before_the_drives_have_settled(bench: Bench) -> None:
-    status = bench.do(Enable(ENABLE_KEY))
+    status = bench.do(bench.enable)
     enabled = bench.chip.cycles
     assert Flag.SETTLING in status.flags
     bench.do(Jog((100, 0, 0, 0)))

@@ -22,7 +22,6 @@ from wristctl.board.messages import (
     ENABLE_KEY,
     Command,
     Configure,
-    Enable,
     Fault,
     Flag,
     Home,
@@ -78,14 +77,15 @@ class BoardStates(RuleBasedStateMachine):
 
     @rule()
     def enable(self) -> None:
-        result, _ = self.ask(Enable(ENABLE_KEY))
+        result, _ = self.ask(self.bench.enable)
         assert result is (Result.FAULTED if self.state is State.FAULT else Result.OK)
         if result is Result.OK:
             self.state = State.ENABLED
 
     @rule(key=integers(0, 2**32 - 1).filter(lambda key: key != ENABLE_KEY))
     def enable_with_a_wrong_key(self, key: int) -> None:
-        assert self.ask(Enable(key))[0] is (Result.FAULTED if self.state is State.FAULT else Result.KEY)
+        result, _ = self.ask(self.bench.enable._replace(key=key))
+        assert result is (Result.FAULTED if self.state is State.FAULT else Result.KEY)
 
     @rule()
     def disable(self) -> None:
@@ -103,7 +103,7 @@ class BoardStates(RuleBasedStateMachine):
     @rule()
     def press_the_button(self) -> None:
         self.bench.chip.drive("G", 0, True)
-        self.bench.run_ms(2)
+        self.bench.run_ms(4)
         self.open = True
         self.latch(Fault.ESTOP_INPUT)
 
@@ -161,12 +161,18 @@ class BoardStates(RuleBasedStateMachine):
     @rule(watchdog=sampled_from([0.05, 0.1, 0.2]), hold=integers(0, 1))
     def configure(self, watchdog: float, hold: int) -> None:
         refusal = self.expected_refusal(enabled=False)
-        assert self.ask(Configure(watchdog, hold))[0] is (refusal or Result.OK)
+        message = Configure(watchdog, hold)
+        assert self.ask(message)[0] is (refusal or Result.OK)
+        if refusal is None:
+            self.bench.heed(message)
 
     @rule()
     def limit(self) -> None:
         refusal = self.expected_refusal(enabled=False)
-        assert self.ask(Limits(tuple(-n for n in FAR), FAR))[0] is (refusal or Result.OK)  # type: ignore[arg-type]
+        message = Limits(tuple(-n for n in FAR), FAR)  # type: ignore[arg-type]
+        assert self.ask(message)[0] is (refusal or Result.OK)
+        if refusal is None:
+            self.bench.heed(message)
 
     @rule(seed=integers(0, 2**32 - 1))
     def noise(self, seed: int) -> None:

@@ -21,6 +21,7 @@ BOOT_SECTION = 0x3E000
 """Byte address at which a Mega's boot loader begins."""
 
 ESTOP_INPUT = ("G", 0)  # D41
+ALARM_INPUTS = tuple(("L", bit) for bit in range(4))  # D49 to D46
 
 EDGE = np.dtype([("cycle", np.uint64), ("port", np.uint8), ("value", np.uint8)])
 
@@ -30,7 +31,7 @@ class Halted(RuntimeError):
 
 
 class Atmega2560:
-    """The chip of a Mega 2560 board, running an Intel hex file from flash; its emergency stop input is closed.
+    """The chip of a Mega 2560 board, running an Intel hex file from flash; its inputs are closed to GND.
 
     `baud` is the rate of bytes to the receiver; None means the rate that the program itself has set. With a
     `boot_loader` (another hex file) reset starts that. The first chip on a machine takes some 15 s, to be compiled.
@@ -48,7 +49,8 @@ class Atmega2560:
         self._chip.line_byte = round(10 * state.FREQUENCY / baud) if baud else 0
         self._sent = bytearray()
         self._edges: list[NDArray[np.int64]] = []
-        self.drive(*ESTOP_INPUT, False)
+        for closed in (ESTOP_INPUT, *ALARM_INPUTS):
+            self.drive(*closed, False)
         reset(self._chip, POWER_ON)
         self.run(0)
 

@@ -42,6 +42,8 @@ class Chip(Protocol):
     inputs: NDArray[np.int64]  # by port: pins driven from outside, and their levels
     watchdog_from: int  # cycle of its last restart
     watchdog_unlocked: int  # cycle until which it may be slowed down or switched off
+    eeprom: NDArray[np.uint8]
+    eeprom_until: int  # cycle at which what is being written is
     line: NDArray[np.uint8]  # ring of bytes on their way to the receiver
     line_head: int  # bytes put on the line so far
     line_tail: int  # bytes taken from it
@@ -68,6 +70,7 @@ _ARRAYS = {
     "due": (np.int64, 27),
     "timers": (np.int64, (6, 5)),
     "inputs": (np.int64, (11, 2)),
+    "eeprom": (np.uint8, 1 << 12),
     "line": (np.uint8, 1 << 16),
     "sent": (np.uint8, 1 << 12),
     "edges": (np.int64, (1 << 16, 3)),
@@ -80,5 +83,5 @@ def new_chip() -> Chip:
     chip = cast(Chip, np.zeros(1, np.dtype((np.record, np.dtype(fields, align=True))))[0])
     chip.memory[CONSTANTS:] = np.arange(256)
     chip.flash[:] = 0xFF
-    chip.page[:] = 0xFF
+    chip.page[:] = chip.eeprom[:] = 0xFF
     return chip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wristctl.board.emulator.chip import DELAY, LOOK, Chip
+from wristctl.board.emulator.eeprom import EECR, read_eeprom, write_eeprom
 from wristctl.board.emulator.ports import PIN, levels, write_port
 from wristctl.board.emulator.timers import TIFR, TIMERS, read_timer, write_timer
 from wristctl.board.emulator.usart import UCSRA, UCSRB, UDR, read_byte, write_byte, write_control
@@ -16,7 +17,7 @@ RAMPZ, EIND, SMCR, SPMCSR = 0x5B, 0x5C, 0x53, 0x57
 IO_FIRST, IO_LAST = 0x20, 0x1FF
 GLOBAL_INTERRUPT = 0x80
 
-_MEMORY, _PORT, _TIMER, _FLAGS, _MASK, _CONTROL, _DATA, _WATCHDOG, _SREG = range(9)
+_MEMORY, _PORT, _TIMER, _FLAGS, _MASK, _CONTROL, _DATA, _WATCHDOG, _SREG, _EEPROM = range(10)
 
 
 def _device_table() -> list[tuple[int, int]]:
@@ -29,7 +30,7 @@ def _device_table() -> list[tuple[int, int]]:
         table[row[0] : row[0] + width] = [(_TIMER, k)] * width
         table[row[TIFR]], table[0x6E + k] = (_FLAGS, k), (_MASK, k)
     table[UCSRA], table[UCSRB], table[UDR] = (_CONTROL, 0), (_CONTROL, 0), (_DATA, 0)
-    table[WDTCSR], table[SREG] = (_WATCHDOG, 0), (_SREG, 0)
+    table[WDTCSR], table[SREG], table[EECR] = (_WATCHDOG, 0), (_SREG, 0), (_EEPROM, 0)
     return table
 
 
@@ -47,6 +48,8 @@ def read(chip: Chip, address: int) -> int:
             return read_byte(chip)
         if device == _PORT and address == PIN[which]:
             return levels(chip, which)
+        if device == _EEPROM:
+            return read_eeprom(chip)
     return chip.memory[address]
 
 
@@ -70,6 +73,8 @@ def write(chip: Chip, address: int, value: int) -> None:
         memory[address] &= ~value
     elif device == _WATCHDOG:
         write_watchdog(chip, value)
+    elif device == _EEPROM:
+        write_eeprom(chip, value)
     else:
         if device == _MASK:
             chip.check |= LOOK

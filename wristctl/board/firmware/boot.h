@@ -3,8 +3,8 @@
 #define BOOT_H
 #include <stdint.h>
 
+void boot_count(void); /* once, before anything is asked: takes some milliseconds */
 uint32_t boot_nonce(void);
-uint8_t boot_cause(void); /* MCUSR's bits (a bootloader may have cleared them), and BOOT_WARM where memory survived */
-#define BOOT_WARM 0x80
+uint8_t boot_cause(void); /* bits of enum reset: MCUSR's, which a bootloader may have cleared, and whether memory survived */
 
 #endif

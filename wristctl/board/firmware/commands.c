@@ -8,7 +8,6 @@
 #include <string.h>
 
 #define RATE_SCALE (1.0f / 65536) /* of RATE on the wire */
-#define FURTHEST 1000000000L      /* the widest LIMITS */
 
 /* These change nothing: what they ask for is their answer. */
 uint8_t on_hello(void) { return RESULT_OK; }
@@ -25,7 +24,14 @@ uint8_t on_connect(const struct connect_command *c) {
   return RESULT_OK;
 }
 
+/* What was told last, byte for byte: ENABLE names its check, so that no motor turns by settings that the host knows not of. */
+static struct {
+  struct configure_command configure;
+  struct limits_command limits;
+} __attribute__((packed)) told;
+
 uint8_t on_configure(const struct configure_command *c) {
+  told.configure = *c;
   motion_configure(c->acceleration, c->stop_acceleration);
   safety_configure((struct configuration){c->watchdog, c->hold_on_fault}, motion_longest_stop_ms());
   return RESULT_OK;
@@ -34,16 +40,19 @@ uint8_t on_configure(const struct configure_command *c) {
 uint8_t on_limits(const struct limits_command *c) {
   for (uint8_t i = 0; i < AXES; i++)
     if (c->lowest[i] > c->highest[i]) return RESULT_RANGE;
+  told.limits = *c;
   motion_set_limits(c->lowest, c->highest);
   return RESULT_OK;
 }
 
 uint8_t on_enable(const struct enable_command *c) {
   if (c->key != ENABLE_KEY) return RESULT_KEY;
+  if (c->configuration != crc16(&told, sizeof told)) return RESULT_CONFIGURATION;
   if (safety_state() == STATE_ENABLED) return RESULT_OK;
   motion_stop();
   safety_enable();
-  return safety_state() == STATE_ENABLED ? RESULT_OK : RESULT_ESTOP_OPEN;
+  if (safety_state() == STATE_ENABLED) return RESULT_OK;
+  return safety_flags() & FLAG_ESTOP_OPEN ? RESULT_ESTOP_OPEN : RESULT_ALARM;
 }
 
 uint8_t on_rate(const struct rate_command *c) {
@@ -166,9 +175,12 @@ void commands_answer(struct frame *f) {
 
 void commands_init(void) {
   connection = (uint16_t)boot_nonce() << 8;
-  static const int32_t lowest[AXES] = {-FURTHEST, -FURTHEST, -FURTHEST, -FURTHEST};
-  static const int32_t highest[AXES] = {FURTHEST, FURTHEST, FURTHEST, FURTHEST};
-  motion_set_limits(lowest, highest);
+  struct limits_command widest;
+  for (uint8_t i = 0; i < AXES; i++) {
+    widest.lowest[i] = DEFAULT_LOWEST;
+    widest.highest[i] = DEFAULT_HIGHEST;
+  }
+  on_limits(&widest);
   on_configure(&(struct configure_command){DEFAULT_WATCHDOG, DEFAULT_HOLD_ON_FAULT, DEFAULT_ACCELERATION,
                                            DEFAULT_STOP_ACCELERATION});
 }

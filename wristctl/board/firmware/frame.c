@@ -13,7 +13,8 @@ static uint8_t encoded[LONGEST + 1]; /* COBS adds one byte below 254 */
 static uint8_t encoded_length;
 static bool overlong;
 
-static uint16_t crc16(const uint8_t *bytes, uint8_t count) {
+uint16_t crc16(const void *of, uint8_t count) {
+  const uint8_t *bytes = of;
   uint16_t crc = 0xFFFF;
   while (count--) crc = _crc_xmodem_update(crc, *bytes++);
   return crc;

@@ -11,6 +11,7 @@ struct frame {
   uint8_t length;                   /* of the payload */
 };
 
+uint16_t crc16(const void *of, uint8_t count); /* CRC-16/CCITT-FALSE */
 bool frame_receive(struct frame *f); /* reads up to the end of one frame: true where it came whole and sound */
 void frame_send(struct frame *f);    /* dropped, and counted, where the host does not read */
 extern uint32_t frames_received;

@@ -2,6 +2,7 @@
  * Interrupts step the axes (axis.c), keep the millisecond and the safety (safety.c) and move bytes (uart.c);
  * this loop answers commands and works out rates. Nothing here waits and nothing is allocated. */
 #include "axis.h"
+#include "boot.h"
 #include "commands.h"
 #include "frame.h"
 #include "motion.h"
@@ -25,6 +26,7 @@ static void sleep_until_interrupt(void) {
 int main(void) {
   static struct frame frame;
   pins_init();
+  boot_count();
   axes_init();
   uart_init();
   commands_init();

@@ -5,6 +5,8 @@
  *   DIR  (port A) PA1  PA3  PA5  PA7    Mega D23 D25 D27 D29   high = toward smaller positions
  *   ENA  (port C) PC0  PC1  PC2  PC3    Mega D37 D36 D35 D34   high = opto energised = drive OFF
  *
+ *   ALM  (port L) PL0  PL1  PL2  PL3    Mega D49 D48 D47 D46   closed to GND while all is well, open in an alarm
+ *
  *   emergency stop input PG0 (D41), closed to GND while all is well: a broken wire stops too
  *   state lamp           PB7 (D13, the board's own)                                                */
 #ifndef PINS_H
@@ -15,6 +17,7 @@
 #define STEP_BIT(axis) (1 << (2 * (axis)))
 #define DIR_BIT(axis) (2 << (2 * (axis)))
 #define ENA_BITS 0x0F
+#define ALARM_BITS 0x0F
 
 static inline void pins_init(void) {
   PORTC |= ENA_BITS; /* before the direction, so that the drives never see an enabling level */
@@ -22,6 +25,7 @@ static inline void pins_init(void) {
   PORTA = 0;
   DDRA = 0xFF;
   PORTG |= _BV(PG0); /* pull-up */
+  PORTL |= ALARM_BITS; /* pull-ups */
   DDRB |= _BV(PB7);
 }
 
@@ -29,5 +33,6 @@ static inline void drives_on(void) { PORTC &= ~ENA_BITS; }
 static inline void drives_off(void) { PORTC |= ENA_BITS; }
 static inline bool drives_are_on(void) { return !(PORTC & ENA_BITS); }
 static inline bool estop_open(void) { return PING & _BV(PG0); }
+static inline bool alarm_open(void) { return PINL & ALARM_BITS; }
 
 #endif

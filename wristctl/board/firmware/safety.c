@@ -11,6 +11,7 @@
 static volatile uint32_t milliseconds;
 static volatile uint8_t state, faults, silent_ms;
 static volatile uint8_t settle_left;
+static uint8_t open_ms; /* for how long the emergency stop input has read open */
 static volatile uint16_t watchdog_left, stop_left;
 static volatile bool homed;
 volatile bool safety_estop_heard;
@@ -96,10 +97,21 @@ static void show_state(uint16_t ms) { /* ENABLED lit, FAULT fast, else slow */
     PORTB &= ~_BV(PB7);
 }
 
+/* One stray reading among motor wires is no button; a drive's alarm output has a low impedance, and one is enough. Without
+ * energised drives an alarm input only tells that the motors' supply is off. */
+static void look_at_inputs(void) {
+  if (!estop_open())
+    open_ms = 0;
+  else if (open_ms < ESTOP_MS)
+    open_ms++;
+  if (open_ms == ESTOP_MS && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
+  if (alarm_open() && (state == STATE_ENABLED || state == STATE_STOPPING)) latch(FAULT_DRIVE, !config.hold_on_fault);
+}
+
 ISR(TIMER0_COMPA_vect) {
   uint32_t ms = ++milliseconds;
   wdt_reset();
-  if (estop_open() && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
+  look_at_inputs();
   if (safety_estop_heard) latch_estop_command();
   if (silent_ms < HEARTBEAT_MS)
     silent_ms++;
@@ -125,7 +137,7 @@ bool safety_homed(void) { return homed; }
 
 uint8_t safety_flags(void) {
   return (homed ? FLAG_HOMED : 0) | (drives_are_on() ? FLAG_DRIVES_ON : 0) | (estop_open() ? FLAG_ESTOP_OPEN : 0) |
-         (settle_left ? FLAG_SETTLING : 0);
+         (settle_left ? FLAG_SETTLING : 0) | (alarm_open() ? FLAG_ALARM : 0);
 }
 
 bool safety_may_move(void) { return state == STATE_ENABLED && !settle_left; }
@@ -142,7 +154,7 @@ void safety_feed_watchdog(void) {
 
 void safety_enable(void) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    if (state == STATE_DISABLED && !estop_open()) {
+    if (state == STATE_DISABLED && !estop_open() && !alarm_open()) {
       drives_on();
       axes_permit();
       settle_left = SETTLE_MS;

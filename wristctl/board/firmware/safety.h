@@ -14,7 +14,7 @@ void safety_init(void);
 void safety_configure(struct configuration c, uint16_t longest_stop_ms); /* the stop is cut off after that long */
 uint8_t safety_state(void);
 uint8_t safety_faults(void);
-uint8_t safety_flags(void); /* HOMED, DRIVES_ON, ESTOP_OPEN, SETTLING */
+uint8_t safety_flags(void); /* HOMED, DRIVES_ON, ESTOP_OPEN, SETTLING, ALARM */
 bool safety_may_move(void); /* ENABLED and settled */
 bool safety_homed(void);
 uint16_t safety_watchdog_left_ms(void);
