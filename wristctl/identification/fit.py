@@ -224,7 +224,7 @@ def fit(problem: Problem) -> Fit:
 
     while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
         weighed = noise
-        found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=_MOST)
+        found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST)
         x = found.x
         residuals = [trial.angle - each for trial, each in zip(problem.trials, at(x).expected, strict=True)]
         count = sum(map(len, residuals))
