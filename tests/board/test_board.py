@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from wristctl.board import driver
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
 from wristctl.board.driver import ATTEMPTS, Board
+from wristctl.board.emulator import Atmega2560
 from wristctl.board.emulator.virtual import VirtualTransport
 from wristctl.board.messages import (
     DICTIONARY_HASH,
@@ -20,8 +23,10 @@ from wristctl.board.messages import (
     State,
 )
 from wristctl.board.rates import within_reach
+from wristctl.board.transport import BOOT_TIME
 
 PERIOD = 0.005
+BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 
 
 class BadWire(VirtualTransport):
@@ -242,3 +247,20 @@ def test_a_command_status_loop_at_200_hz_misses_no_deadline(board: Board, wire: 
     counters = board.counters()
     assert counters.uart_errors == counters.bad_crc == counters.late_steps == 0
     assert board.send(Command.STATUS).state == State.ENABLED
+
+
+@pytest.mark.skipif(not BOOT_LOADER.exists(), reason="needs arduino-core-avr")
+def test_a_board_whose_boot_loader_has_just_started_hears_nothing_until_it_is_up_and_then_is_stopped() -> None:
+    """A single byte before, and the stock boot loader waits for a program for seven seconds."""
+    wire = VirtualTransport(Atmega2560(boot_loader=BOOT_LOADER))
+    wire.boot_time = BOOT_TIME
+    assert Board(wire).stop_whatever_runs() is Result.OK
+    assert wire.now() < BOOT_TIME + 0.1
+    assert Board(wire).read().faults is Fault.ESTOP_COMMAND
+
+
+def test_a_board_beside_a_running_program_is_stopped_at_once(wire: BadWire, board: Board) -> None:
+    ready(board).turn((500.0, 0.0, 0.0, 0.0))
+    began = wire.now()
+    assert Board(wire).stop_whatever_runs() is Result.OK
+    assert wire.now() - began < 0.01

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Call
+from wristctl.board import transport
+from wristctl.board.board_errors import PortUnusable
 from wristctl.board.check import RoundTrips
 from wristctl.board.exchange import Traffic
 from wristctl.board.flashing import IMAGE
@@ -35,7 +37,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
 
     def opened(port: str | None, baud: int, exclusive: bool = True) -> Any:
         found.append(("open", port, baud, exclusive))
-        return SimpleNamespace(name="/dev/board", close=lambda: found.append(("close",)), boot_time=0.0)
+        return SimpleNamespace(name="/dev/board", close=lambda: found.append(("close",)), boot_time=BOOT_TIME)
 
     class Plugged:
         hello, traffic, bad_frames = HELLO, Traffic(sent=31, answers=29), 3
@@ -125,9 +127,22 @@ def test_an_axis_moves_after_a_typed_yes_asked_for_on_stderr(
         assert "nothing was moved" in err
 
 
-def test_stop_works_beside_another_program_and_lets_the_port_go(call: Call, asked: list[Any]) -> None:
+def test_stop_opens_a_free_port_alone_and_lets_it_go(call: Call, asked: list[Any]) -> None:
     code, out, _ = call("hw", "stop")
-    assert code == 0 and out == f"stopped ({Result(0).name}); the fault is latched until cleared\n"
+    assert code == 0 and out == "stopped (OK); the fault is latched until cleared\n"
+    assert asked == [("open", None, 250_000, True), ("board", 2.0), ("close",)], "it may have been reset"
+
+
+def test_beside_another_program_it_stops_at_once(call: Call, asked: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = transport.open_transport
+
+    def opened(port: str | None, baud: int, exclusive: bool = True) -> Any:
+        if exclusive:
+            raise PortUnusable("/dev/board", OSError("could not exclusively lock"))
+        return alone(port, baud, exclusive)
+
+    monkeypatch.setattr(transport, "open_transport", opened)
+    assert call("hw", "stop")[0] == 0
     assert asked == [("open", None, 250_000, False), ("board", 0.0), ("close",)]
 
 

@@ -155,13 +155,13 @@ class Board:
         return self.send(Command.ESTOP)
 
     def stop_whatever_runs(self) -> Result:
-        """Emergency stop without a session, at once and until answered, of a board of any message table."""
-        try:
-            answer = self._exchange.ask(Command.ESTOP, b"", _START_PATIENCE, ATTEMPTS)
-        except NoAnswer:
-            self.transport.wait(self.transport.boot_time)
-            answer = self._when_up(Command.ESTOP)
-        return Result(answer[0])
+        """Emergency stop without a session, until answered, of a board of any message table.
+
+        Silent at first where opening the port has reset the board: it makes no steps then, and the stock boot loader
+        would take the first byte for a program to come, and wait for it for 7 s.
+        """
+        self.transport.wait(self.transport.boot_time)
+        return Result(self._when_up(Command.ESTOP)[0])
 
     def clear(self) -> Status:
         """Leave FAULT for DISABLED."""

@@ -33,7 +33,7 @@ COMMANDS = {
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
     "hw-run": ("wristctl.cli.hw_run", _HARDWARE, "Perform the paper's experiment, on hardware or all emulated."),
     "identify": ("wristctl.cli.identify", _HARDWARE, "Find a real wrist's parameters from logged trials."),
-    "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop; calibrate."),
+    "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."),
     "track": ("wristctl.cli.track", _HARDWARE, "Find the wrist's angle in a recorded video."),
     "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }

@@ -1,0 +1,148 @@
+"""Motors by a person's word: asked first, moved as told, held meanwhile, released at the end."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from typing import ClassVar
+
+import pytest
+
+from tests.cli.conftest import Call
+from wristctl.board.driver import Board
+from wristctl.board.emulator import virtual
+from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.messages import Limits
+from wristctl.config.plant import Actuator
+
+STEP_MM = 1e3 * Actuator().step_length
+VERBS = (("jog", "--axis", "1", "--mm", "0.5"), ("home",), ("limits",), ("slacken",), ("clear",))
+
+
+class Emulated(VirtualTransport):
+    """The board that the command opened."""
+
+    made: ClassVar[list[Emulated]] = []
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.made.append(self)
+        self.presses_after = float("inf")
+
+    def wait(self, seconds: float) -> None:
+        super().wait(seconds)
+        if self.now() > self.presses_after:
+            self.chip.drive("G", 0, True)
+
+    @property
+    def energised(self) -> list[bool]:
+        return [not self.chip.pin("C", axis) for axis in range(4)]
+
+
+@pytest.fixture(autouse=True)
+def emulated(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    Emulated.made.clear()
+    monkeypatch.setattr(virtual, "VirtualTransport", Emulated)
+    yield
+
+
+def typed(monkeypatch: pytest.MonkeyPatch, lines: str) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(lines))
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb[0])
+def test_a_dry_run_says_what_would_be_done_and_opens_nothing(call: Call, verb: tuple[str, ...]) -> None:
+    code, out, err = call("hw", *verb, "--port", "emulated", "--dry-run")
+    assert code == 0 and err == "" and len(out.splitlines()) == 1 and not Emulated.made
+
+
+@pytest.mark.parametrize("verb", VERBS[:-1], ids=lambda verb: verb[0])
+def test_only_a_yes_switches_the_drives_on(call: Call, monkeypatch: pytest.MonkeyPatch, verb: tuple[str, ...]) -> None:
+    typed(monkeypatch, "y\n")
+    code, _, err = call("hw", *verb, "--port", "emulated")
+    assert code == 3 and "Emergency stop within reach" in err and "nothing was moved" in err
+    (board,) = Emulated.made
+    assert not len(board.chip.events()) or not any(board.energised)
+    assert board.chip.pin("C", 0), "off all the time"
+
+
+def test_a_tendon_is_reeled_in_by_what_is_typed_and_let_go_at_the_end(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    typed(monkeypatch, "yes\n0.3\nfar\n-9\n-0.2\n\n")
+    code, out, err = call("hw", "jog", "--axis", "2", "--mm", "0.5", "--port", "emulated")
+    steps = [round(mm / STEP_MM) for mm in (0.5, 0.3, -0.2)]
+    assert code == 0 and out.splitlines() == [f"axis 2: {each:+d} steps" for each in steps]
+    assert "'far' is no length" in err and "'-9' is no length of at most 5 mm" in err
+    (board,) = Emulated.made
+    assert board.energised == [False] * 4 and Board(board).read().position == (0, 0, sum(steps), 0)
+
+
+def test_from_home_an_axis_goes_to_lengths_from_zero(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    typed(monkeypatch, "2 0.5\n7 1\n1 -1\n2 0\n\n")
+    code, out, err = call("hw", "home", "--port", "emulated", "--yes")
+    half, one = round(0.5 / STEP_MM), round(1.0 / STEP_MM)
+    assert code == 0 and "'7 1' is no axis and length" in err
+    assert out.splitlines()[1:] == [
+        f"positions {each} steps" for each in ((0, 0, half, 0), (0, -one, half, 0), (0, -one, 0, 0))
+    ]
+    assert Emulated.made[0].energised == [False] * 4
+
+
+def test_limits_are_tried_without_a_step(call: Call) -> None:
+    code, out, _ = call("hw", "limits", "--port", "emulated", "--yes", "--set", "safety.travel=0.01")
+    assert code == 0 and f"+-{round(10 / STEP_MM)} steps is refused" in out
+    (board,) = Emulated.made
+    assert Board(board).read().position == (0, 0, 0, 0) and board.energised == [False] * 4
+
+
+def test_limits_that_the_board_does_not_keep_are_told_of(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    set_up = Board.set_up
+    monkeypatch.setattr(Board, "set_up", lambda board, settings, limits: set_up(board, settings, Limits()))
+    code, _, err = call("hw", "limits", "--port", "emulated", "--yes")
+    assert code == 4 and "axis 0 has no soft limit" in err and Emulated.made[0].energised == [False] * 4
+
+
+def test_slackened_tendons_are_paid_out_together_and_released(call: Call) -> None:
+    code, out, _ = call("hw", "slacken", "--mm", "1", "--port", "emulated", "--yes")
+    (board,), paid = Emulated.made, -round(1.0 / STEP_MM)
+    assert code == 0 and out == f"paid out: {(paid,) * 4} steps\n"
+    assert Board(board).read().position == (paid,) * 4 and board.energised == [False] * 4
+
+
+def test_a_button_pressed_while_a_person_thinks_ends_the_command(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    init = Emulated.__init__
+
+    def pressed(board: Emulated) -> None:
+        init(board)
+        board.presses_after = 1.5
+
+    monkeypatch.setattr(Emulated, "__init__", pressed)
+    with open(reading) as stdin, open(writing, "w"):
+        monkeypatch.setattr(sys, "stdin", stdin)
+        code, _, err = call("hw", "jog", "--axis", "0", "--mm", "0.5", "--port", "emulated", "--yes")
+    (board,) = Emulated.made
+    assert code == 5 and "the emergency stop button is pressed" in err
+    assert board.now() < 1.8 and board.energised == [False] * 4
+
+
+def test_a_latched_fault_is_told_and_cleared_after_a_yes(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    init = Emulated.__init__
+
+    def stopped(board: Emulated) -> None:
+        init(board)
+        board.wait(0.1)
+        Board(board).emergency_stop()
+
+    monkeypatch.setattr(Emulated, "__init__", stopped)
+    typed(monkeypatch, "no\n")
+    code, out, _ = call("hw", "clear", "--port", "emulated")
+    assert code == 3 and out == "the host sent an emergency stop\n"
+    code, out, _ = call("hw", "clear", "--port", "emulated", "--yes")
+    assert code == 0 and out.splitlines()[1] == "cleared; the board is DISABLED"
+    monkeypatch.setattr(Emulated, "__init__", init)
+    code, out, _ = call("hw", "clear", "--port", "emulated", "--yes")
+    assert code == 0 and out == "no fault is latched; the board is DISABLED\n"

@@ -1,0 +1,185 @@
+"""`wristctl hw jog`, `home`, `limits`, `slacken` and `clear`: the motors by a person's word.
+
+The drives hold while the person thinks, and are released at the end: a board keeps no zero without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wristctl.cli.hw_options import BAUD, Baud, Port
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS
+from wristctl.cli.typed import idle, typed_line
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
+
+if TYPE_CHECKING:
+    from wristctl.trial.by_hand import ByHand
+
+Override = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Override a setting of calibrate-wrist: safety.travel=0.01"),
+]
+Calibration = Annotated[
+    str | None, typer.Option("--calibration", help="calibrate-wrist run that knows the senses; without one + reels in.")
+]
+Dry = Annotated[bool, typer.Option("--dry-run", help="Say what would be done; open nothing.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Ask nobody before the motors move.")]
+Axis = Annotated[int, typer.Option("--axis", min=0, max=3, help="Axis, 0 to 3, of tendons 1, 2, 4, 5.")]
+_TENDONS = "Emergency stop within reach, nobody's hands in the tendons?"
+
+
+def jog(
+    axis: Axis, mm: Annotated[float, typer.Option("--mm", help="Tendon to reel in; negative: to pay out.")],
+    port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Reel a tendon in, or pay it out, slowly and by little; then by as much more as is typed."""
+    plan = f"axis {axis} {_reels(mm)}, at 400 steps/s and without soft limits; then the drives hold"
+    with _session(plan, port, baud, override, calibration, out, dry_run, yes) as hand:
+        if hand is None:
+            return
+
+        def more(typed: str) -> None:
+            length = _length(typed)
+            steps = hand.jog([length * (k == axis) for k in range(4)])
+            print(f"axis {axis}: {steps[axis]:+d} steps")
+
+        more(str(mm))
+        _converse(hand, f"Millimetres for axis {axis}, or Enter to release the drives: ", more)
+
+
+def home(
+    port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Call the place where the motors stand zero, and go from there within soft limits as is typed."""
+    plan = "the drives are switched on where they stand, and that is zero; nothing moves until you say so"
+    with _session(plan, port, baud, override, calibration, out, dry_run, yes) as hand:
+        if hand is None:
+            return
+        hand.home()
+        print("zero is here until the drives are released")
+
+        def go(typed: str) -> None:
+            axis, _, length = typed.partition(" ")
+            if axis not in ("0", "1", "2", "3"):
+                raise UserError(f"{typed!r} is no axis and length", fix="for instance 2 0.5")
+            print(f"positions {hand.go(int(axis), _length(length))} steps")
+
+        _converse(hand, "Axis and millimetres from zero, or Enter to release the drives: ", go)
+
+
+def limits(
+    port: Port = None, baud: Baud = BAUD, override: Override = None,
+    dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Set the soft limits of safety.travel, and see that the board keeps them; nothing moves."""
+    plan = "soft limits are set, the drives switched on, and targets beyond the limits sent, which are to be refused"
+    with _session(plan, port, baud, override, None, RESULTS, dry_run, yes) as hand:
+        if hand is not None:
+            hand.home()
+            print(f"a step beyond +-{hand.limits_hold()} steps is refused, on all axes and to both sides")
+
+
+def slacken(
+    mm: Annotated[float, typer.Option("--mm", min=0.0, help="Tendon to pay out.")] = 0.6,
+    port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Pay out all four tendons together, then release the drives: unloads a wrist that has been stopped."""
+    plan = f"each of the four axes {_reels(-mm)}, all together; then the drives are released"
+    with _session(plan, port, baud, override, calibration, out, dry_run, yes) as hand:
+        if hand is not None:
+            print(f"paid out: {hand.jog([-_length(str(mm))] * 4)} steps")
+
+
+def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False, debug: Debug = False) -> None:
+    """Clear a latched fault once its cause is mended; drives that hold let go."""
+    from wristctl.board.driver import Board
+    from wristctl.board.messages import FAULT_MEANING, Fault, State
+    from wristctl.board.transport import open_transport
+
+    plan = "a fault that is latched is cleared: drives that hold tendons let go"
+    if dry_run:
+        print(plan)
+        return
+    with Board(open_transport(port, baud)) as board:
+        status = board.read()
+        if status.state != State.FAULT:
+            print(f"no fault is latched; the board is {status.state.name}")
+            return
+        print("; ".join(FAULT_MEANING[fault] for fault in Fault if fault in status.faults))
+        _agree(plan, yes, idle)
+        print(f"cleared; the board is {board.clear().state.name}")
+
+
+@contextmanager
+def _session(
+    plan: str, port: str | None, baud: int, override: list[str] | None, calibration: str | None, out: Path,
+    dry_run: bool, yes: bool,
+) -> Iterator[ByHand | None]:  # fmt: skip
+    """The drives on, after a yes, until the block ends (at once where that goes wrong); None in a dry run."""
+    settings = load_study((), override or (), "calibrate-wrist").calibrate_wrist
+    if dry_run:
+        print(plan)
+        yield None
+        return
+    from wristctl.board.driver import Board
+    from wristctl.board.transport import open_transport
+    from wristctl.records import open_run
+    from wristctl.trial.by_hand import ByHand
+    from wristctl.trial.calibration import WristCalibration
+    from wristctl.trial.patience import Patience
+
+    signs = WristCalibration.load(open_run(calibration, out)).zero.signs if calibration else (1, 1, 1, 1)
+    with Board(open_transport(port, baud)) as board:
+        _agree(f"{plan}. {_TENDONS}", yes, Patience(board).pulse)
+        yield ByHand(board, settings, signs)
+
+
+def _agree(plan: str, yes: bool, meanwhile: Callable[[], None]) -> None:
+    typer.echo(plan, err=True)
+    if yes:
+        return
+    typer.echo("Type yes to go on: ", nl=False, err=True)
+    if typed_line(meanwhile) != "yes":
+        raise UserError("nothing was moved", fix="type yes, or --yes for scripted use", exit_code=3)
+
+
+def _converse(hand: ByHand, question: str, answer: Callable[[str], None]) -> None:
+    """Do what is typed until nothing is; what cannot be done is said, and asked for anew."""
+    while True:
+        typer.echo(question, nl=False, err=True)
+        if not (typed := typed_line(hand.patience().pulse).strip()):
+            return
+        try:
+            answer(typed)
+        except UserError as error:
+            if error.exit_code != 2:
+                raise
+            typer.echo(str(error), err=True)
+
+
+def _length(typed: str) -> float:
+    """Millimetres as typed, in metres. Raises UserError."""
+    from wristctl.trial.by_hand import MOST
+
+    try:
+        length = 1e-3 * float(typed)
+    except ValueError:
+        length = float("nan")
+    if not abs(length) <= MOST:
+        raise UserError(f"{typed!r} is no length of at most {1e3 * MOST:g} mm", fix="for instance 0.5 or -0.5")
+    return length
+
+
+def _reels(mm: float) -> str:
+    length = 1e3 * _length(str(mm))
+    return f"reels in {length:g} mm of tendon" if length >= 0.0 else f"pays out {-length:g} mm of tendon"

@@ -1,0 +1,66 @@
+"""Motors moved by a person's word: before anything is known of the wrist, or after something went wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from wristctl.board.board_errors import BoardError, Refused
+from wristctl.board.driver import Board
+from wristctl.board.messages import AXES, JOG_RATE, Result, Target
+from wristctl.config.hw_run import RigSettings
+from wristctl.trial.patience import Patience
+from wristctl.trial.prepare import prepare
+from wristctl.trial.spools import spools_of
+
+MOST = 5e-3
+"""Tendon [m] that one word may move."""
+
+
+class ByHand:
+    """The drives of a board, energised for as long as a person works with them; lengths of tendon [m], + reeled in.
+
+    `signs` say which way each motor's positive steps turn. An old fault is cleared.
+    """
+
+    def __init__(self, board: Board, settings: RigSettings, signs: Sequence[int] = (1,) * AXES) -> None:
+        self._board, self._signs, self._step = board, signs, spools_of(settings.actuator).step
+        self._furthest = round(settings.safety.travel / self._step)
+        prepare(board, settings)
+
+    def jog(self, lengths: Sequence[float]) -> tuple[int, ...]:
+        """Creep on by `lengths`, without soft limits; the steps made, once the axes stand."""
+        steps = [sign * round(length / self._step) for sign, length in zip(self._signs, lengths, strict=True)]
+        self._board.jog([at + way for at, way in zip(self._board.read().position, steps, strict=True)])
+        return tuple(steps)
+
+    def patience(self) -> Patience:
+        """For waiting while the drives hold."""
+        return Patience(self._board)
+
+    def home(self) -> None:
+        """Where the axes stand is zero, until the drives are released."""
+        self._board.home()
+
+    def go(self, axis: int, length: float) -> tuple[int, ...]:
+        """Creep with one axis to a length from zero, within the soft limits; the positions [steps] then."""
+        goal = list(self._board.read().position)
+        goal[axis] = self._signs[axis] * round(length / self._step)
+        return self._board.go_to(goal, JOG_RATE).position
+
+    def limits_hold(self) -> int:
+        """See that the board refuses to go a step beyond each soft limit, and moves nothing; the limit [steps].
+
+        Raises BoardError where it does not refuse.
+        """
+        for axis in range(AXES):
+            for beyond in (-self._furthest - 1, self._furthest + 1):
+                goal = [beyond * (k == axis) for k in range(AXES)]
+                try:
+                    self._board.send(Target((goal[0], goal[1], goal[2], goal[3]), (1, 1, 1, 1)))
+                except Refused as error:
+                    if error.result is Result.RANGE:
+                        continue
+                    raise
+                self._board.stop()
+                raise BoardError("firmware", f"axis {axis} has no soft limit", fix="wristctl hw flash")
+        return self._furthest
