@@ -17,9 +17,13 @@ import pytest
 
 from tests.cli.conftest import Call
 from tests.report.browser import CHROMIUM, DRIVER, Browser
+from wristctl.config.load import load_study
 from wristctl.records import list_runs, open_run
+from wristctl.studies.loop_warnings import outside_conditions
+from wristctl.wrist.directions import DIRECTIONS
 
-KEPT = Path(__file__).parents[2] / "build" / "screenshots"
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "build" / "screenshots"
 
 HOMING = "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}"
 QUICK = (
@@ -203,3 +207,17 @@ def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call: Call) -> Non
     assert call(*QUICK, "--set", motors, "--calibration", "latest:calibrate-wrist")[0] == 0
     code, _, err = call(*QUICK, "--calibration", "latest:calibrate-wrist", "--set", "positions=stored")
     assert code == 4 and "the calibration left the motors at" in err
+
+
+def test_the_first_motion_of_a_new_rig_is_small_slow_and_stops_early(call: Call) -> None:
+    file = str(ROOT / "experiments" / "first-motion.yaml")
+    study = load_study([Path(file)])
+    settings = study.hw_run
+    assert {DIRECTIONS[each].plane for each in settings.directions} == {"ulnar"} and settings.push.force == 0.0
+    assert settings.reference.angle_deg == 5.0 and study.wrist.tension_limit == 10.0
+    assert outside_conditions(settings.rows, [settings.loop]) == [], "no --force is needed on hardware"
+    code, _, err = call("hw-run", file, "--set", "directions=[ulnar]", "--set", "horizon=2.2", "--set", HOMING)
+    assert code == 0, err
+    truth = open_run("latest:hw-run").data("truth")
+    assert truth[[f"pull_{tendon}" for tendon in (1, 2, 4, 5)]].to_numpy().max() < 10.0
+    assert np.degrees(np.abs(truth["theta"]).max()) == pytest.approx(5.0, abs=0.3)
