@@ -7,6 +7,7 @@ from pydantic import Field
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
+from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
@@ -25,6 +26,7 @@ class Study(Section):
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
     audit: AuditSettings = AuditSettings()
+    hysteresis: HysteresisSettings = HysteresisSettings()
     identify: IdentifySettings = IdentifySettings()
     calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")

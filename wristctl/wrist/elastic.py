@@ -59,7 +59,7 @@ OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped")
 backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows comes the path, x of both sides
 [m] and the bend [rad], after them the springs' psi [rad]."""
 _OWN, PATH = len(OF_A_TENDON), 3
-_Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
+Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
 
 
 class Tendons(NamedTuple):
@@ -96,7 +96,7 @@ def travel(segment: Any, theta: Any) -> Any:
 
 @compiled
 def _slid(nonideal: Any, state: Any, t: int, x: Any) -> Any:
-    return bristle(state[row_of(t, _Z)], x - state[t % 2], nonideal.bristle)
+    return bristle(state[row_of(t, Z)], x - state[t % 2], nonideal.bristle)
 
 
 @compiled
@@ -117,7 +117,7 @@ def _at_wrist(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, z: Any
 
 @compiled
 def _as_it_was(nonideal: Any, state: Any, t: int, x: Any) -> Any:
-    return state[row_of(t, _Z)]
+    return state[row_of(t, Z)]
 
 
 @compiled
@@ -157,7 +157,7 @@ def _slope(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, speed: An
     x = path[t % 2]
     if nonideal is None:
         return where(given[t] - x > 0.0, tendons.stiffness, 0.0 * x)
-    z, wrapped = tendons.state[row_of(t, _Z)], nonideal.friction * (nonideal.sheath + path[2])
+    z, wrapped = tendons.state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + path[2])
     pull = spool_pull(tendons, given[t], t, x)
     taut = where(pull > 0.0, tendons.state[row_of(t, SHARE)] * tendons.stiffness, 0.0 * x)
     slope = (taut + pull * wrapped * bristle_slope(z, speed, nonideal.bristle)) * capstan(wrapped, 1.0 + 0.0 * x, z)
@@ -197,7 +197,7 @@ def settle(tendons: Any, theta: Any, given: Any, path: Any) -> None:
 def _settle(nonideal: Any, state: Any, theta: Any, given: Any, path: Any) -> None:
     if nonideal is not None:
         for t in range(len(given)):
-            state[row_of(t, _Z)] = _slid(nonideal, state, t, path[t % 2])
+            state[row_of(t, Z)] = _slid(nonideal, state, t, path[t % 2])
             stretch, at = maximum(given[t] - path[t % 2], 0.0 * path[2]), row_of(t, _CREPT)
             state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
         state[0] = path[0]

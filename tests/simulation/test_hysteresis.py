@@ -1,0 +1,159 @@
+"""Hysteresis loops and dead bands of a wrist: against the statics, speed, symmetry, and figures measured otherwise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, friction_cases, loops, main_case
+from wristctl.simulation.strokes import Strokes, strokes
+
+WRIST = WristParameters()
+
+
+def stroke(**own: Any) -> Strokes:
+    """What moves a wrist by settings that differ so from the default ones."""
+    return strokes(WRIST, HysteresisSettings.model_validate({"ranges_deg": ((0.0, 30.0),), "angles_deg": ()} | own))
+
+
+@pytest.fixture(scope="module")
+def driven() -> dict[tuple[float, float], HysteresisLoop]:
+    """Slow loops of bare tendons and of long sheaths, by sheath and speed."""
+    own = stroke(sheaths=(0.0, 3.0), frequencies=(0.002, 0.02, 0.2))
+    return {(each.case.tendons.sheath, each.case.frequency): each for each in loops(own)}
+
+
+@pytest.mark.parametrize(
+    ("sheath", "works", "close"), [(0.0, (6.438, 6.437, 6.427), 2e-4), (3.0, (67.07, 66.93, 65.54), 3e-3)]
+)
+def test_works_are_those_of_an_independent_prototype(
+    driven: dict[tuple[float, float], HysteresisLoop], sheath: float, works: tuple[float, ...], close: float
+) -> None:
+    """0 to 30 deg and back at 0.002, 0.02 and 0.2 Hz [mJ], by another implementation of the same element."""
+    found = [1e3 * driven[sheath, frequency].friction_work for frequency in (0.002, 0.02, 0.2)]
+    np.testing.assert_allclose(found, works, rtol=close)
+
+
+@pytest.mark.parametrize("sheath", [0.0, 3.0])
+def test_friction_takes_the_same_at_every_slow_speed_and_damping_more(
+    driven: dict[tuple[float, float], HysteresisLoop], sheath: float
+) -> None:
+    slow, ten, hundred = (driven[sheath, frequency] for frequency in (0.002, 0.02, 0.2))
+    assert ten.friction_work == pytest.approx(slow.friction_work, rel=0.01)
+    assert ten.damped_work == pytest.approx(10.0 * slow.damped_work, rel=0.01)
+    for each in (slow, ten, hundred):
+        rest = each.raw_work - each.friction_work - each.damped_work
+        assert abs(rest) < 0.005 * each.raw_work, (
+            "nothing else takes any: damping is that of rates at the ends of steps"
+        )
+        assert each.course.theta[0] == pytest.approx(each.course.theta[-1], abs=1e-6), "it closes"
+
+
+def test_a_slow_loop_is_as_wide_as_the_roots_of_the_statics_are_apart(
+    driven: dict[tuple[float, float], HysteresisLoop],
+) -> None:
+    """But for what the wrist's damping lags: its torque over the stiffness of held spools."""
+    for sheath in (0.0, 3.0):
+        slow, fast = driven[sheath, 0.002], driven[sheath, 0.02]
+        lag = fast.width - slow.width
+        assert slow.width - lag / 9.0 == pytest.approx(slow.exact_width, rel=0.003) and lag > 0.0
+        middle = slow.course.theta[(len(slow.time) - 1) // 4], slow.course.theta[3 * (len(slow.time) - 1) // 4]
+        assert middle[1] < np.radians(15.0) < middle[0]
+
+
+@pytest.mark.parametrize("ramp", [5.0, 9.0])
+def test_ramps_leave_held_spools_at_the_roots_of_the_statics(ramp: float) -> None:
+    settings = {"preslidings": (5e-6, 2e-5, 1e-4), "frictions": (0.05, 0.2), "angles_deg": (4.0, 15.0, 27.0)}
+    found = dead_bands(stroke(ramp=ramp, **settings))
+    assert len(found) == 2 * 3 * 3 * 3 and all(each.slid for each in found)
+    for each in found:
+        assert each.width == pytest.approx(each.exact_width, rel=0.01)
+        assert abs(each.below - each.exact_below) < 0.01 * each.exact_width
+        assert each.exact_below < each.unhindered < each.exact_above
+
+
+def test_held_pulls_leave_a_dead_band_many_times_as_wide() -> None:
+    """By the springs alone: the spools' tendons had most of the stiffness."""
+    wide, narrow = (
+        next(each for each in dead_bands(stroke(drive=drive, sheaths=(1.0,), angles_deg=(15.0,))))
+        for drive in ("tensions", "spools")
+    )
+    assert wide.slid and wide.width == pytest.approx(wide.exact_width, rel=0.01)
+    assert 40.0 < wide.width / narrow.width < 55.0
+
+
+def test_ramps_that_do_not_slide_far_enough_are_told_from_those_that_do() -> None:
+    """Against pulls that hardly overcome 3 rad of sheath, from an end of the range 5 deg away."""
+    near, far = dead_bands(stroke(drive="tensions", sheaths=(3.0,), angles_deg=(15.0, 25.0)))
+    assert near.slid and not far.slid and far.width < 0.9 * far.exact_width
+
+
+def test_an_inner_loop_lies_in_the_outer_one() -> None:
+    own = stroke(ranges_deg=((0.0, 30.0), (10.0, 20.0)), frequencies=(0.01,), sheaths=(1.0,))
+    outer, inner = loops(own)
+    assert inner.friction_work < outer.friction_work / 2.5
+    half = len(outer.time) // 2
+    down, up = (
+        np.interp(inner.course.theta, outer.course.theta[part][::order], outer.course.spool_plus[part][::order])
+        for part, order in ((slice(0, half + 1), -1), (slice(half, None), 1))
+    )
+    assert (inner.course.spool_plus > down - 0.02).all() and (inner.course.spool_plus < up + 0.02).all()
+    assert np.ptp(inner.course.spool_plus) > 0.9 * np.abs(up - down).max()
+
+
+def test_a_loop_to_the_other_side_is_the_mirror_image() -> None:
+    right, left = (
+        loops(stroke(ranges_deg=((low, high),), frequencies=(0.5,), sheaths=(1.0,)))[0]
+        for low, high in ((-5.0, 25.0), (-25.0, 5.0))
+    )
+    half = len(right.time) // 2
+    shifted = np.concatenate([left.course.theta[half:-1], left.course.theta[: half + 1]])
+    np.testing.assert_allclose(shifted, -right.course.theta, atol=1e-6)
+    assert left.friction_work == pytest.approx(right.friction_work, rel=1e-5)
+
+
+def test_a_triangle_goes_at_one_speed() -> None:
+    (done,) = loops(stroke(shape="triangle", frequencies=(0.02,), sheaths=(1.0,)))
+    steps = np.abs(np.diff(done.unhindered))
+    np.testing.assert_allclose(steps, np.radians(30.0) / 100.0, rtol=1e-9)
+    assert done.unhindered[0] == pytest.approx(np.radians(30.0)) and done.unhindered[100] == pytest.approx(
+        0.0, abs=1e-12
+    )
+
+
+def test_more_friction_takes_more() -> None:
+    found = loops(stroke(frictions=(0.0, 0.05, 0.1), sheaths=(1.0,), frequencies=(0.1,)))
+    none, some, more = (each.friction_work for each in found)
+    assert none == 0.0 and more == pytest.approx(2.0 * some, rel=0.02) and some > 1e-3
+
+
+def test_of_no_friction_there_is_one_kind() -> None:
+    settings = HysteresisSettings(frictions=(0.0, 0.1), sheaths=(3.0, 0.0, 1.0), preslidings=(2e-5, 1e-4))
+    assert len(friction_cases(settings)) == 1 + 3 * 2
+    assert main_case(settings).friction == 0.0
+    chosen = main_case(settings.model_copy(update={"frictions": (0.1,)}))
+    assert chosen == (0.1, 1.0, 2e-5)
+
+
+@pytest.mark.parametrize(
+    ("own", "wrist", "words"),
+    [
+        ({"ranges_deg": ((0.0, 60.0),)}, {}, "beyond the wrist's range, 50 deg"),
+        ({"drive": "tensions"}, {"hand_mass": 0.8}, "buckles on held pulls"),
+        ({}, {"stiffness": 10.0}, "a tendon, above wrist.tension_limit"),
+    ],
+)
+def test_loops_that_a_wrist_cannot_go_through_are_refused(own: Any, wrist: Any, words: str) -> None:
+    settings = HysteresisSettings.model_validate({"ranges_deg": ((0.0, 30.0),), "angles_deg": ()} | own)
+    with pytest.raises(UserError, match=words):
+        strokes(WRIST.model_copy(update=wrist), settings)
+
+
+def test_on_spools_a_wrist_that_would_buckle_on_pulls_goes_on() -> None:
+    own = strokes(WRIST.model_copy(update={"hand_mass": 0.8}), HysteresisSettings(frequencies=(1.0,)))
+    assert all(np.isfinite(each.course.theta).all() for each in loops(own))

@@ -1,0 +1,79 @@
+"""Hysteresis of a wrist on its tendons: the loops that it is driven through, and a measured loop to be fitted."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from wristctl.config.plant import Actuator
+from wristctl.config.section import Section, choice, quantity
+
+Speed = Annotated[float, Field(gt=0, le=20)]
+NotNegative = Annotated[float, Field(ge=0)]
+Path = Annotated[float, Field(gt=0)]
+
+
+class KnownBeforehand(Section):
+    """What a fit takes as known, and how well: standard deviations, of which the relative ones are logarithmic."""
+
+    stiffness_error: float = quantity(0.1, "", "of wrist.stiffness, relative", "assumed", gt=0)
+    damping_error: float = quantity(0.3, "", "of wrist.damping, relative", "assumed", gt=0)
+    tendon_stiffness_error: float = quantity(0.1, "", "of tendon_stiffness, relative", "assumed", gt=0)
+    zero_error_deg: float = quantity(0.1, "deg", "of the angle's zero", "as identify's", gt=0)
+    spool_error: float = quantity(2e-5, "m", "of where each side's tendons are taut", "as identify's", gt=0)
+    run_up: float = quantity(
+        2e-4, "m", "path after which bristles are bent fully; what comes before is not used", "10 presliding", gt=0
+    )
+
+
+class HysteresisSettings(Section):
+    """Loops of every range, speed, friction, sheath and presliding, and the dead band at angles."""
+
+    drive: Literal["spools", "tensions"] = choice(
+        "spools", "what is moved: spools' positions, or pulls at the spools; both as a wrist without friction needs"
+    )
+    shape: Literal["sine", "triangle"] = choice("sine", "course of that wrist's angle, from the range's low end")
+    ranges_deg: tuple[tuple[float, float], ...] = quantity(
+        ((0.0, 30.0), (10.0, 20.0), (14.0, 16.0)), "deg", "angles between which it goes: outer loop, then inner ones",
+        min_length=1,
+    )  # fmt: skip
+    frequencies: tuple[Speed, ...] = quantity((0.002, 0.02, 0.2, 1.0), "1/s", "cycles per second", min_length=1)
+    frictions: tuple[NotNegative, ...] = quantity((0.1,), "", "coefficients of the tendons' friction", min_length=1)
+    sheaths: tuple[NotNegative, ...] = quantity(
+        (0.0, 1.0, 3.0), "rad", "angles by which each tendon is wrapped before it reaches the wrist", min_length=1
+    )
+    preslidings: tuple[Path, ...] = quantity((2e-5,), "m", "paths in which friction turns round", min_length=1)
+    tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed; sweep 2-50 kN/m", gt=0)
+    angles_deg: tuple[float, ...] = quantity(
+        (5.0, 15.0, 25.0),
+        "deg",
+        "where held spools are approached from both ends of the outer range, for the dead band",
+    )
+    ramp: float = quantity(7.0, "s", "how long that takes", "assumed; below 5 s a wrist arrives with a swing", gt=0)
+    segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
+    step: float = quantity(1e-3, "s", "longest integration step", "as simulated", gt=0, le=5e-3)
+    samples: int = choice(200, "samples kept of each cycle, a multiple of 4", ge=40, le=10_000, multiple_of=4)
+    measured: str | None = choice(None, "a measured loop (CSV, see docs/friction.md) to overlay and to fit")
+    known: KnownBeforehand = KnownBeforehand()
+
+    @model_validator(mode="after")
+    def _ranges_go_up(self) -> Self:
+        for low, high in self.ranges_deg:
+            if not high > low:
+                raise ValueError(f"a range goes from a lower to a higher angle, not from {low:g} to {high:g} deg")
+        low, high = self.ranges_deg[0]
+        for angle in self.angles_deg:
+            if not low < angle < high:
+                raise ValueError(f"{angle:g} deg lies outside the outer range, {low:g} to {high:g} deg")
+        return self
+
+    def actuator(self, friction: float, sheath: float, presliding: float) -> Actuator:
+        """Tendons with such friction."""
+        return Actuator(
+            level="tendon",
+            tendon_stiffness=self.tendon_stiffness,
+            friction=friction,
+            sheath=sheath,
+            presliding=presliding,
+        )

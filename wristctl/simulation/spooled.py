@@ -1,0 +1,189 @@
+"""Wrists on spools, or on winches that keep a pull, which move as they are told: no controller, no camera.
+
+A winch that keeps a pull P is a spool behind a tendon so soft that nothing the wrist does in a step changes its pull,
+reeled in anew before each step: the element with its friction is the same for both.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
+from wristctl.lanes.cores import cores
+from wristctl.lanes.lane import where
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
+from wristctl.wrist.elastic import Nonideal, Tendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
+from wristctl.wrist.moving import advance_or_stop
+from wristctl.wrist.pcc import PCC
+from wristctl.wrist.plant import kernel_of, parameters_of, tip_angle
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+_STIFFNESS = len(Nonideal._fields)
+_WINCH = 1.0
+"""Stiffness of a winch's tendons [N/m]: 1 m/s changes its pull by 1 mN in a millisecond."""
+_CHUNK = 20_000
+"""Steps of a block of wrists between two looks at what the spools do next."""
+
+
+class SpooledWrist(NamedTuple):
+    """A wrist and its tendons, driven at its spools by their positions or, with a `winch`, by their pulls."""
+
+    wrist: WristParameters
+    actuator: Actuator
+    begin: Array
+    """Segments' angles (n,) [rad] at first, when it does not move."""
+    winch: bool = False
+    z: tuple[float, float] = (0.0, 0.0)
+    """State of both sides' bristles at first."""
+
+
+class Spooled(NamedTuple):
+    """What wrists did, (count, T) each; of a side both tendons together."""
+
+    theta: Array
+    """Bending angle [rad]."""
+    given_plus: Array
+    """What the + side has reeled in since it was taut and free of tension on the straight wrist [m]."""
+    given_minus: Array
+    spool_plus: Array
+    """Pull at the spool [N]."""
+    spool_minus: Array
+    wrist_plus: Array
+    """Pull at the wrist [N]."""
+    wrist_minus: Array
+    z_plus: Array
+    """State of its bristle."""
+    z_minus: Array
+    friction: Array
+    """What tendons have lost to friction so far [J]: pull at the spool less pull at the wrist, along the path."""
+    raw: Array
+    """What the spools have given so far [J]: pull at the spool along the path."""
+    damped: Array
+    """What the wrist's damping has taken so far [J], by its rates at the ends of steps."""
+
+
+class _Timing(NamedTuple):
+    h: float
+    first: int
+    every: int
+
+
+class _Lanes(NamedTuple):
+    wrist: Any
+    tendons: Any
+    """Nonideal's values, stiffness, and 1 for a winch."""
+    state: Any
+    memory: Any
+    ends: Any
+    """Works so far, and of the last step's end what both sides have reeled in, pull at the spool and at the wrist."""
+
+
+_ENDS = 9
+
+
+def _move(model: Any, lanes: Any, told: Any, timing: Any, out: Any, cut: Any) -> None:
+    segment, own = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
+    zero = 0.0 * own[_STIFFNESS]
+    tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(lanes.memory))
+    winch, memory, ends, n = own[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
+    q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
+    alive = 1.0 + zero
+    for k in range(told.shape[0]):
+        at, now = timing.first + k, rows_of(told[k])
+        path = memory[0], memory[1], memory[2]
+        given = (
+            where(winch > 0.0, now[0] / tendons.stiffness + path[0], now[0]),
+            where(winch > 0.0, now[1] / tendons.stiffness + path[1], now[1]),
+        )
+        spool_plus, spool_minus = spool_pull(tendons, given[0], 0, path[0]), spool_pull(tendons, given[1], 1, path[1])
+        plus, minus = pulls_at_start(tendons, given, path)
+        if at == 0:
+            ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *given, spool_plus, spool_minus, plus, minus
+        if at % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
+            row = rows_of(out[at // timing.every])
+            row[0], _ = tip_angle(segment, q, rate)
+            row[1], row[2] = 0.5 * (given[0] + ends[3]), 0.5 * (given[1] + ends[4])
+            row[3], row[4] = 0.5 * (spool_plus + ends[5]), 0.5 * (spool_minus + ends[6])
+            row[5], row[6] = 0.5 * (plus + ends[7]), 0.5 * (minus + ends[8])
+            row[7], row[8] = memory[row_of(0, Z)], memory[row_of(1, Z)]
+            row[9], row[10], row[11] = ends[0], ends[1], ends[2]
+        rates = zero
+        for i in range(n):
+            rates = rates + rate[i] * rate[i]
+        alive = advance_or_stop(segment, q, rate, given, tendons, timing.h + zero, alive)
+        for i in range(n):
+            rates = rates + rate[i] * rate[i]
+        end = memory[0], memory[1], memory[2]
+        ends[3], ends[4] = given
+        ends[5], ends[6] = spool_pull(tendons, given[0], 0, end[0]), spool_pull(tendons, given[1], 1, end[1])
+        ends[7], ends[8] = pulls_at_start(tendons, given, end)
+        raw = (spool_plus + ends[5]) * (end[0] - path[0]) + (spool_minus + ends[6]) * (end[1] - path[1])
+        left = (plus + ends[7]) * (end[0] - path[0]) + (minus + ends[8]) * (end[1] - path[1])
+        ends[0], ends[1] = ends[0] + 0.5 * (raw - left), ends[1] + 0.5 * raw
+        ends[2] = ends[2] + 0.5 * timing.h * segment.damping * rates
+
+
+Told = Callable[[Array, NDArray[np.int64]], Array]
+"""From times (T,) [s] and which wrists (L,) to what drives both sides of each: spools [m], or pulls [N]; (T, 2, L)."""
+
+
+def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, every: int = 1) -> Spooled:
+    """Move wrists, all of as many segments, in so many steps of h [s]; every so many of them are in the result.
+
+    `told` is asked for what is held over each step, at its middle. A wrist that bends a segment beyond a full turn
+    stays where it was.
+    """
+    count, cut = len(wrists), (0,) * len(wrists[0].begin)
+    blocks, which = _lanes(wrists, h), np.atleast_2d(lanes_of(count))
+    wide, samples = blocks.wrist.shape[2:], -(-steps // every)
+    out, move = np.empty((len(which), samples, len(Spooled._fields), *wide)), kernel_of(_move, PCC)
+    stop = threading.Event()
+
+    def run(block: int) -> None:
+        own = _Lanes(*(each[block] for each in blocks))
+        for first in range(0, steps, _CHUNK):
+            if stop.is_set():
+                return
+            last = min(first + _CHUNK, steps)
+            middle = h * np.arange(first + 0.5, last)
+            driven = told(middle, which[block]).reshape(last - first, 2, *wide)
+            move(PCC, own, np.ascontiguousarray(driven), _Timing(h, first, every), out[block], cut)
+
+    with ThreadPoolExecutor(cores()) as pool:
+        try:
+            list(pool.map(run, range(len(which))))
+        except BaseException:
+            stop.set()
+            raise
+    rows: Array = to_rows(out.reshape(len(out), -1, *wide), count).reshape(count, samples, -1)
+    return Spooled(*np.moveaxis(rows, 2, 0))
+
+
+def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
+    rows = []
+    for each in wrists:
+        own = nonideal_of(TrueWrist(), each.actuator, TendonFacts(), h)
+        stiffness = _WINCH if each.winch else TENDONS_PER_SIDE * each.actuator.tendon_stiffness
+        path = np.array([*(each.wrist.length - PCC.taut(each.wrist, each.begin)), np.abs(each.begin).sum()])
+        memory = unmoved(np.zeros(2), path, np.zeros(2), each.begin)
+        of_tendons(memory, 2)[:, 0] = each.z
+        rows.append(
+            _Lanes(
+                PCC.values(each.wrist, len(each.begin)),
+                np.array([*own, stiffness, float(each.winch)], float),
+                np.concatenate([each.begin, 0.0 * each.begin]),
+                memory,
+                np.zeros(_ENDS),
+            )
+        )
+    return _Lanes(*(to_blocks(np.array(each)) for each in zip(*rows, strict=True)))
