@@ -1,0 +1,127 @@
+"""A measured loop's file: columns in any order and unit that its header names, and what is wrong said with its line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.wrist import WristParameters
+from wristctl.identification.measured_loop import MeasuredLoop, read_loop
+
+WRIST = WristParameters()
+TIME = np.linspace(0.0, 10.0, 201)
+ANGLE = 15.0 - 15.0 * np.cos(0.4 * np.pi * TIME)
+SPOOL = np.radians(ANGLE) * WRIST.tendon_offset * 1e3
+COLUMNS = {
+    "time [s]": TIME, "angle [deg]": ANGLE, "spool_plus [mm]": 0.1 + SPOOL, "spool_minus [mm]": 0.1 - SPOOL,
+    "tension_plus [N]": 2.0 + 0.2 * ANGLE, "tension_minus [N]": 2.0 + 0.0 * ANGLE,
+}  # fmt: skip
+
+
+def text_of(columns: dict[str, np.ndarray]) -> str:
+    rows = zip(*columns.values(), strict=True)
+    return "\n".join([",".join(columns), *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n"
+
+
+def without(*names: str) -> dict[str, np.ndarray]:
+    return {name: each for name, each in COLUMNS.items() if not name.startswith(names)}
+
+
+def put(before: str, after: str, line: int, text: str = "") -> str:
+    """The file with a cell of one line changed."""
+    lines = (text or text_of(COLUMNS)).splitlines()
+    assert before in lines[line - 1]
+    lines[line - 1] = lines[line - 1].replace(before, after, 1)
+    return "\n".join(lines)
+
+
+def read(text: str, folder: Path) -> MeasuredLoop:
+    file = folder / "loop.csv"
+    file.write_text(text, encoding="utf-8")
+    return read_loop(file, WRIST)
+
+
+def test_columns_may_stand_in_any_order_and_unit(tmp_path: Path) -> None:
+    first = read(text_of(COLUMNS), tmp_path)
+    other = {
+        "tension_minus [N]": COLUMNS["tension_minus [N]"], "spool_minus [m]": 1e-3 * COLUMNS["spool_minus [mm]"],
+        "angle [rad]": np.radians(ANGLE), " tension_plus[N] ": COLUMNS["tension_plus [N]"], "time [ms]": 1e3 * TIME,
+        "spool_plus [um]": 1e3 * COLUMNS["spool_plus [mm]"],
+    }  # fmt: skip
+    again = read(f"\ufeff# by hand\n\n{text_of(other)}# end\n", tmp_path)
+    for name in ("time", "angle", "spools", "tensions"):
+        np.testing.assert_allclose(getattr(again, name), getattr(first, name), rtol=1e-12)
+    assert first.spools is not None and first.tensions is not None and not first.winch
+    np.testing.assert_allclose(first.spools[:, 0] * 1e3, COLUMNS["spool_plus [mm]"])
+    np.testing.assert_allclose(first.angle, np.radians(ANGLE))
+    assert first.drive is first.spools and first.name == "loop.csv"
+
+
+def test_either_spools_or_tensions_will_do(tmp_path: Path) -> None:
+    pulled, moved = read(text_of(without("spool")), tmp_path), read(text_of(without("tension")), tmp_path)
+    assert pulled.winch and pulled.drive is pulled.tensions and moved.tensions is None and not moved.winch
+
+
+def test_it_turns_where_what_drives_it_turns_whatever_trembles(tmp_path: Path) -> None:
+    loop = read(text_of(COLUMNS), tmp_path)
+    np.testing.assert_allclose(loop.time[loop.turns], [2.5, 5.0, 7.5], atol=1e-9)
+    assert loop.rises
+    trembling = COLUMNS | {"tension_plus [N]": 2.0 + 0.2 * ANGLE + 0.1 * (-1.0) ** np.arange(len(TIME))}
+    late = {name: each[60:] for name, each in trembling.items() if "spool" not in name}
+    other = read(text_of(late), tmp_path)
+    assert not other.rises
+    np.testing.assert_allclose(other.time[other.turns], [5.0, 7.5], atol=0.15)
+
+
+IN_UM = {name.replace("[mm]", "[um]"): each for name, each in COLUMNS.items()}
+STILL = {name: each if name == "time [s]" else 0.0 * each for name, each in COLUMNS.items()}
+ONE_WAY = {name: each if name == "time [s]" else each[:51].repeat(4)[:201] for name, each in COLUMNS.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "where", "fix"),
+    [
+        ("", "empty", "", "a header such as time [s],angle [deg]"),
+        ("# nothing\n", "empty", "", "a header"),
+        (put("angle [deg]", "angle", 1), "column 'angle' is no name with a unit", ":1", "name [unit]"),
+        (put("angle [deg]", "angle [grad]", 1), "angle is in 'grad'", ":1", "angle [deg] or [rad]"),
+        (put("[mm]", "[N]", 1), "spool_plus is in 'N'", ":1", "spool_plus [m] or [mm] or [um]"),
+        (put("[deg]", "[DEG]", 1), "angle is in 'DEG'", ":1", "[deg] or [rad]"),
+        (put("angle", "angel", 1), "unknown column 'angel'", ":1", "did you mean 'angle'?"),
+        (put("angle [deg]", "time [ms]", 1), "column time stands there twice", ":1", "leave one out"),
+        (text_of(without("time")), "no column time", ":1", "a header such as"),
+        (text_of(without("angle")), "no column angle", ":1", "a header such as"),
+        (text_of(without("spool_minus")), "spool_plus without spool_minus", "", "both sides, or none"),
+        (text_of(without("spool", "tension")), "neither spools nor tensions", "", "columns of both sides"),
+        (put(",2.0", ",two", 2), "tension_plus is 'two'", ":2", "a number with a decimal point"),
+        (put("0.0,", "nan,", 2), "time is 'nan'", ":2", "a number"),
+        (put(",2.0", "", 5), "5 cells under 6 columns", ":5", "one number for each column"),
+        (text_of({name: each[:60] for name, each in COLUMNS.items()}), "60 samples, too few", "", "at least 100"),
+        (put(str(TIME[7]), str(TIME[6]), 9), "time does not go on", ":9", "in the order of their times"),
+        (text_of(COLUMNS | {"angle [deg]": 57.3 * ANGLE}), "it bends by 1.72e+03 deg", "", "the angle's unit"),
+        (text_of(COLUMNS | {"tension_minus [N]": 0.1 * TIME - 0.9}), "a tendon pushes", ":2", "the load cell's zero"),
+        (text_of(COLUMNS | {"angle [deg]": -ANGLE}), "the angle falls", "", "the sign of the angle, or plus and minus"),
+        (text_of(IN_UM), "0.001 times as far", "", "units"),
+        (text_of(STILL), "nothing moves", "", "sign"),
+        (text_of(ONE_WAY), "never turns", "", "there and back"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_place_and_remedy(
+    text: str, what: str, where: str, fix: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UserError) as caught:
+        read(text, tmp_path)
+    assert what in caught.value.what and fix in caught.value.fix and caught.value.exit_code == 2
+    assert re.fullmatch(rf".*loop\.csv{where}", caught.value.where), caught.value.where
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"cannot read the measured loop: No such file.*gone\.csv"):
+        read_loop(tmp_path / "gone.csv", WRIST)
+    (tmp_path / "picture.png").write_bytes(bytes(range(256)))
+    with pytest.raises(UserError, match=r"no text in UTF-8.*picture\.png"):
+        read_loop(tmp_path / "picture.png", WRIST)

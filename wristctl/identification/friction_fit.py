@@ -1,0 +1,233 @@
+"""Friction of a wrist's tendons from a measured loop: coefficient, sheath and presliding, with 95 % intervals.
+
+Intervals come from the sandwich covariance of `wristctl.identification.intervals`, in the coordinates of
+`wristctl.identification.loop_problem`, in which the model is nearly linear; ends that pass what can be are cut off. One
+of the sheath's may be infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import norm, qmc
+
+from wristctl.arrays import Array
+from wristctl.identification.intervals import NORMAL_95, autocorrelation, bandwidth, inflation, inverse, long_run
+from wristctl.identification.loop_problem import (
+    BEGIN_PRESLIDING,
+    EXPONENT,
+    LEAST_SHARE,
+    NUDGES,
+    PRESLIDING,
+    SHARE,
+    WIDEST,
+    LoopProblem,
+)
+
+_MOST = 200
+"""Evaluations of one search; 10 are usual."""
+_STARTS, _EXPONENTS, _PRESLIDINGS = 32, (0.02, 1.0), (3e-6, 2e-4)
+"""Places that are tried first: how many, and between which exponents and preslidings [m]."""
+_LASTING = 30
+"""Samples over which small errors are alike."""
+
+
+class FrictionEstimate(NamedTuple):
+    """A value with the ends of its 95 % interval; `high` may be infinite."""
+
+    value: float
+    low: float
+    high: float
+
+    def holds(self, truth: float) -> bool:
+        """Whether a value lies in the interval."""
+        return self.low <= truth <= self.high
+
+
+@dataclass(frozen=True)
+class FrictionFit:
+    """Where the search ended."""
+
+    problem: LoopProblem
+    x: Array
+    residuals: list[Array]
+    """Measured less expected, of the angle [rad] and of both tensions [N] where they were measured."""
+    noise: Array
+    """Standard deviation of each of them."""
+    covariance: Array
+    autocorrelation: float
+    """Of neighbouring residuals over their noise."""
+
+    @property
+    def count(self) -> int:
+        """Samples that were used."""
+        return len(self.residuals[0])
+
+    @property
+    def without_friction(self) -> Array:
+        """The angle (T,) that the same wrist would take without friction [rad]."""
+        x = self.x.copy()
+        x[EXPONENT] = 0.0
+        return self.problem.expected([x])[0][0]
+
+    @property
+    def leap(self) -> float:
+        """How far tendons move between two samples at a turn [m]: where it is about as much as presliding, nobody
+        knows where the turn was."""
+        loop = self.problem.loop
+        if loop.spools is None:
+            return 0.0
+        steps = np.abs(np.diff(loop.spools[:, 0]))
+        turns = loop.turns[(loop.turns > 0) & (loop.turns < len(steps))]
+        return float((0.5 * (steps[turns - 1] + steps[turns])).max())
+
+    @property
+    def exponent(self) -> FrictionEstimate:
+        """The capstan's exponent at the mean bend."""
+        return self._straight(EXPONENT, 0.0, math.inf)
+
+    @property
+    def friction(self) -> FrictionEstimate:
+        """mu"""
+        value = float(self.x[EXPONENT] * self.x[SHARE] / self.problem.bend)
+        half = NORMAL_95 * math.sqrt(self._friction_by @ self.covariance[:2, :2] @ self._friction_by)
+        most = self.exponent.high / self.problem.bend
+        return FrictionEstimate(value, max(0.0, value - half), max(value, min(value + half, most)))
+
+    @property
+    def _friction_by(self) -> Array:
+        """Derivatives of mu by the exponent and by the share."""
+        return self.x[[SHARE, EXPONENT]] / self.problem.bend
+
+    @property
+    def told_best(self) -> tuple[float, FrictionEstimate]:
+        """The bend [rad] at which the capstan's exponent is told best, and the exponent there."""
+        own, by = self.covariance[:2, :2], self._friction_by
+        both, spread = float((own @ by)[EXPONENT]), float(by @ own @ by)
+        further = max(-both / spread, -self.problem.bend)
+        value = float(self.x[EXPONENT]) + self.friction.value * further
+        half = NORMAL_95 * math.sqrt(max(0.0, own[EXPONENT, EXPONENT] + further * (2.0 * both + further * spread)))
+        return self.problem.bend + further, FrictionEstimate(value, max(0.0, value - half), value + half)
+
+    @property
+    def sheath(self) -> FrictionEstimate:
+        """Its angle [rad]; endless where the bend's share of the exponent may be none."""
+        bend, share = self.problem.bend, self._straight(SHARE, 0.0, 1.0)
+        high = math.inf if share.low <= LEAST_SHARE else bend * (1.0 / share.low - 1.0)
+        return FrictionEstimate(bend * (1.0 / share.value - 1.0), bend * (1.0 / share.high - 1.0), high)
+
+    @property
+    def presliding(self) -> FrictionEstimate:
+        """[m]; between nothing and no end where the loop does not tell it."""
+        at = self._straight(PRESLIDING, -math.inf, math.inf)
+        if at.high - at.value > WIDEST:
+            return FrictionEstimate(BEGIN_PRESLIDING * math.exp(at.value), 0.0, math.inf)
+        return FrictionEstimate(*(BEGIN_PRESLIDING * math.exp(each) for each in at))
+
+    @property
+    def correlation(self) -> float:
+        """Of mu with the whole angle that a tendon is wrapped by at the mean bend, both as logarithms."""
+        friction, wrapped = np.array([1.0 / max(self.x[EXPONENT], 1e-12), 1.0 / self.x[SHARE]]), np.array([0.0, -1.0])
+        own = self.covariance[:2, :2]
+        both = friction @ own @ wrapped
+        return float(both / math.sqrt((friction @ own @ friction) * (wrapped @ own @ wrapped)))
+
+    def _straight(self, at: int, least: float, most: float) -> FrictionEstimate:
+        half, value = NORMAL_95 * math.sqrt(self.covariance[at, at]), float(self.x[at])
+        return FrictionEstimate(value, max(least, value - half), min(most, value + half))
+
+
+def fit_friction(problem: LoopProblem) -> FrictionFit:
+    """Least squares of the model against a measured loop; what is known beforehand counts by its own deviation.
+
+    A search starts from the two best of some places spread over all that may be. Each measured quantity is weighed by
+    the size of its own residuals: the search goes on until these stay.
+    """
+    noise, searches = np.array([math.radians(0.1), 0.1, 0.1][: len(problem.measured)]), 0
+    found = min((_search(problem, each, noise) for each in _starts(problem, noise)), key=lambda each: each.cost)
+    weighed = np.full(len(noise), np.inf)
+    while np.abs(np.log(weighed / noise)).max() > 0.05 and searches < 10:
+        found, searches = _search(problem, found.x, noise), searches + 1
+        weighed, noise = noise, np.array([max(float(np.sqrt(np.mean(each**2))), 1e-9) for each in found.residuals])
+    parts = [each / sd for each, sd in zip(found.residuals, noise, strict=True)]
+    slopes = [each / sd for each, sd in zip(found.slopes, noise, strict=True)]
+    covariance = _covariance(parts, slopes, problem.prior)
+    return FrictionFit(problem, found.x, found.residuals, noise, covariance, autocorrelation(parts))
+
+
+class _Found(NamedTuple):
+    x: Array
+    cost: float
+    residuals: list[Array]
+    slopes: list[Array]
+
+
+def _starts(problem: LoopProblem, noise: Array) -> Array:
+    """Where to start: the two that fit best of the usual place and of others, spread as evenly as Sobol's."""
+    usual, known = problem.begin(), problem.prior > 0.0
+    spread = qmc.Sobol(len(usual), scramble=False).random(_STARTS)[1:]  # the first is a corner
+    x = np.zeros_like(spread)
+    x[:, EXPONENT] = np.exp(np.interp(spread[:, EXPONENT], (0.0, 1.0), np.log(_EXPONENTS)))
+    x[:, SHARE] = spread[:, SHARE]
+    x[:, PRESLIDING] = np.interp(spread[:, PRESLIDING], (0.0, 1.0), np.log(_PRESLIDINGS)) - math.log(BEGIN_PRESLIDING)
+    x[:, known] = norm.ppf(spread[:, known]) / problem.prior[known]
+    x = np.concatenate([usual[None], x])
+    costs = [
+        sum(float(np.sum(((e - m) / sd) ** 2)) for e, m, sd in zip(each, problem.measured, noise, strict=True))
+        for each in problem.expected(list(x))
+    ]
+    best: Array = x[np.argsort(np.nan_to_num(costs, nan=np.inf), kind="stable")[:2]]
+    return best
+
+
+def _search(problem: LoopProblem, x: Array, noise: Array) -> _Found:
+    """The least squares that a search from x finds, measured quantities weighed by their noise."""
+    known, weights = problem.prior > 0.0, problem.prior
+    last: tuple[Array, list[Array], list[Array]] | None = None
+
+    def at(x: Array) -> tuple[Array, list[Array], list[Array]]:
+        nonlocal last
+        if last is None or not np.array_equal(last[0], x):
+            last = (x.copy(), *_linearised(problem, x))
+        return last
+
+    def rows(x: Array) -> Array:
+        parts = [(e - m) / sd for e, m, sd in zip(at(x)[1], problem.measured, noise, strict=True)]
+        return np.concatenate([*parts, (weights * x)[known]])
+
+    def slopes(x: Array) -> Array:
+        return np.concatenate([*(s / sd for s, sd in zip(at(x)[2], noise, strict=True)), np.diag(weights)[known]])
+
+    bounds = problem.bounds()
+    found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=_MOST)
+    residuals = [m - e for m, e in zip(problem.measured, at(found.x)[1], strict=True)]
+    return _Found(found.x, float(found.cost), residuals, at(found.x)[2])
+
+
+def _linearised(problem: LoopProblem, x: Array) -> tuple[list[Array], list[Array]]:
+    """What is expected (T,) of each quantity, and its derivatives (T, coordinates); nudges point inward."""
+    inward = np.where(x > problem.bounds()[1] - 0.1, -1.0, 1.0)
+    nudges = inward * np.array(NUDGES[: len(x)])
+    expected, *others = problem.expected([x, *(x + np.diag(nudges))])
+    slopes = [
+        np.stack([(other[k] - own) / nudge for other, nudge in zip(others, nudges, strict=True)], axis=1)
+        for k, own in enumerate(expected)
+    ]
+    return expected, slopes
+
+
+def _covariance(residuals: Sequence[Array], slopes: Sequence[Array], weights: Array) -> Array:
+    """The sandwich of `wristctl.identification.intervals`: residuals that are alike widen it."""
+    count = sum(map(len, residuals))
+    lags = bandwidth(autocorrelation(residuals), count / len(residuals))
+    bread = inverse(np.diag(weights**2) + sum(each.T @ each for each in slopes))
+    meat = np.diag(weights**2) + sum(long_run(s * r[:, None], lags) for s, r in zip(slopes, residuals, strict=True))
+    alike, robust = max(1.0, inflation(residuals, _LASTING)) * bread, bread @ meat @ bread
+    widen = np.sqrt(np.maximum(1.0, np.diag(robust) / np.diag(alike)))
+    found: Array = alike * np.outer(widen, widen)
+    return found
