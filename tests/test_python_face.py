@@ -24,7 +24,8 @@ LAYERS = (
 
 
 FACE = {
-    "audit", "compare", "gen_data", "identify", "load_study", "open_run", "runs", "simulate", "train", "tune",
+    "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "runs", "simulate", "train",
+    "tune",
 }  # fmt: skip
 
 SMALL = """

@@ -12,7 +12,7 @@ In a notebook:
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `compare`, `identify` and `audit` go the same way; see wristctl.api.
+`gen_data`, `train`, `tune`, `compare`, `hysteresis`, `identify` and `audit` go the same way; see wristctl.api.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         audit,
         compare,
         gen_data,
+        hysteresis,
         identify,
         load_study,
         open_run,
@@ -41,6 +42,7 @@ __all__ = [
     "audit",
     "compare",
     "gen_data",
+    "hysteresis",
     "identify",
     "load_study",
     "open_run",

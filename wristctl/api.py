@@ -23,6 +23,7 @@ from wristctl.studies.audit import AUDIT, Audited
 from wristctl.studies.compare import COMPARE, Compared
 from wristctl.studies.counting import Watch, watched
 from wristctl.studies.gen_data import GEN_DATA, Generated
+from wristctl.studies.hysteresis import HYSTERESIS, Hysteresis
 from wristctl.studies.identify import IDENTIFY, Identified
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Found, Procedure
@@ -150,6 +151,22 @@ def simulate(
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return _carry_out(SIMULATE, study, given, out, label, progress)
+
+
+@_in_python()
+def hysteresis(
+    study: Study, *, out: Folder | None = None, label: str = "", progress: Watch | None = None
+) -> Hysteresis:
+    """Loops of a wrist whose tendons have friction, by the study's `hysteresis` section, which may name a measured one.
+
+    The result has `.loops`, `.dead_bands` and, of a measured loop, `.fit` (coefficient, sheath and presliding with 95 %
+    intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
+    and for a measured file that is none, with its line.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return _carry_out(HYSTERESIS, study, {}, out, label, progress)
 
 
 @_in_python()

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 FAST = ("--set", "loops={fast: {plant_segments: 1}}")
 MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
+LOOPS = ("--set", "ranges_deg=[[0, 5]]", "--set", "frequencies=[5]", "--set", "angles_deg=[]", "--set", "sheaths=[1]")
 QUICK = ("--epochs", "5", "--set", "hidden=[8]", "--set", "gen-data.samples=100")
 GRID = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
 CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
@@ -30,6 +31,7 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     ),),
     "simulate": (("--set", "horizon=0.5"),),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
+    "hysteresis": (LOOPS,),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip
 """The commands that need nothing but a study, or the run of one before them, and what makes them quick."""

@@ -30,6 +30,11 @@ COMMANDS = {
     "tune": ("wristctl.cli.tune", _REPRODUCE, "Search the gains of controllers."),
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
+    "hysteresis": (
+        "wristctl.cli.hysteresis",
+        _REPRODUCE,
+        "Drive the wrist through hysteresis loops; fit a measured one.",
+    ),
     "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
     "hw-run": ("wristctl.cli.hw_run", _HARDWARE, "Perform the paper's experiment, on hardware or all emulated."),
     "identify": ("wristctl.cli.identify", _HARDWARE, "Find a real wrist's parameters from logged trials."),

@@ -1,0 +1,206 @@
+"""Hysteresis of the wrist: loops of tension and angle, the dead band, and friction fitted to a measured loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from wristctl.config.study import Study
+from wristctl.report.printed_table import Table
+from wristctl.studies.findings import Findings
+from wristctl.studies.friction_of_loop import FITTED, fit_measured, problem_of
+from wristctl.studies.inputs import Inputs
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.session import Session
+from wristctl.studies.study_result import StudyResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.identification.friction_fit import FrictionFit
+    from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
+    from wristctl.simulation.strokes import FrictionCase
+
+_LOOPS = {
+    "friction": ("", "coefficient of the tendons' friction"),
+    "sheath": ("rad", "angle by which a tendon is wrapped before it reaches the wrist"),
+    "presliding": ("m", "path in which friction turns round"),
+    "frequency": ("1/s", "cycles per second"),
+    "low": ("rad", "angle without friction at one end"),
+    "high": ("rad", "and at the other"),
+    "width": ("rad", "by how much more it is bent on its way back, in the middle of the range"),
+    "exact_width": ("rad", "dead band there, by the roots of the statics"),
+    "friction_work": ("J", "what friction took in a cycle: pull at the spool less pull at the wrist, along the path"),
+    "raw_work": ("J", "area of the loop of pulls at the spools along the path"),
+    "damped_work": ("J", "what the wrist's damping took in a cycle"),
+}
+_COURSES = {
+    "loop": ("", "row of loops.csv, from 0"),
+    "time": ("s", "since the range's high end"),
+    "unhindered": ("rad", "angle without friction on these spools"),
+    "theta": ("rad", "angle"),
+    "given_plus": ("m", "what the + side has reeled in"),
+    "given_minus": ("m", "what the - side has"),
+    "spool_plus": ("N", "pull of both tendons of the + side at the spool"),
+    "spool_minus": ("N", "of the - side"),
+    "wrist_plus": ("N", "pull of the + side at the wrist"),
+    "wrist_minus": ("N", "of the - side"),
+    "z_plus": ("", "state of the + side's bristle"),
+    "z_minus": ("", "of the - side's"),
+}
+_BANDS = {
+    "friction": _LOOPS["friction"],
+    "sheath": _LOOPS["sheath"],
+    "presliding": _LOOPS["presliding"],
+    "unhindered": ("rad", "angle without friction"),
+    "exact_below": ("rad", "rest from below by the statics"),
+    "exact_above": ("rad", "rest from above by the statics"),
+    "below": ("rad", "rest after a ramp from below"),
+    "above": ("rad", "rest after a ramp from above"),
+    "slid": ("", "whether tendons slid far enough on both ramps to bend their bristles fully"),
+}
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Hysteresis(StudyResult):
+    """Loops of a wrist on its tendons, the dead band, and the fit of a measured loop where there was one."""
+
+    kind = "hysteresis"
+
+    loops: list[HysteresisLoop]
+    dead_bands: list[DeadBand]
+    fit: FrictionFit | None
+
+    def frame(self) -> pd.DataFrame:
+        """One row per loop: friction, speed, range, the dead band in its middle, and works; SI units."""
+        import pandas as pd
+
+        cases = [each.case.tendons._asdict() | each.case._asdict() for each in self.loops]
+        own = [name for name in _LOOPS if name not in (cases[0] if cases else ())]
+        found = [{name: getattr(each, name) for name in own} for each in self.loops]
+        rows = [case | values for case, values in zip(cases, found, strict=True)]
+        return pd.DataFrame(rows, columns=list(_LOOPS))
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """See that the wrist can be driven so, and that a measured loop can be read."""
+    from wristctl.simulation.hysteresis import loop_cases
+    from wristctl.simulation.strokes import strokes
+
+    settings = study.hysteresis
+    strokes(study.wrist, settings)
+    count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / each for each in settings.frequencies)
+    told = f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
+    if settings.measured is None:
+        return told
+    problem = problem_of(study)
+    return f"{told}; {', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
+
+
+def hysteresis(session: Session) -> Hysteresis:
+    """Drive the wrist through hysteresis loops, and fit tendon friction to a measured one.
+
+    Its spools go to and fro at several speeds, over several ranges, for several frictions. Of a measured loop (a CSV
+    file) coefficient, sheath and presliding are found, with 95 % intervals.
+    """
+    from wristctl.report import hysteresis_figures as figures
+    from wristctl.simulation.hysteresis import dead_bands, loops, main_case
+    from wristctl.simulation.strokes import strokes
+
+    findings, settings = session.findings, session.study.hysteresis
+    own = strokes(session.study.wrist, settings)
+    with session.progress("compiling and driving loops", 100, "%") as done:
+        driven = loops(own, lambda share: done(round(100.0 * share)))
+        bands = dead_bands(own)
+    fit, answer = fit_measured(session) if settings.measured is not None else (None, None)
+    findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments)
+    tables = [*([answer] if answer else []), *_tables(findings, driven, bands, main_case(settings))]
+    result = Hysteresis(session.study, findings, tables, driven, bands, fit)
+    _write(findings, result)
+    with session.progress("drawing"):
+        if bands:
+            findings.figure("dead-band", figures.dead_band, own, bands)
+        findings.figure("loops", figures.loops, own, driven)
+        if len(settings.ranges_deg) > 1:
+            findings.figure("minor-loops", figures.minor_loops, own, driven)
+        findings.figure("work", figures.work, own, driven)
+    return result
+
+
+def _write(findings: Findings, found: Hysteresis) -> None:
+    import numpy as np
+    import pandas as pd
+
+    def units(columns: dict[str, tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
+        return {name: each[0] for name, each in columns.items()}, {name: each[1] for name, each in columns.items()}
+
+    findings.table("data/loops.csv", found.frame(), *units(_LOOPS))
+    courses = [
+        {"loop": np.full(len(each.time), at), "time": each.time, "unhindered": each.unhindered} | each.course._asdict()
+        for at, each in enumerate(found.loops)
+    ]
+    columns = {name: np.concatenate([each[name] for each in courses]) for name in _COURSES}
+    findings.table("data/courses.csv", columns, *units(_COURSES))
+    if found.dead_bands:
+        rows = [each.tendons._asdict() | each._asdict() for each in found.dead_bands]
+        findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
+
+
+def _tables(
+    findings: Findings, driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase
+) -> list[Table]:
+    """The outer loops, under what they say in words, and the dead bands."""
+    first = driven[0].case
+    outer = [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
+    heads = ("friction", "sheath [rad]", "presliding [um]")
+    loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]")
+    rows = [
+        (*_in_um(each.case.tendons), each.case.frequency, math.degrees(each.width), math.degrees(each.exact_width),
+         *(1e3 * work for work in (each.friction_work, each.damped_work, each.raw_work)))
+        for each in outer
+    ]  # fmt: skip
+    tables = [Table(_told(findings, outer, bands, main), (*heads, *loop_heads), rows)]
+    if bands:
+        held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully")
+        rests = [
+            (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid)
+            for each in bands
+        ]
+        tables.append(Table("Where ramps leave the wrist", (*heads, *held), rests))
+    return tables
+
+
+def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[DeadBand], chosen: FrictionCase) -> str:
+    """What was found, in words, of the main one of the frictions; its numbers are the run's metrics."""
+    slow, *faster = sorted((e for e in outer if e.case.tendons == chosen), key=lambda e: e.case.frequency)
+    case = f"mu {chosen.friction:g}, sheath {chosen.sheath:g} rad"
+    swing = f"{math.degrees(slow.case.low):g} to {math.degrees(slow.case.high):g} deg"
+    lines = []
+    if mine := [each for each in bands if each.tendons == chosen]:
+        band = mine[len(mine) // 2]
+        width, exact, at = (math.degrees(each) for each in (band.width, band.exact_width, band.unhindered))
+        lines.append(f"dead band {width:.3g} deg at {at:g} deg (roots of the statics: {exact:.3g} deg)")
+        findings.metric("dead_band", width, "deg", "lower", meaning=f"at {at:g} deg, {case}")
+    lines.append(f"friction takes {1e3 * slow.friction_work:.3g} mJ a cycle of {swing}")
+    findings.metric("friction_work", slow.friction_work, "J", "lower", meaning=f"a cycle of {swing}, {case}")
+    if faster and slow.friction_work > 0.0:
+        change = abs(faster[0].friction_work / slow.friction_work - 1.0)
+        speeds = f"{slow.case.frequency:g} and {faster[0].case.frequency:g} Hz"
+        lines[-1] += f", the same within {100.0 * change:.2g} % at {speeds}"
+        findings.metric("friction_work_change", change, "", "lower", meaning=f"between {speeds}, {case}")
+    damped = ", ".join(f"{1e3 * e.damped_work:.3g} mJ at {e.case.frequency:g} Hz" for e in (slow, *faster))
+    lines.append(f"the wrist's damping makes up the rest of the raw loop: {damped}")
+    if slid := [each for each in bands if each.slid and each.exact_width > 1e-9]:
+        worst = max(abs(each.width / each.exact_width - 1.0) for each in slid)
+        meaning = "largest relative error of a simulated dead band against the roots of the statics"
+        findings.metric("root_error", worst, "", "lower", len(slid), meaning=meaning)
+    return f"{case}: " + ";\n".join(lines)
+
+
+def _in_um(case: FrictionCase) -> tuple[float, float, float]:
+    return case.friction, case.sheath, 1e6 * case.presliding
+
+
+HYSTERESIS = Procedure("hysteresis", plan, hysteresis)
