@@ -12,7 +12,7 @@ In a notebook:
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `compare`, `hysteresis`, `identify` and `audit` go the same way; see wristctl.api.
+`gen_data`, `train`, `tune`, `compare`, `analyse`, `hysteresis`, `identify` and `audit` go the same way: wristctl.api.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from wristctl.version import __version__
 
 if TYPE_CHECKING:
     from wristctl.api import (
+        analyse,
         audit,
         compare,
         gen_data,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "__version__",
+    "analyse",
     "audit",
     "compare",
     "gen_data",

@@ -19,6 +19,7 @@ from wristctl.config.load import load_study as _load_study
 from wristctl.config.study import Study
 from wristctl.records import Run
 from wristctl.records import open_run as _open_run
+from wristctl.studies.analyse import ANALYSE, Analysed
 from wristctl.studies.audit import AUDIT, Audited
 from wristctl.studies.compare import COMPARE, Compared
 from wristctl.studies.counting import Watch, watched
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
 
 Ref = str | Path | Run
 Folder = str | Path
-
 RESULTS = "results"
 """Where runs are looked for when no folder is given."""
 
@@ -151,6 +151,23 @@ def simulate(
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return _carry_out(SIMULATE, study, given, out, label, progress)
+
+
+@_in_python()
+def analyse(
+    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Analysed:  # fmt: skip
+    """The loop of the study's `simulate` section, linearised about where it rests, by its `analyse` section.
+
+    `network`, `tuned` and `from_identified` are as in `simulate`. The result has `.answer`, `.found` about each of
+    `.angles`, `.locus`, `.portrait`; `.frame()` is a row per angle. Raises UserError as `simulate` does, and where the
+    loop cannot rest. With a folder `out` it is a sealed run directory there too, `label` part of its name;
+    `progress(what, count, total, figures)` is called as it goes on.
+    """
+    inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
+    return _carry_out(ANALYSE, study, inputs, out, label, progress)
 
 
 @_in_python()

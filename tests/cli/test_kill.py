@@ -30,6 +30,7 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
         "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]",
     ),),
     "simulate": (("--set", "horizon=0.5"),),
+    "analyse": (("--controller", "gvsc", "--gains", "default"),),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
     "hysteresis": (LOOPS,),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),

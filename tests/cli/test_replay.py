@@ -74,6 +74,7 @@ CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchange
 CHAIN = (
     ("gen-data", "--source", "plant", "--samples", "60"),
     ("simulate", "--set", "horizon=0.3"),
+    ("analyse", "--controller", "smc-tracking", "--gains", "default", "--set", "horizon=0.3", "--over", "k"),
     ("gen-data", "--source", "run", "--run", "latest:simulate", "--samples", "50"),
     ("train", "--search", "--epochs", "3", "--set", SEARCH, "--set", "gen-data.samples=80"),
     ("train", "--epochs", "3", "--set", "hidden=[8]", "--set", "gen-data.samples=80"),

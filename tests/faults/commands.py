@@ -34,6 +34,7 @@ KINDS: dict[str, tuple[str, ...]] = {
         "--set", "rows=[{controller: smc, gains: initial}]",
     ),
     "simulate": ("simulate", "--set", "horizon=0.1"),
+    "analyse": ("analyse", "--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}"),
     "hysteresis": ("hysteresis", *LOOPS),
     "audit": ("audit", "--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),
     "identify": ("identify", "UPRIGHT", "LEVEL", "--set", "fix.friction=0.1"),

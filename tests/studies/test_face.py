@@ -22,20 +22,21 @@ from wristctl.records import Run
 from wristctl.studies.study_result import StudyResult
 from wristctl.tuning import gains_file
 
-CHAIN = ("gen_data", "train", "tune", "compare", "simulate", "hysteresis", "audit")
+CHAIN = ("gen_data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "audit")
 INPUTS: dict[str, dict[str, str]] = {
     "gen_data": {},
     "train": {"data": "gen_data"},
     "tune": {"network": "train"},
     "compare": {"network": "train", "tuned": "tune"},
     "simulate": {"network": "train", "tuned": "tune"},
+    "analyse": {"network": "train", "tuned": "tune"},
     "hysteresis": {},
     "audit": {"table1": "train"},
 }
 """What each function is given of those before it."""
 MAIN_TABLE = {
-    "gen_data": "samples", "train": "trials", "compare": "comparison", "simulate": "trajectory", "hysteresis": "loops",
-    "audit": "claims", "identify": "parameters",
+    "gen_data": "samples", "train": "trials", "compare": "comparison", "simulate": "trajectory", "analyse": "margins",
+    "hysteresis": "loops", "audit": "claims", "identify": "parameters",
 }  # fmt: skip
 """The table of the run that `frame` is, where it is one."""
 
@@ -224,7 +225,7 @@ def test_runs_are_a_table_with_the_filters_of_the_command(
     recorded: Results, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     table = wristctl.runs(out=folder)
-    assert list(table["kind"]) == ["gen-data", "train", "tune", "compare", "simulate", "hysteresis", "audit"]
+    assert list(table["kind"]) == ["gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "audit"]
     assert set(table["label"]) == {"small"} and (table["state"] == "ok").all()
     assert table.set_index("kind")["rmse"]["simulate"] == recorded["simulate"].metrics["rmse"]
     low = wristctl.runs("rmse<1e9", kind="simulate", newer="1d", out=folder)

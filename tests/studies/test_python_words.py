@@ -69,7 +69,18 @@ def test_what_is_wrong_is_said_in_pythons_words(
 
 
 def test_what_an_error_calls_is_there_to_be_called() -> None:
-    commands = ("gen-data", "train", "tune", "compare", "simulate", "hysteresis", "identify", "audit", "runs ls")
+    commands = (
+        "gen-data",
+        "train",
+        "tune",
+        "compare",
+        "simulate",
+        "analyse",
+        "hysteresis",
+        "identify",
+        "audit",
+        "runs ls",
+    )
     for call in (Call(command).in_python for command in commands):
         found = re.fullmatch(r"wristctl\.(\w+)\((study)?\)", call)
         assert found is not None and found[1] in dir(wristctl) and callable(getattr(wristctl, found[1]))

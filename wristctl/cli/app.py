@@ -30,6 +30,7 @@ COMMANDS = {
     "tune": ("wristctl.cli.tune", _REPRODUCE, "Search the gains of controllers."),
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
+    "analyse": ("wristctl.cli.analyse", _REPRODUCE, "Find the margins of one loop, with pictures."),
     "hysteresis": (
         "wristctl.cli.hysteresis",
         _REPRODUCE,

@@ -40,9 +40,19 @@ def _given(annotation: Any) -> Any:
     return others[0] if isinstance(annotation, UnionType) and len(others) == 1 else annotation
 
 
+SUBJECTS = {"analyse": "simulate"}
+"""Commands that work on what another command's section describes: its keys are theirs too."""
+
+
 def section_keys(command: str | None) -> dict[str, FieldInfo]:
-    """The keys of a command's own section; empty where it has none."""
-    return keys_of(field_at((command,))[0]) if command else {}
+    """The keys of a command's own section and of the one that it works on; empty where it has none."""
+    sections = [SUBJECTS[command], command] if command in SUBJECTS else [command] if command else []
+    return {key: field for section in sections for key, field in keys_of(field_at((section,))[0]).items()}
+
+
+def home_of(command: str, key: str) -> str:
+    """The section in which a command finds one of its keys."""
+    return command if key in keys_of(field_at((command,))[0]) else SUBJECTS.get(command, command)
 
 
 def unit_of(field: FieldInfo) -> str:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
 from wristctl.config.former import leave_out_former
-from wristctl.config.keys import keys_of, section_keys
+from wristctl.config.keys import home_of, keys_of, section_keys
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Phrase, Setting
@@ -67,7 +67,7 @@ def _override(text: str, command: str | None) -> Document:
     keys = dotted.split(".")
     own, top = section_keys(command), keys_of(Study)
     if command and keys[0] in own:
-        keys.insert(0, command)
+        keys.insert(0, home_of(command, keys[0]))
     elif keys[0] not in top:
         raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], [*own, *top]))
     try:

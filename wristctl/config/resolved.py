@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from wristctl.config.keys import choices_of, keys_of, source_of, unit_of
+from wristctl.config.keys import SUBJECTS, choices_of, keys_of, source_of, unit_of
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
@@ -21,7 +21,7 @@ _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 Entry = tuple[str, Any, str]
 
 _SHARED = ("seed", "wrist")
-_READ = {"train": ("gen-data",)}
+_READ = {"train": ("gen-data",)} | {command: (subject,) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from wristctl.config.analyse import AnalyseSettings
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
@@ -25,6 +26,7 @@ class Study(Section):
     tune: TuneSettings = TuneSettings()
     compare: CompareSettings = CompareSettings()
     simulate: SimulateSettings = SimulateSettings()
+    analyse: AnalyseSettings = AnalyseSettings()
     audit: AuditSettings = AuditSettings()
     hysteresis: HysteresisSettings = HysteresisSettings()
     identify: IdentifySettings = IdentifySettings()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 _FUNCTIONS = {
     "gen-data": "gen_data", "train": "train", "tune": "tune", "compare": "compare", "simulate": "simulate",
-    "hysteresis": "hysteresis", "identify": "identify", "audit": "audit", "runs ls": "runs",
+    "analyse": "analyse", "hysteresis": "hysteresis", "identify": "identify", "audit": "audit", "runs ls": "runs",
 }  # fmt: skip
 """The function of each command that Python has; the others are called at the shell from there too."""
 

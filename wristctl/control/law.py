@@ -56,6 +56,16 @@ class Conditions(NamedTuple):
     """Believed, of one tendon [N/m]."""
 
 
+class Surface(NamedTuple):
+    """Of a sliding law, what its switching term reads: sigma = a e + b de/dt + c int(e), 0 on the surface.
+
+    `weights` gives a, b and c by the law's gains, `layer` the |sigma| within which the term is about a line.
+    """
+
+    weights: Callable[[Mapping[str, float]], tuple[float, float, float]]
+    layer: Callable[[Mapping[str, float]], float]
+
+
 @dataclass(frozen=True)
 class Controller:
     """A named law with its gains; `memory` is the number of values it carries from tick to tick.
@@ -74,6 +84,8 @@ class Controller:
     """What a reader should know about a preset."""
     conditions: Mapping[str, Conditions] = field(default_factory=dict)
     """Of the presets that are made for motors, tendons and a camera too; the others are for tensions as commanded."""
+    surface: Surface | None = None
+    """Of the sliding laws, for where their rate is that of the error."""
 
     def __post_init__(self) -> None:
         """ValueError for a preset that does not give every gain and no other, and for conditions of none."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain, Surface
 from wristctl.control.model import one_segment
 from wristctl.lanes.functions import tanh
 
@@ -47,4 +47,5 @@ SMC = Controller(
         "initial": Conditions((1e-3, 1e-2), (5e3, 1e5)),
         "stepper": Conditions((1e-3, 1e-2), (5e3, 1e5)),
     },
+    surface=Surface(lambda gains: (gains["P1"], gains["P2"], 0.0), lambda gains: 1.0),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain, Surface
 from wristctl.control.model import one_segment
 from wristctl.lanes.functions import tanh
 from wristctl.lanes.lane import where
@@ -53,4 +53,5 @@ SMC_TRACKING = Controller(
         "on the emulated bench, springs of 70 and 100 %, tendons of 10 to 40 kN/m, up to three frames of delay",
     },
     conditions={"camera": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    surface=Surface(lambda gains: (gains["lambda"], 1.0, gains["kappa"]), lambda gains: gains["phi"]),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import Conditions, Controller, Gain, Surface
 from wristctl.control.model import one_segment
 from wristctl.lanes.lane import sqrt, where
 
@@ -54,4 +54,5 @@ SUPER_TWISTING = Controller(
         "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
     conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    surface=Surface(lambda gains: (gains["lambda"], 1.0, 0.0), lambda gains: 0.25 * (gains["k1"] * gains["tau"]) ** 2),
 )

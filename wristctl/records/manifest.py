@@ -15,7 +15,7 @@ TABLES = "tables.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
 KINDS = (
-    "gen-data", "train", "tune", "compare", "simulate", "hysteresis", "audit", "hw-run", "identify", "track",
+    "gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "audit", "hw-run", "identify", "track",
     "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
 """What commands make runs."""

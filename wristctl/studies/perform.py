@@ -42,7 +42,7 @@ def prepare(
     section = procedure.section(study)
     inputs = opened(procedure.kind, section, procedure.needs, given or {}, out)
     if inputs:
-        own = {procedure.kind.replace("-", "_"): named_for_good(inputs, section, out)}
+        own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=own)
     return Prepared(procedure, study, inputs)
 

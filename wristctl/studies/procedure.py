@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from wristctl.config.keys import SUBJECTS
 from wristctl.config.study import Study
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.session import Session
@@ -27,5 +28,10 @@ class Procedure(Generic[Found]):
     needs: tuple[EarlierRun, ...] = ()
 
     def section(self, study: Study) -> Any:
-        """Its own section of a study."""
-        return getattr(study, self.kind.replace("-", "_"))
+        """The section of a study that names what it reads."""
+        return getattr(study, self.subject.replace("-", "_"))
+
+    @property
+    def subject(self) -> str:
+        """The command in whose section that is: its own, or that of the one it works on."""
+        return SUBJECTS.get(self.kind, self.kind)

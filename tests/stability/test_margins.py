@@ -1,0 +1,176 @@
+"""Margins are python-control's, and where they say that a loop becomes unstable, its eigenvalues do."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.stability.conftest import closed, linear, periodic
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.stability.encirclements import PoleCount
+from wristctl.stability.margins import NEUTRAL, frequencies, margins
+from wristctl.stability.sampled_loop import SampledLoop
+
+S, PERIOD = control.tf("s"), 0.01
+PLANTS = {
+    "lag": 8.0 / ((0.1 * S + 1) * (0.02 * S + 1)),
+    "integrator": 12.0 / (S * (0.05 * S + 1)),
+    "double integrator with lead": 40.0 * (0.2 * S + 1) / (S * S * (0.01 * S + 1)),
+    "conditionally stable": 900.0 * (0.1 * S + 1) ** 2 / (S**3 * (0.002 * S + 1)),
+    "resonances, many crossings": 5.0 / (S + 5) + 30.0 / (S * S + 0.6 * S + 900.0) + 80.0 / (S * S + 1.5 * S + 6400.0),
+    "unstable plant, stable loop": 6.0 * (0.05 * S + 1) / ((0.3 * S - 1) * (0.01 * S + 1)),
+    "unstable loop": 300.0 / (S * (0.05 * S + 1)),
+    "nearly marginal": 20.9 / (S * (0.05 * S + 1)),
+    "below 1 everywhere": 0.3 / (0.1 * S + 1),
+}
+
+
+def _open(name: str) -> tuple[control.StateSpace, SampledLoop]:
+    own = control.ss(control.c2d(control.ss(PLANTS[name]), PERIOD))
+    return own, closed(np.array(own.A), np.array(own.B)[:, 0], np.array(own.C)[0], PERIOD)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", PLANTS)
+def test_margins_are_those_of_python_control(name: str) -> None:
+    """Its polynomials have roots beside the unit circle too, of which it keeps the nearest: they are left out."""
+    own, loop = _open(name)
+    found, half = margins(loop), math.pi / PERIOD
+    polynomials = control.stability_margins(control.tf(own), returnall=True, method="poly")
+    gains, phases, distances, at_phase, at_gain, at_distance = polynomials
+    answer = {w: complex(own(np.exp(1j * w * PERIOD))) for w in (*at_phase[at_phase > 0.01], *at_gain)}
+    ours = sorted((each.omega, each.value) for each in found.phase_crossings if each.omega < 0.999 * half)
+    theirs = [(w, gain) for w, gain in zip(at_phase, gains, strict=True) if w == 0.0 and gain > 1e-3]
+    theirs += [(w, g) for w, g in zip(at_phase, gains, strict=True) if w > 0.01 and abs(answer[w].imag) < 1e-6]
+    np.testing.assert_allclose(np.array(ours).reshape(-1, 2), np.array(theirs).reshape(-1, 2), rtol=1e-6)
+    ours = sorted((each.omega, math.degrees(each.value)) for each in found.gain_crossings)
+    turned = zip(at_gain, (phases + 180.0) % 360.0 - 180.0, strict=True)
+    theirs = [(w, phase) for w, phase in turned if abs(abs(answer[w]) - 1.0) < 1e-6]
+    np.testing.assert_allclose(np.array(ours).reshape(-1, 2), np.array(theirs).reshape(-1, 2), rtol=1e-6, atol=1e-6)
+    if found.sensitivity.omega < 0.999 * half:
+        inner = distances[at_distance < 0.999 * half]
+        assert found.sensitivity.value == pytest.approx(1.0 / min(inner), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_loop_is_stable_between_its_limits_and_not_beyond(name: str) -> None:
+    _, loop = _open(name)
+    found = margins(loop)
+    assert found.stable == (np.abs(np.linalg.eigvals(loop.transitions()[0])).max() < 1.0)
+    for limit, inside in ((found.least, 1.001), (found.most, 0.999)):
+        if 0.0 < limit.value < math.inf:
+            assert loop.growth(limit.value * inside) < 0.0 < loop.growth(limit.value / inside)
+            swings = 2.0 * math.pi * loop.modes(limit.value)[0].frequency
+            assert swings == pytest.approx(limit.omega, rel=1e-6, abs=1e-6)
+    if found.least.value == 0.0:
+        smaller = np.geomspace(1e-6, min(1.0, found.most.value) * 0.999, 50)
+        assert all(loop.growth(factor) < NEUTRAL for factor in smaller)
+    if math.isinf(found.most.value):
+        assert all(loop.growth(factor) < 0.0 for factor in np.geomspace(1.0, 1e3, 50))
+
+
+def late(loop: SampledLoop, ticks: int) -> float:
+    """The largest multiplier of a loop of one tick whose signal comes back so many ticks later."""
+    (tick,) = loop.ticks
+    n = len(tick.into)
+    whole = np.zeros((n + ticks, n + ticks))
+    whole[:n, :n] = loop.transitions(0.0)[0]
+    whole[:n, n + ticks - 1 if ticks else slice(0, n)] += tick.into if ticks else np.outer(tick.into, tick.back)
+    whole[n : n + 1, :n] = tick.back if ticks else whole[n : n + 1, :n]
+    whole[n + 1 :, n:-1] += np.eye(max(ticks - 1, 0))
+    return float(np.abs(np.linalg.eigvals(whole)).max())
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_loop_bears_whole_ticks_of_delay_up_to_its_margin(name: str) -> None:
+    _, loop = _open(name)
+    found = margins(loop)
+    if not found.stable:
+        assert math.isnan(found.delay)
+    elif math.isinf(found.delay):
+        assert all(late(loop, ticks) < 1.0 for ticks in range(30))
+    else:
+        assert late(loop, math.floor(found.delay / PERIOD)) < 1.0 < late(loop, math.floor(found.delay / PERIOD) + 2)
+
+
+def test_an_unstable_loop_tells_where_it_would_be_stable() -> None:
+    found = margins(_open("unstable loop")[1])
+    assert not found.stable and found.least.value == 0.0 and found.most.value < 1.0
+    low = margins(_open("unstable plant, stable loop")[1])
+    assert low.stable and 0.0 < low.least.value < 1.0
+
+
+@st.composite
+def loops(draw: st.DrawFn) -> tuple[Array, Array, Array]:
+    """A stable open loop of random poles and residues."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n = draw(st.integers(2, 6))
+    a = rng.normal(size=(n, n))
+    return a * rng.uniform(0.3, 0.98) / np.abs(np.linalg.eigvals(a)).max(), rng.normal(size=n), rng.normal(size=n)
+
+
+@settings(max_examples=40, deadline=None)
+@given(loops())
+def test_limits_of_any_loop_are_where_eigenvalues_leave_the_unit_circle(own: tuple[Array, Array, Array]) -> None:
+    loop = closed(*own, 1.0)
+    found = margins(loop)
+    assert found.stable == (loop.growth() < NEUTRAL)
+    if found.stable and not math.isinf(found.most.value):
+        assert loop.growth(0.9999 * found.most.value) < 1e-3 and loop.growth(1.0001 * found.most.value) > -1e-3
+    within = np.linspace(found.least.value, min(found.most.value, 1e3), 20)[1:-1]
+    assert all(loop.growth(float(factor)) < 2e-3 for factor in within if not math.isnan(found.least.value))
+
+
+def _uneven(rng: np.random.Generator, size: float) -> SampledLoop:
+    """Three states over five ticks, cut at two of them."""
+    a, b, c = size * rng.normal(size=(3, 3)), rng.normal(size=3), rng.normal(size=3)
+    cuts = (True, False, True, False, False)
+    return periodic([(a + 0.1 * rng.normal(size=(3, 3)), b, c, cut) for cut in cuts], 0.1)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_poles_of_a_loop_of_several_rates_are_counted(seed: int) -> None:
+    loop = _uneven(np.random.default_rng(seed), 0.5)
+    count = PoleCount(loop, NEUTRAL)
+    for factor in (0.0, 0.2, 0.7, 1.0, 1.6, 4.0, -1.5):
+        assert count.unstable(factor) == np.sum(np.abs(loop.multipliers(factor)) > math.exp(NEUTRAL * loop.lasts))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_added_at_uneven_cuts_is_amplified_by_the_loop(seed: int) -> None:
+    """A tone goes on at the cuts for long; what it makes of itself at its own frequency is 1/(1 + L) of it."""
+    loop = _uneven(np.random.default_rng(seed), 0.2)
+    quiet = zip(loop.ticks, loop.transitions(0.1), strict=True)
+    loop = SampledLoop(loop.period, [t._replace(transition=m, into=0.1 * t.into) for t, m in quiet])
+    assert loop.growth() < -0.5
+    omega, state, seen = 3.0, np.zeros(3, complex), []
+    for k in range(4000):
+        tick, tone = loop.ticks[k % 5], np.exp(1j * omega * loop.period * k)
+        if tick.cut and k >= 2000:
+            seen.append((tone + tick.back @ state) / tone)
+        state = tick.transition @ state + tick.into * tone * tick.cut
+    amplified = 1.0 / (1.0 + loop.response(np.array([omega]))[0])
+    assert np.mean(seen) == pytest.approx(amplified, abs=5e-3)
+
+
+def test_a_sharp_resonance_between_the_decades_is_seen() -> None:
+    sharp = control.c2d(control.ss(1.0 / (S * S + 2e-4 * S + 700.0)), PERIOD)
+    loop = closed(np.array(sharp.A), np.array(sharp.B)[:, 0], np.array(sharp.C)[0], PERIOD)
+    assert len(margins(loop).gain_crossings) == 2 and np.diff(frequencies(loop)).min() > 0.0
+
+
+def test_margins_of_a_configured_loop_are_python_controls() -> None:
+    found = linear("pid", {"Kp": 10.0, "Ki": 20.0, "Kd": 0.5}, Loop(plant_segments=1, control_period=5e-3), 15.0).closed
+    (tick,) = found.ticks
+    own = control.ss(found.transitions(0.0)[0], tick.into[:, None], -tick.back[None], 0.0, found.period)
+    _, phases, _, _, at_gain, _ = control.stability_margins(control.tf(own), returnall=True, method="poly")
+    ours = margins(found)
+    assert ours.delay == pytest.approx(min(np.radians((phases + 180.0) % 360.0 - 180.0) / at_gain), rel=1e-6)
+    peak = max(abs(1.0 / (1.0 + complex(own(np.exp(1j * w))))) for w in np.linspace(1e-3, math.pi, 3000))
+    assert peak == pytest.approx(ours.sensitivity.value, rel=1e-4)

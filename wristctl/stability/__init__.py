@@ -1,0 +1,1 @@
+"""The linearised closed loop: margins, poles, and where linearisation says nothing."""

@@ -1,0 +1,133 @@
+"""From and up to which swing of the wrist a loop is as its linearisation says, where it begins to swing."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Surface
+from wristctl.simulation.actuator import TENDON, level_of, motor_of
+from wristctl.simulation.disturbances import DISTURBANCES
+from wristctl.simulation.worlds import World
+from wristctl.stability.linearise import LinearLoop
+from wristctl.stability.sampled_loop import Complex, Mode
+from wristctl.stability.smooth_loop import FrictionReading
+
+_SHARE = 0.3
+"""Of a stepper's acceleration, from which its profile's lag of v/(2 a) turns a swing by 0.15 rad and more."""
+
+
+class LinearityLimit(NamedTuple):
+    """Something that linearisation leaves out: it is felt `above` or below a swing of the wrist's angle [rad].
+
+    The swing is nan where the loop has no way to swing, `read_as` how it was linearised.
+    """
+
+    what: str
+    above: bool
+    swing: float
+    read_as: str
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A loop that swings with an amplitude of 1 rad, in one of its modes; None: it does not swing."""
+
+    linear: LinearLoop
+    mode: Mode | None
+
+    def of(self, **weights: complex) -> float:
+        """The amplitude of a weighted sum of outputs; nan where nothing swings."""
+        return self._size(np.sum([weight * self._output(name) for name, weight in weights.items()], axis=0))
+
+    def motor(self, order: int = 0) -> float:
+        """Of what the motors of the two sides do against each other, or of its derivative [1/s^order]."""
+        sides = np.array(self.linear.names) == "motor"
+        if self.mode is None:
+            return math.nan
+        return self._size(self.mode.states[:, sides] @ np.array([1.0, -1.0], complex)) * abs(self.turning) ** order
+
+    @property
+    def turning(self) -> complex:
+        """Growth and frequency as one number [1/s]."""
+        return complex(self.mode.growth, 2.0 * math.pi * self.mode.frequency) if self.mode else cmath.nan
+
+    def _output(self, name: str) -> Complex:
+        if self.mode is None:
+            return np.zeros(0, complex)
+        pairs = zip(self.linear.closed.ticks, self.mode.states, strict=True)
+        return np.array([tick.outputs[name] @ state for tick, state in pairs])
+
+    def _size(self, values: Complex) -> float:
+        if self.mode is None:
+            return math.nan
+        return float(np.abs(values).max() / np.abs(self._output("theta")).max())
+
+
+def linearity_limits(
+    swing: Swing, loop: Loop, wrist: WristParameters, friction: FrictionReading, surface: Surface | None,
+    gains: dict[str, float],
+) -> list[LinearityLimit]:  # fmt: skip
+    """What linearisation leaves out of a loop, and the swings from which, or up to which, it is felt: those first."""
+    world, level, found = World(loop, wrist), level_of(loop.actuator), list[LinearityLimit]()
+    if loop.sensor.level == "camera":
+        noise = math.radians(world.sensor.noise_deg)
+        found.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
+    if level is not None:
+        motor = motor_of(loop.actuator)
+        step, scale = (motor.step, 1.0) if level == TENDON else (motor.stiffness * motor.step, motor.stiffness)
+        told = LinearityLimit("a motor's microstep", False, _over(0.5 * step, swing.motor()), "no steps: any length")
+        speed = scale * loop.actuator.step_length * world.actuator.step_rate
+        found += [
+            told,
+            LinearityLimit("a motor's speed", True, _over(speed, swing.motor(1)), "as fast as it has to be"),
+        ]
+    if level == TENDON:
+        play = loop.plant.actuator.backlash / world.plant.tendon_offset
+        found += [LinearityLimit("backlash", False, play, "none")] if play else []
+        acceleration = _SHARE * loop.actuator.step_length * world.actuator.step_acceleration
+        most = _over(acceleration, swing.motor(2))
+        found += [LinearityLimit("the stepper's acceleration", True, most, "where it is told to be after a period")]
+        found += _friction(world, friction)
+    if loop.limits:
+        left = wrist.tension_limit - max(swing.linear.tensions)
+        most = _over(left, swing.of(tension_plus=1.0, tension_minus=-1.0))
+        found.append(LinearityLimit("saturation", True, most, f"none: tensions rest {left:.3g} N below their limit"))
+    if surface is not None:
+        error, rate, integral = surface.weights(gains)
+        sigma = swing.of(theta=error + (integral / swing.turning if swing.mode else 0.0), rate=rate)
+        most = _over(surface.layer(gains), sigma)
+        found.append(LinearityLimit("the boundary layer's end", True, most, "the sliding term as inside the layer"))
+    if loop.plant.end_stop_deg is not None:
+        room = math.radians(loop.plant.end_stop_deg) - abs(swing.linear.theta)
+        found.append(LinearityLimit("the end stops", True, room, "none"))
+    found += [LinearityLimit(each, True, math.nan, "left out") for each in _passing(loop)]
+    return sorted(found, key=lambda each: (each.above, math.isnan(each.swing), each.swing))
+
+
+def _passing(loop: Loop) -> list[str]:
+    """What happens at times, or may."""
+    acting = [each.meaning for name, each in DISTURBANCES.items() if name != "load" and each.acts(loop.disturbances)]
+    facts = {"broken_at": "a tendon that breaks", "slips_at": "a spool that slips", "torque": "a motor that stalls"}
+    return [*acting, *(told for name, told in facts.items() if getattr(loop.plant.actuator, name) is not None)]
+
+
+def _over(most: float, each: float) -> float:
+    """Up to which swing a signal stays below its most; inf where it does not swing along."""
+    return math.inf if each == 0.0 else most / each
+
+
+def _friction(world: World, reading: FrictionReading) -> list[LinearityLimit]:
+    """A bristle turns round within its presliding path, which the angle makes by the tendons' arm."""
+    if world.actuator.friction == 0.0:
+        return []
+    swing = world.actuator.presliding / world.plant.tendon_offset
+    if reading == "slipping":
+        return [LinearityLimit("friction that sticks", False, swing, "slipping: Coulomb's, which has no slope")]
+    return [LinearityLimit("friction that slips", True, swing, "stuck: the springs of its bristles")]

@@ -1,0 +1,198 @@
+"""A loop in many lanes at once, whose ticks are taken from any state: its compiled code, differentiated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
+from wristctl.config.errors import UserError
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.simulation.batch import Lanes, batch
+from wristctl.simulation.frames import schedule
+from wristctl.simulation.kernel import Span, run_blocks
+from wristctl.simulation.reference import Motion
+from wristctl.simulation.sums import SUMS
+from wristctl.simulation.worlds import World
+from wristctl.stability.smooth_loop import cycle_of
+from wristctl.stability.state_rows import Remembered, StatePart, read_state, state_parts, write_state
+from wristctl.wrist.plant import kernel_of
+
+SMALL = 1e-6
+"""Difference quotients are over so many times a variable's typical size, to both sides."""
+_WARM_UP = 200
+"""Ticks before the first guess of a resting point."""
+_LONGEST_MEMORY = 200
+"""Ticks that an observer may look back: each is two variables more."""
+
+
+_ALIVE = SUMS.index("alive")
+_OTHERS = ("by_frame", "by_gain", "by_reference")
+"""What a tick is differentiated by beside its state, in the order of their lanes."""
+
+
+class TickSlopes(NamedTuple):
+    """One tick from a state: the next one, what is recorded, and their derivatives by the state x.
+
+    Columns of `recorded` are the kernel's RECORDED. `by_frame` is 0 but where a frame is taken (`seen`).
+    """
+
+    after: Array
+    """The next state, (x,); nan where the wrist has left what it can be."""
+    recorded: Array
+    transition: Array
+    """(x, x)"""
+    outputs: Array
+    """Of what is recorded, (columns, x)."""
+    seen: bool
+    by_frame: Array
+    """Of the next state by an angle added to the frame, (x,)."""
+    by_gain: Array
+    """By the law's first gain, (x,)."""
+    by_reference: Array
+    """By the reference angle, (x,)."""
+
+
+def looks_back(loop: Loop) -> tuple[int, Remembered]:
+    """A tick, at the start of a cycle, from which on a smooth loop repeats, and how far back it remembers then.
+
+    Raises UserError where that is too far.
+    """
+    if loop.sensor.level == "ideal":
+        return 0, Remembered(0, 0)
+    period, (cycle, _), sensor = loop.control_period, cycle_of(loop), loop.plant.sensor.of(loop.sensor)
+    late = schedule(sensor, period, 3.0 * cycle * period, loop.sensor).arrivals[0]
+    early = cycle * (2 + math.ceil(2.0 * late / cycle))
+    frames = schedule(sensor, period, (early + 2 * cycle) * period, loop.sensor)
+    ticks = np.arange(early, early + cycle)
+    taken, arrived = (np.searchsorted(each, ticks) for each in (frames.captures, frames.arrivals))
+    back = int((ticks - frames.dated[arrived - 1]).max())
+    if back > _LONGEST_MEMORY:
+        what = f"the observer looks back over {back} control periods, more than {_LONGEST_MEMORY} can be analysed"
+        shortest = 1e3 * period * back / _LONGEST_MEMORY
+        raise UserError(what, "loop.control_period", f"at least {shortest:.2g} ms behind this camera")
+    return early, Remembered(back, int((taken - arrived).max()))
+
+
+class LoopTicks:
+    """The ticks of one cycle of a smooth loop (`smooth`) about a reference that rests at theta [rad].
+
+    `sizes` (x,) are the typical sizes of the state's variables and `names` what they are; `guesses` are states (x,)
+    from which a resting point may be looked for. Raises UserError where the observer would have to look back too far.
+    """
+
+    def __init__(
+        self, law: Controller, gains: Sequence[float], loop: Loop, wrist: WristParameters, theta: float
+    ) -> None:
+        self.period = loop.control_period
+        self.cycle, _ = cycle_of(loop)
+        self._law, self._gains, self._world, self._theta = law, np.array([gains], float), World(loop, wrist), theta
+        self._model = PLANTS[loop.plant.model]
+        self._kernel = kernel_of(run_blocks, self._model)
+        early, self._back = looks_back(loop)
+        self._first = early + self.cycle * math.ceil(_WARM_UP / self.cycle)
+        self._make(2)
+        parts = list(self._parts(0))
+        self.sizes = np.concatenate([each.sizes for each in parts])
+        self.names = [each.name for each in parts for _ in each.rows]
+        self._make(2 * (len(self.sizes) + len(_OTHERS)) + 1)
+        self._run(0, early)
+        self.guesses = [self._states(early)[-1]]
+        for begin, end in ((early, early + 1), (early + 1, self._first)):
+            self._run(begin, end)
+            self.guesses.append(self._states(end)[-1])
+
+    def slopes(self, state: Array, small: float = SMALL) -> list[TickSlopes]:
+        """Each tick of a cycle, taken from the same state (x,), differentiated over `small` typical sizes.
+
+        Ticks at which no frame is taken or arrives are all the same one.
+        """
+        frames, between = self._batch.course.schedule, None
+        found = []
+        for tick in range(self._first, self._first + self.cycle):
+            plain = frames is None or (tick not in frames.captures and tick not in frames.arrivals)
+            each = between if plain and between is not None else self._tick(tick, state, small)
+            between = each if plain else between
+            found.append(each)
+        return found
+
+    def _tick(self, tick: int, state: Array, small: float) -> TickSlopes:
+        n, changes = len(state), small * self.sizes
+        states = np.tile(state, (self._count, 1))
+        states[np.arange(0, 2 * n, 2), np.arange(n)] += changes
+        states[np.arange(1, 2 * n, 2), np.arange(n)] -= changes
+        self._count_to(tick)
+        write_state(self._parts(tick), states)
+        seen = self._shift_frame(tick, 2 * n)
+        self._batch.state.sums[:, _ALIVE] = 1.0
+        self._run(tick, tick + 1)
+        after, recorded = self._states(tick + 1), to_rows(self._batch.state.record[:, tick], self._count)
+        after[to_rows(self._batch.state.sums, self._count)[:, _ALIVE] <= 0.0] = math.nan
+        steps = np.append(changes, [SMALL, self._gain_step(), SMALL])[:, None]
+        by, outputs = ((each[:-1:2] - each[1:-1:2]) / (2.0 * steps) for each in (after, recorded))
+        others = dict(zip(_OTHERS, by[n:], strict=True))
+        return TickSlopes(after[-1], recorded[-1], by[:n].T, outputs[:n].T, seen=seen, **others)
+
+    def _shift_frame(self, tick: int, lane: int) -> bool:
+        """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
+        watch, frames = self._batch.state.watch, self._batch.course.schedule
+        if watch is None:
+            return False
+        taken = int(watch.turn[0, 0])
+        if frames.captures[taken] != tick:
+            return False
+        added = np.zeros((self._count, 1))
+        added[lane : lane + 2, 0] = SMALL, -SMALL
+        watch.readings[:, taken, :1] = to_blocks(added)
+        return True
+
+    def _gain_step(self) -> float:
+        return SMALL * max(1.0, abs(float(self._gains[0, 0]))) if self._gains.size else SMALL
+
+    def _make(self, count: int) -> None:
+        """A batch of so many lanes; the last is as it is, before it those of the reference and the first gain."""
+        samples = self._first + 2 * self.cycle + 1
+        motions = [_at_rest(self._theta + shift, samples, self.period) for shift in (0.0, SMALL, -SMALL)]
+        which, gains = np.zeros(count, np.int64), np.tile(self._gains, (count, 1))
+        if count > 2:
+            which[-3:-1] = 1, 2
+            gains[-5:-3, :1] += self._gain_step() * np.array([[1.0], [-1.0]])
+        k = self._model.coordinates(self._world.loop.plant_segments)
+        lanes = Lanes(which, np.zeros(count, np.int64), [(0,)] * count)
+        made = batch(
+            self._law, gains, motions, [self._world], lanes, self._model,
+            lambda plant: np.full(k, self._theta / k), record=True,
+        )  # fmt: skip
+        self._count, self._batch = count, made._replace(setup=made.setup._replace(ticks=1))
+        self._scratch = made.scratch()
+
+    def _parts(self, tick: int) -> Iterator[StatePart]:
+        return state_parts(self._batch, self._law.memory, tick, self._back)
+
+    def _states(self, tick: int) -> Array:
+        return read_state(self._parts(tick), self._count)
+
+    def _count_to(self, tick: int) -> None:
+        """Set the camera's counters to what they are before a tick."""
+        watch, frames = self._batch.state.watch, self._batch.course.schedule
+        if watch is not None:
+            taken, arrived = (int(np.searchsorted(each, tick)) for each in (frames.captures, frames.arrivals))
+            watch.turn[:] = taken, arrived
+            watch.observer.at[:] = frames.dated[arrived - 1]
+
+    def _run(self, begin: int, end: int) -> None:
+        own = self._batch
+        self._kernel(own.setup, own.course, own.world, own.state, self._scratch, Span(0, own.blocks, begin, end))
+
+
+def _at_rest(theta: float, samples: int, period: float) -> Motion:
+    still, time = np.zeros(samples), period * np.arange(samples, dtype=np.float64)
+    angle = np.full(samples, theta)
+    return Motion(time, angle, still, still, angle, np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)

@@ -1,0 +1,89 @@
+"""How the nonlinear loop comes to its sliding surface, from angles to both sides of where it rests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller, Surface
+from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.closed_loop import repeat
+from wristctl.simulation.draws import Draws
+from wristctl.simulation.reference import motion
+
+SCENARIO = "phase portrait"
+"""The name that the camera's noise goes by."""
+_SHARES = (-1.0, -0.5, 0.5, 1.0)
+_FURTHEST_DEG = 20.0
+
+
+@dataclass(frozen=True)
+class Approach:
+    """One course (T,): error [rad], its rate [rad/s] and sigma over time [s].
+
+    `reached` is when sigma has come into the boundary layer, never to leave it; nan where it never does.
+    """
+
+    time: Array
+    error: Array
+    rate: Array
+    sigma: Array
+    reached: float
+
+
+@dataclass(frozen=True)
+class PhasePortrait:
+    """Courses of a loop over its sliding surface: slope de/dt = -slope e of the surface, `layer` the half width of its
+    boundary layer in de/dt [rad/s]."""
+
+    slope: float
+    layer: float
+    courses: Sequence[Approach]
+
+
+def phase_portrait(
+    law: Controller, gains: Mapping[str, float], loop: Loop, wrist: WristParameters, theta: float, horizon: float,
+    draws: Draws,
+) -> PhasePortrait | None:  # fmt: skip
+    """Courses of the loop as it is (with limits, steps, noise) toward theta [rad], from rest to both sides of it.
+
+    None for a law that has no sliding surface. The integral of the error counts from the start.
+    """
+    if law.surface is None:
+        return None
+    room = math.radians(wrist.range_deg) - abs(theta)
+    furthest = min(math.radians(_FURTHEST_DEG), max(room, 0.1))
+    count = PLANTS[loop.plant.model].coordinates(loop.plant_segments)
+    goal = Reference(kind="step", angle_deg=math.degrees(theta))
+    followed = motion(goal, wrist, horizon, sample_period(loop.control_period))
+    courses = []
+    for share in _SHARES:
+        (done,) = repeat(
+            law, np.array([law.values(gains)]), [followed], np.zeros(1, np.int64), loop, wrist, [SCENARIO], draws,
+            start=_from(np.full(count, (theta + share * furthest) / count)),
+        )  # fmt: skip
+        course = done.first.trajectory
+        courses.append(_approach(law.surface, gains, course.time, course.error, course.rate))
+    error, rate, _ = law.surface.weights(gains)
+    return PhasePortrait(error / rate, law.surface.layer(gains) / abs(rate), courses)
+
+
+def _from(begin: Array) -> Start:
+    return lambda plant: begin
+
+
+def _approach(surface: Surface, gains: Mapping[str, float], time: Array, error: Array, rate: Array) -> Approach:
+    a, b, c = surface.weights(gains)
+    integral = np.cumsum(error) * (time[1] - time[0])
+    sigma = a * error + b * rate + c * integral
+    outside = np.flatnonzero(~(np.abs(sigma) <= surface.layer(gains)))
+    ends = len(outside) and outside[-1] + 1 == len(time)
+    reached = math.nan if ends else float(time[outside[-1] + 1]) if len(outside) else 0.0
+    return Approach(time, error, rate, sigma, reached)

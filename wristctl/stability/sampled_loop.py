@@ -1,0 +1,148 @@
+"""A linear loop in discrete time that repeats after a cycle of ticks: its poles, and its answer to a cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+
+Complex = NDArray[np.complex128]
+
+
+class LinearTick(NamedTuple):
+    """One tick of a closed loop: x becomes transition x + into w + reference r, r that of the angle.
+
+    The loop may be cut at a signal, back x: w is added to it, and is felt where `cut`. `outputs` are rows for other
+    signals, by name.
+    """
+
+    transition: Array
+    into: Array
+    back: Array
+    reference: Array
+    cut: bool
+    outputs: dict[str, Array]
+
+
+class Mode(NamedTuple):
+    """A way in which a loop swings: how fast it grows [1/s] and turns [Hz], and the state at each tick, (N, x)."""
+
+    growth: float
+    frequency: float
+    states: Complex
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """The ticks of a cycle, `period` [s] apart. The loop's gain multiplies what comes back over the cut."""
+
+    period: float
+    ticks: Sequence[LinearTick]
+
+    @property
+    def lasts(self) -> float:
+        """A cycle [s]."""
+        return self.period * len(self.ticks)
+
+    @property
+    def cuts(self) -> list[int]:
+        """The ticks at which it is cut."""
+        return [k for k, tick in enumerate(self.ticks) if tick.cut]
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is cut once in a cycle, and so is the same at each cut: of one sampling rate."""
+        return len(self.cuts) == 1
+
+    def transitions(self, factor: float = 1.0) -> list[Array]:
+        """Of each tick, with the loop's gain times a factor: 1 is the loop as it is, 0 the open one."""
+        return [each.transition + (factor - 1.0) * each.cut * np.outer(each.into, each.back) for each in self.ticks]
+
+    def multipliers(self, factor: float = 1.0) -> Complex:
+        """What a cycle multiplies the loop's modes by: z at poles, (x,)."""
+        return np.asarray(np.linalg.eigvals(_product(self.transitions(factor))), complex)
+
+    def growth(self, factor: float = 1.0) -> float:
+        """How fast the least stable mode grows [1/s]."""
+        return float(np.log(max(np.abs(self.multipliers(factor)).max(), 1e-300)) / self.lasts)
+
+    def modes(self, factor: float = 1.0) -> list[Mode]:
+        """All that swing or not, least stable first; each pair once. What dies out within a tick is left out.
+
+        A mode's frequency is followed from tick to tick: after a cycle several would have turned as far.
+        """
+        ticks = self.transitions(factor)
+        multipliers, states = np.linalg.eig(_product(ticks))
+        least = np.exp(-_FORGOTTEN * len(ticks))
+        order = np.argsort(-np.abs(multipliers), kind="stable")
+        chosen = [k for k in order if multipliers[k].imag >= 0.0 and abs(multipliers[k]) > least]
+        multipliers, course = multipliers[chosen].astype(complex), [states[:, chosen].astype(complex)]
+        for each in ticks:
+            course.append(each @ course[-1].real + 1j * (each @ course[-1].imag))
+        steps = pairwise(course)
+        turned = sum(np.angle(np.sum(before.conj() * after, axis=0)) for before, after in steps)
+        turned = np.angle(multipliers) + 2.0 * np.pi * np.round((turned - np.angle(multipliers)) / (2.0 * np.pi))
+        growth, frequency = np.log(np.abs(multipliers)) / self.lasts, np.abs(turned) / (2.0 * np.pi * self.lasts)
+        shapes = np.moveaxis(np.array(course[:-1]), -1, 0)
+        return [Mode(*each) for each in zip(growth.tolist(), frequency.tolist(), shapes, strict=True)]
+
+    def returned(self, z: Complex) -> Complex:
+        """What comes back over the cut at each tick where z^(cycles) goes out at one of them, (n, ticks, cuts).
+
+        The loop is open: nothing that comes back goes out again.
+        """
+        triangle, own, forced, direct = self._opened
+        found = np.empty((len(z), len(self.ticks), len(self.cuts)), complex)
+        for k, each in enumerate(np.asarray(z, complex)):
+            start = scipy.linalg.solve_triangular(each * np.eye(len(triangle)) - triangle, forced)
+            found[k] = own @ start + direct
+        return found
+
+    @cached_property
+    def _opened(self) -> tuple[Complex, Complex, Complex, Array]:
+        """A Schur form of the open loop's cycle; in its coordinates what is seen at each tick and what goes in."""
+        x, cuts = len(self.ticks[0].into), self.cuts
+        far, forced = np.eye(x), np.zeros((x, len(cuts)))
+        seen, direct = np.empty((len(self.ticks), x)), np.zeros((len(self.ticks), len(cuts)))
+        for k, (tick, transition) in enumerate(zip(self.ticks, self.transitions(0.0), strict=True)):
+            seen[k], direct[k] = tick.back @ far, tick.back @ forced
+            far, forced = transition @ far, transition @ forced
+            if tick.cut:
+                forced[:, cuts.index(k)] += tick.into
+        triangle, turn = scipy.linalg.schur(far, output="complex")
+        return triangle, seen @ turn, turn.conj().T @ forced, direct
+
+    def response(self, omega: Array) -> Complex:
+        """The loop's transfer L at frequencies [rad/s], (n,), positive where it is fed back negatively.
+
+        The closed loop amplifies what is added at the cut by 1/(1 + L) at its own frequency. Of a loop that is cut once
+        in a cycle it is the open loop's transfer; of another that with all frequencies fed back into which uneven cuts
+        turn this one (a Schur complement of the harmonic transfer function, Wereley 1991).
+        """
+        omega = np.atleast_1d(omega)
+        at = np.array(self.cuts)
+        back = self.returned(np.exp(1j * omega * self.lasts))[:, at]
+        if self.is_steady:
+            return np.asarray(-back[:, 0, 0])
+        sent = np.exp(1j * np.outer(omega * self.period, at))
+        amplified = np.linalg.solve(np.eye(len(at)) - back, sent[:, :, None])[:, :, 0]
+        return np.asarray(1.0 / np.mean(sent.conj() * amplified, axis=1) - 1.0)
+
+
+_FORGOTTEN = 12.0
+"""Of a mode in one tick, as an exponent."""
+
+
+def _product(transitions: Sequence[Array]) -> Array:
+    whole = np.eye(len(transitions[0]))
+    for each in transitions:
+        whole = each @ whole
+    return whole

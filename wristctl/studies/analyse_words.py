@@ -1,0 +1,154 @@
+"""What the analysis of a loop comes to, in words and tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.report.printed_table import Table, number
+
+if TYPE_CHECKING:
+    from wristctl.stability.loop_analysis import LoopAnalysis
+    from wristctl.stability.margins import Crossing
+    from wristctl.stability.phase_portrait import PhasePortrait
+    from wristctl.stability.root_locus import RootLocus
+
+_HZ = 1.0 / (2.0 * math.pi)
+CUTS = {
+    "ideal": "the law's torque (ideal sensing)",
+    "camera": "the camera's frames",
+}
+"""Where the loop is cut, by the sensor's level: the same loop on both sides of motors and wrist."""
+
+
+def decibels(factor: float) -> float:
+    """A factor of the gain in dB; -inf for 0."""
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
+
+
+def listed(angles: Iterable[float]) -> str:
+    """Angles [deg] as text: 0, 15 and 30 deg."""
+    texts = [f"{round(each, 6):g}" for each in angles]
+    *others, last = texts
+    return f"{', '.join(others)} and {last} deg" if others else f"{last} deg"
+
+
+def answer(label: str, found: Sequence[LoopAnalysis], angles: Sequence[float]) -> str:
+    """The answer in a sentence, with the least margin of all resting angles [deg]."""
+    if all(each.is_open for each in found):
+        stays = all(each.margins.stable for each in found)
+        told = f"{label} feeds nothing back: there is no loop, and no margin; the plant alone is shown"
+        return told if stays else f"{told}, and it is UNSTABLE"
+    bad = [k for k, each in enumerate(found) if not each.margins.stable]
+    if bad:
+        worst = max((found[k] for k in bad), key=lambda each: each.margins.growth)
+        swing = worst.linear.closed.modes()[0].frequency
+        told = f"{label} is UNSTABLE at {listed(angles[k] for k in bad)}: a swing of {_three(swing)} Hz"
+        return f"{told} grows by e in {_time(1.0 / worst.margins.growth)}; {_mended(worst)}"
+    parts = [_gain_margin(found), _delay_margin(found)]
+    sensitivity = max(each.margins.sensitivity.value for each in found)
+    step = max(found, key=lambda each: each.step.settling).step
+    parts += [
+        f"largest sensitivity {_three(sensitivity)}",
+        f"a step settles in {_time(step.settling)} with {_three(100.0 * step.overshoot)} % overshoot",
+    ]
+    return f"{label} is stable at {listed(angles)}: {', '.join(parts)}"
+
+
+def _gain_margin(found: Sequence[LoopAnalysis]) -> str:
+    most = min((each.margins.most for each in found), key=lambda each: each.value)
+    least = max((each.margins.least for each in found), key=lambda each: each.value)
+    told = f"gain margin {_three(decibels(most.value))} dB" if math.isfinite(most.value) else "no gain is too large"
+    limits = [_times(each) for each in (most, least) if 0.0 < each.value < math.inf]
+    return f"{told} (begins to oscillate at {', and at '.join(limits)})" if limits else told
+
+
+def _times(limit: Crossing) -> str:
+    return f"{_three(limit.value)} times the loop gain, with {_three(_HZ * limit.omega)} Hz"
+
+
+def _delay_margin(found: Sequence[LoopAnalysis]) -> str:
+    least = min((each.margins for each in found), key=lambda each: each.delay)
+    return "no delay is too long" if math.isinf(least.delay) else f"delay margin {_time(least.delay)}"
+
+
+def _mended(worst: LoopAnalysis) -> str:
+    least, most = worst.margins.least, worst.margins.most
+    if math.isnan(least.value):
+        return "no other loop gain makes it stable"
+    if least.value == 0.0:
+        return f"it is stable up to {_three(most.value)} times the loop gain"
+    above = "" if math.isinf(most.value) else f" to {_three(most.value)}"
+    return f"it is stable from {_three(least.value)}{above} times the loop gain"
+
+
+def _time(seconds: float) -> str:
+    return f"{_three(seconds)} s" if seconds >= 1.0 else f"{_three(1e3 * seconds)} ms"
+
+
+def _three(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def margin_table(said: str, found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Table:
+    """What was found in words, and below it a row for each resting angle."""
+    columns = (
+        "rests at [deg]", "torque [N m]", "stable", "gain margin [dB]", "at [Hz]", "least factor", "phase margin [deg]",
+        "delay margin [ms]", "at [Hz] ", "Ms", "Mt",
+    )  # fmt: skip
+    rows = [
+        (
+            angle, round(each.linear.torque, 12), each.margins.stable, decibels(each.margins.most.value),
+            _HZ * each.margins.most.omega, each.margins.least.value, math.degrees(each.margins.phase.value),
+            1e3 * each.margins.delay, _HZ * each.margins.delay_omega, each.margins.sensitivity.value,
+            each.margins.complementary.value,
+        )
+        for angle, each in zip(angles, found, strict=True)
+    ]  # fmt: skip
+    return Table(said, columns, rows)
+
+
+def step_table(found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Table:
+    """What each closed loop makes of a small step of its reference."""
+    columns = ("rests at [deg]", "rise 10-90 % [ms]", "overshoot [%]", "settling 2 % [ms]", "arrives at [%]")
+    rows = [
+        (angle, 1e3 * each.step.rise, 100.0 * each.step.overshoot, 1e3 * each.step.settling, 100.0 * each.step.final)
+        for angle, each in zip(angles, found, strict=True)
+    ]
+    return Table("A small step of the reference", columns, rows)
+
+
+def limit_table(found: LoopAnalysis, cut: str) -> Table:
+    """Where linearisation says nothing, at one angle, of a loop that is cut there."""
+    rows = [
+        (each.what, f"{'above' if each.above else 'below'} {number(math.degrees(each.swing))}", each.read_as)
+        if math.isfinite(each.swing)
+        else (each.what, "-", each.read_as)
+        for each in found.limits
+    ]
+    title = f"Where linearisation says nothing; the loop is cut at {cut}"
+    return Table(title, ("because of", "swings of the wrist [deg]", "linearised as"), rows)
+
+
+def locus_table(locus: RootLocus, value: float | None, unit: str, span: float) -> Table:
+    """Within which values of a gain the loop is stable, as far as that was looked at."""
+    heads = ("over", "value", "stable from", "with [Hz]", "up to", "with [Hz] ")
+    least, most = (each if value is None else value * each for each in (locus.least, locus.most))
+    name = "the loop's gain, as a factor" if value is None else f"{locus.over} [{unit}]" if unit else locus.over
+    low, high = locus.swings
+    limits = (None if least == 0.0 else least, low, None if math.isinf(most) else most, high)
+    return Table(
+        f"Root locus, from 1/{span:g} to {span:g} times", heads, [(name, 1.0 if value is None else value, *limits)]
+    )
+
+
+def portrait_table(portrait: PhasePortrait) -> Table:
+    """How each course comes to the sliding surface."""
+    rows = [
+        (math.degrees(each.error[0]), 1e3 * each.reached, math.degrees(abs(each.error).max()), each.sigma[-1])
+        for each in portrait.courses
+    ]
+    heads = ("begins with an error of [deg]", "reaching [ms]", "largest error [deg]", "sigma at the end")
+    slope = f"Sliding surface: de/dt = -{number(portrait.slope)} e; its boundary layer is"
+    return Table(f"{slope} {number(portrait.layer)} rad/s wide to either side", heads, rows)
