@@ -18,6 +18,7 @@ from wristctl.simulation.worlds import World
 from wristctl.stability.linearise import LinearLoop
 from wristctl.stability.sampled_loop import Complex, Mode
 from wristctl.stability.smooth_loop import FrictionReading
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _SHARE = 0.3
 """Of a stepper's acceleration, from which its profile's lag of v/(2 a) turns a swing by 0.15 rad and more."""
@@ -94,7 +95,7 @@ def linearity_limits(
         acceleration = _SHARE * loop.actuator.step_length * world.actuator.step_acceleration
         most = _over(acceleration, swing.motor(2))
         found += [LinearityLimit("the stepper's acceleration", True, most, "where it is told to be after a period")]
-        found += _friction(world, friction)
+        found += [*_friction(world, friction), _slack(world, swing.linear)]
     if loop.limits:
         left = wrist.tension_limit - max(swing.linear.tensions)
         most = _over(left, swing.of(tension_plus=1.0, tension_minus=-1.0))
@@ -121,6 +122,13 @@ def _passing(loop: Loop) -> list[str]:
 def _over(most: float, each: float) -> float:
     """Up to which swing a signal stays below its most; inf where it does not swing along."""
     return math.inf if each == 0.0 else most / each
+
+
+def _slack(world: World, linear: LinearLoop) -> LinearityLimit:
+    """The side that pulls least is let go by a turn that takes up its stretch, its spool standing still."""
+    stiffness = TENDONS_PER_SIDE * world.actuator.tendon_stiffness
+    swing = TENDONS_PER_SIDE * min(linear.tensions) / (stiffness * world.plant.tendon_offset)
+    return LinearityLimit("a slack tendon", True, swing, "both sides taut")
 
 
 def _friction(world: World, reading: FrictionReading) -> list[LinearityLimit]:
