@@ -16,6 +16,7 @@ from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linear
 from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.identifiability import (
     ADDITIONS,
+    FINER,
     Addition,
     additions,
     budget,
@@ -162,7 +163,7 @@ def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> Non
     assert fitted.values["stiffness"] == pytest.approx(truth["stiffness"], rel=0.03)
     moved = budget(fitted, knowledge(fitted))
     leaves = {f"1 % more {what}": leaf for what, leaf in BELIEVED.items()} | {"a base that leans by 1 deg": "gravity"}
-    assert set(moved) == set(leaves)
+    assert set(moved) == {*leaves, FINER}
     for name, leaf in leaves.items():
         changed = []
         for each in trials:
@@ -175,6 +176,9 @@ def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> Non
         for at_, free in enumerate(fitted.problem.free):
             step = again.x[at_] - fitted.x[at_]
             assert moved[name][free] == pytest.approx(step, rel=0.2, abs=2e-4), (name, free)
+    again = fit(Problem(trials, START, settings.model_copy(update={"segments": 8}), TENDONS))
+    step = again.x[0] - fitted.x[0]
+    assert moved[FINER]["stiffness"] == pytest.approx(step, rel=0.3) and abs(step) > 1e-4
 
 
 def test_added_trials_are_reckoned_at_the_start_of_what_is_not_known() -> None:

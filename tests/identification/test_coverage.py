@@ -12,7 +12,7 @@ from tests.identification.benches import logged, problem
 from wristctl.config.errors import UserError
 from wristctl.config.plant import TendonFacts, TrueWrist
 from wristctl.identification.fit import fit
-from wristctl.identification.identifiability import not_identified
+from wristctl.identification.identifiability import FINER, budget, not_identified
 from wristctl.identification.intervals import interval, knowledge
 from wristctl.identification.lack_of_fit import misfits, refuse_misfit, suspicions, widened
 
@@ -59,7 +59,7 @@ def outcome(seed: int, bench: Bench) -> Outcome:
         refuse_misfit(fitted, known, suspected, misfits(fitted))
     except UserError as told:
         refused = str(told)
-    known = widened(known, suspected)
+    known = widened(known, suspected, budget(fitted, known)[FINER])
     ends = {name: interval(fitted, known, name) for name in fitted.problem.free}
     holds = {name: bool(low <= truth[name] <= high) for name, (low, high) in ends.items()}
     return Outcome(refused, list(not_identified(fitted, known)), holds)

@@ -74,12 +74,14 @@ def test_a_cause_is_named_first_and_its_size_estimated(more: dict[str, Any], cau
 def test_an_evident_cause_widens_intervals_by_what_it_would_move(sound: Found) -> None:
     fitted, known, _, _ = sound
     shifts = {name: 0.5 * float(half) for name, half in zip(fitted.problem.free, known.half_widths, strict=False)}
+    count, nothing = len(shifts), dict.fromkeys(shifts, 0.0)
     chance, evident = (Suspicion("springs that creep", size, 1.0, shifts) for size in (3.0, 5.0))
-    assert np.array_equal(widened(known, [chance]).deviation, known.deviation)
-    count = len(shifts)
-    wider = widened(known, [evident]).deviation
+    assert np.array_equal(widened(known, [chance], nothing).deviation, known.deviation)
+    wider = widened(known, [evident], nothing).deviation
     np.testing.assert_allclose(wider[:count], np.hypot(known.deviation[:count], list(shifts.values())))
     np.testing.assert_array_equal(wider[count:], known.deviation[count:])
+    finer = widened(known, [], shifts).deviation
+    np.testing.assert_allclose(finer[:count], np.hypot(known.deviation[:count], 0.7 * np.array(list(shifts.values()))))
     against = Suspicion("springs that creep", -9.0, 1.0, shifts)
     assert not against.evident and Suspicion("more damping toward flexion", -9.0, 1.0, shifts).evident
 

@@ -174,17 +174,21 @@ KNOWN: dict[str, Callable[[SupposedWrist], SupposedWrist]] = {
     "a base that leans by 1 deg": _turned,
 }
 """What identification takes as known, changed to see what depends on it."""
+FINER = "8 segments in place of the model's"
+"""As how finely it bends is taken as known too."""
+_FINER = 8
 
 
 def budget(fit: Fit, known: Knowledge) -> dict[str, dict[str, float]]:
-    """By how much each free coordinate would move if one of KNOWN were so, as believed: to first order."""
+    """By how much each free coordinate would move if one of KNOWN, or FINER, were so, as believed: to first order."""
     problem, weights = fit.problem, 1.0 / fit.noise**2
-    push = {name: np.zeros(len(fit.x)) for name in KNOWN}
+    push = {name: np.zeros(len(fit.x)) for name in (*KNOWN, FINER)}
     for trial, slopes in zip(problem.trials, fit.slopes, strict=True):
         own = problem.candidate(trial, fit.x)
-        course = problem.simulate(trial, [own, *(change(own) for change in KNOWN.values())])
+        course = [*problem.simulate(trial, [own, *(change(own) for change in KNOWN.values())])]
+        course += [*problem.simulate(trial, [own], _FINER)]
         expected, *others = (trial.shown(each, fit.values["delay"]) for each in course)
-        for name, other in zip(KNOWN, others, strict=True):
+        for name, other in zip(push, others, strict=True):
             push[name] += weights * slopes.T @ (other - expected)
     bread = inverse(known.information)
     shifts = {name: -bread @ each for name, each in push.items()}

@@ -29,6 +29,9 @@ from wristctl.lanes.cores import cores
 EVIDENT = 3.5
 """Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""
 
+_UNSURE = 0.7
+"""Standard deviation of how far a wrist is on the way from the model's segments to a finer bend: nothing is known."""
+
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 
 
@@ -164,13 +167,13 @@ def misfits(fit: Fit) -> list[Misfit]:
     ]
 
 
-def widened(known: Knowledge, suspected: list[Suspicion]) -> Knowledge:
-    """The knowledge with deviations that count what an evident cause would move as one more of them."""
-    deviation = known.deviation.copy()
-    for each in suspected:
-        if each.evident:
-            count = len(each.shifts)
-            deviation[:count] = np.hypot(deviation[:count], list(each.shifts.values()))
+def widened(known: Knowledge, suspected: list[Suspicion], finer: Mapping[str, float]) -> Knowledge:
+    """The knowledge with deviations that count what else is behind them: what an evident cause would move, and how
+    finely the wrist bends, which trials hardly tell: by most of what a `finer` bend would move."""
+    deviation, count = known.deviation.copy(), len(finer)
+    systematic = [np.array(list(each.shifts.values())) for each in suspected if each.evident]
+    for shift in (*systematic, _UNSURE * np.array(list(finer.values()))):
+        deviation[:count] = np.hypot(deviation[:count], shift)
     return replace(known, deviation=deviation)
 
 

@@ -70,7 +70,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 def identify(session: Session) -> Identified:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals."""
     from wristctl.identification.fit import fit
-    from wristctl.identification.identifiability import additions, budget, not_identified, refuse
+    from wristctl.identification.identifiability import FINER, additions, budget, not_identified, refuse
     from wristctl.identification.identified import identified_yaml
     from wristctl.identification.intervals import knowledge
     from wristctl.identification.lack_of_fit import misfits, refuse_misfit, suspicions, widened
@@ -82,10 +82,10 @@ def identify(session: Session) -> Identified:
     with session.progress("compiling and searching"):
         found = fit(problem)
         sure, suspected, missed = knowledge(found), suspicions(found), misfits(found)
-        known = widened(sure, suspected)
+        moved = budget(found, sure)
+        known = widened(sure, suspected, moved[FINER])
         lacking = not_identified(found, known)
         offered = additions(found, lacking) if lacking else []
-        moved = budget(found, known)
     findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments)
     tables = [
         parameters(findings, found, known, lacking), fit_table(findings, found, known), residual_table(missed),
