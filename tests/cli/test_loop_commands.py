@@ -44,6 +44,19 @@ def test_simulate_leaves_a_trajectory_metrics_and_pictures(call: Call) -> None:
     assert drawn == {f"{name}.{kind}" for name in ("angle", "error", "tensions", "motion") for kind in ("png", "svg")}
 
 
+def test_analyse_takes_the_loop_of_simulate_and_begins_with_its_margins(call: Call) -> None:
+    typed = ("--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}", "--over", "Kp")
+    code, out, _ = call("analyse", *typed, "--set", "loop.control_period=2e-3", "--set", "angles_deg=[20.0]")
+    run = open_run("latest:analyse")
+    assert code == 0 and out.startswith("pid/given is stable at 20 deg: gain margin ")
+    assert run.config.simulate.loop.control_period == 2e-3 and run.config.analyse.over == "Kp"
+    delay = run.metrics["delay_margin"]
+    assert 5e-3 < delay["value"] < 15e-3 and delay["unit"] == "s"
+    config = str(run.path / "config.yaml")
+    assert call("analyse", "-c", config)[0] == 0 and open_run("latest:analyse").result_hash == run.result_hash
+    assert call("analyse", "--gains", "exchanged", "-q", "--set", "angles_deg=[0.0]", "--set", "horizon=0.1")[0] == 3
+
+
 @pytest.fixture(scope="module")
 def tuning(made: Callable[..., Path]) -> Path:
     """A folder with a tune run."""
@@ -74,6 +87,9 @@ def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     compared = open_run("latest:compare")
     assert [entry["run"] for entry in compared.manifest.model_dump()["inputs"]] == [tuned.id]
     assert call("simulate", "--gains", "tuned", "--tuned", tuned.id, "--set", "horizon=0.5")[0] == 0
+    call("analyse", "--gains", "tuned", "--tuned", "latest:tune", "--set", "horizon=0.5")
+    analysed = open_run(max(Path("results").glob("*-analyse-*")))
+    assert [each.run for each in analysed.manifest.inputs] == [tuned.id] == [analysed.config.simulate.tuned]
 
 
 def test_compare_has_a_row_for_every_combination_and_the_papers_numbers_beside(comparison: Path) -> None:
@@ -108,6 +124,11 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> 
         (("simulate", "--set", "reference.inverse=network"), "--network RUN"),
         (("simulate", "--set", "start=equilibrium", "--set", "wrist.hand_mass=0.9"), "the wrist buckles"),
         (("simulate", "--tuned", "nowhere"), "nowhere"),
+        (("analyse", "--controller", "pid", "--gains", "printed", "--over", "Kx"), "one of Kd, Ki, Kp, loop"),
+        (("analyse", "--controller", "scm"), "did you mean 'smc'?"),
+        (("analyse", "--set", "angels_deg=[1.0]"), "did you mean 'angles_deg'?"),
+        (("analyse", "--set", "horizn=1.0"), "did you mean 'horizon'?"),
+        (("analyse", "--gains", "initial", "--set", "wrist.tension_limit=3.0"), "in a tendon that bears 3"),
         (("tune", "--set", "controllers=[feedforward]"), "no gains to tune"),
         (("tune", "--set", "scenarios=[{loop: defalt}]"), "did you mean 'default'?"),
         (("compare", "--set", "rows=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
@@ -123,14 +144,18 @@ def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
     assert all(run.state == "failed" for run in list_runs(Path("results")))
 
 
-@pytest.mark.parametrize("command", ["simulate", "compare", "hw-run"])
+@pytest.mark.parametrize("command", ["simulate", "analyse", "compare", "hw-run"])
 def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call: Call, tmp_path: Path, command: str) -> None:
-    rows = ("--gains", "tuned") if command == "simulate" else ("--set", "rows=[{controller: smc, gains: tuned}]")
+    rows = (
+        ("--gains", "tuned")
+        if command in ("simulate", "analyse")
+        else ("--set", "rows=[{controller: smc, gains: tuned}]")
+    )
     code, _, err = call(command, *rows)
     assert code == 2 and "no tuned gains of smc" in err and "--tuned RUN" in err and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("command", ["simulate", "tune", "compare"])
+@pytest.mark.parametrize("command", ["simulate", "analyse", "tune", "compare"])
 def test_a_dry_run_writes_nothing(call: Call, tmp_path: Path, command: str) -> None:
     code, out, _ = call(command, "--dry-run")
     assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())

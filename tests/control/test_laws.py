@@ -75,6 +75,30 @@ def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float],
     assert p1 * rate + p2 * (u - load) / inertia == pytest.approx(-p3 * np.tanh(sigma), rel=1e-9, abs=1e-8 * p3)
 
 
+@pytest.mark.parametrize(("name", "switching"), [("smc", "P3"), ("smc-tracking", "k"), ("super-twisting", "k1")])
+def test_a_sliding_law_switches_on_the_surface_that_it_states(name: str, switching: str) -> None:
+    """On it the gain of the switching term does not matter; at the layer's end that term is well below its line."""
+    law = controller(name)
+    assert law.surface is not None
+    gains = {each.removesuffix("_"): 3.0 for each in law.gains} | {"phi": 0.4, "tau": 0.3, "k1": 2.0, "k2": 1e-9}
+    gains = {each: gains[each] for each in law.gains}
+    (a, b, c), layer = law.surface.weights(gains), law.surface.layer(gains)
+    error, period, memory = 0.2, 1e-3, np.full(max(law.memory, 1), 0.05 if c else 0.0)
+
+    def wanted(sigma: float, factor: float) -> float:
+        rate = (sigma - a * error - c * (memory[0] + period * error)) / b
+        values = law.values(gains | {switching: factor * gains[switching]})
+        now = {"theta": 0.3 + error, "rate": rate, "theta_ref": 0.3, "torque_low": -1e3, "torque_high": 1e3}
+        return torque(name, values, memory.copy(), period=period, **now)
+
+    assert wanted(0.0, 1.0) == pytest.approx(wanted(0.0, 2.0), rel=1e-9)
+
+    small = 1e-4 * layer
+    slope = (wanted(small, 1.0) - wanted(small, 1e-9)) / small
+    share = (wanted(layer, 1.0) - wanted(layer, 1e-9)) / (slope * layer)
+    assert slope < 0.0 and 0.7 < share < 0.9 and wanted(1.0, 1.0) != pytest.approx(wanted(1.0, 2.0))
+
+
 @settings(max_examples=80)
 @given(state)
 def test_computed_torque_gives_the_linear_error_equation(at: tuple[float, float, float]) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
@@ -15,6 +17,13 @@ from wristctl.stability.linearise import LinearLoop
 from wristctl.stability.loop_analysis import AnalysedRow
 from wristctl.stability.sampled_loop import LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread() -> Iterator[None]:
+    """Small matrices: more threads are slower."""
+    with threadpool_limits(limits=1):
+        yield
+
 
 LAGGED, TENDON = Actuator(level="lagged"), Actuator(level="tendon")
 CAMERA = Sensor(level="camera", noise_deg=0.0, dropped=0.0)

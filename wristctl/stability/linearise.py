@@ -16,7 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.simulation.kernel import RECORDED
 from wristctl.stability.hold import HOLD
-from wristctl.stability.loop_ticks import SMALL, LoopTicks, TickSlopes
+from wristctl.stability.loop_ticks import LoopTicks, TickSlopes
 from wristctl.stability.resting_point import RestingPoint, resting_point, with_relaxed_bristles
 from wristctl.stability.sampled_loop import LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading, smooth
@@ -111,7 +111,7 @@ def _alone(held: TickSlopes) -> LinearTick:
 def _bend(ticks: LoopTicks, point: RestingPoint) -> float:
     """By how much of its size the torque's slope changes over a hundred times the small change."""
     at, worst = _OUTPUTS["torque_wanted"], 0.0
-    for near, far in zip(point.ticks, ticks.slopes(point.state, 100.0 * SMALL), strict=True):
+    for near, far in zip(point.ticks, ticks.slopes(point.state, 100.0), strict=True):
         size = float(np.abs(near.outputs[at] * ticks.sizes).max())
         if size > 0.0:
             worst = max(worst, float(np.abs((far.outputs[at] - near.outputs[at]) * ticks.sizes).max()) / size)

@@ -25,8 +25,9 @@ from wristctl.stability.smooth_loop import cycle_of
 from wristctl.stability.state_rows import Remembered, StatePart, read_state, state_parts, write_state
 from wristctl.wrist.plant import kernel_of
 
-SMALL = 1e-6
-"""Difference quotients are over so many times a variable's typical size, to both sides."""
+SMALL, SMALLER = 1e-6, 1e-8
+"""Difference quotients are over so many times a variable's typical size, to both sides; the smaller with bristles,
+which turn round within 20 um."""
 _WARM_UP = 200
 """Ticks before the first guess of a resting point."""
 _LONGEST_MEMORY = 200
@@ -109,12 +110,13 @@ class LoopTicks:
             self._run(begin, end)
             self.guesses.append(self._states(end)[-1])
 
-    def slopes(self, state: Array, small: float = SMALL) -> list[TickSlopes]:
-        """Each tick of a cycle, taken from the same state (x,), differentiated over `small` typical sizes.
+    def slopes(self, state: Array, times: float = 1.0) -> list[TickSlopes]:
+        """Each tick of a cycle, taken from the same state (x,), differentiated over so many times a small change.
 
         Ticks at which no frame is taken or arrives are all the same one.
         """
         frames, between = self._batch.course.schedule, None
+        small = times * (SMALLER if "bristle" in self.names else SMALL)
         found = []
         for tick in range(self._first, self._first + self.cycle):
             plain = frames is None or (tick not in frames.captures and tick not in frames.arrivals)

@@ -11,7 +11,7 @@ from wristctl.arrays import Array
 from wristctl.stability.margins import NEUTRAL
 from wristctl.stability.sampled_loop import SampledLoop
 
-_DECAYED, _LONGEST, _SAMPLES = 1e-4, 60.0, 20_000
+_DECAYED, _LONGEST, _SAMPLES = 1e-5, 60.0, 20_000
 _SLOW = 30.0 * NEUTRAL
 """Decay [1/s] of what does not end within the longest time [s]: it is left out of how long to look."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from wristctl.report.printed_table import Table, number
 
 if TYPE_CHECKING:
+    from wristctl.stability.linear_range import LinearityLimit
     from wristctl.stability.loop_analysis import LoopAnalysis
     from wristctl.stability.margins import Crossing
     from wristctl.stability.phase_portrait import PhasePortrait
@@ -20,6 +21,10 @@ CUTS = {
     "camera": "the camera's frames",
 }
 """Where the loop is cut, by the sensor's level: the same loop on both sides of motors and wrist."""
+
+
+NOISE = "the camera's noise"
+"""The limit of linearity that only adds to a swing."""
 
 
 def decibels(factor: float) -> float:
@@ -52,6 +57,7 @@ def answer(label: str, found: Sequence[LoopAnalysis], angles: Sequence[float]) -
     parts += [
         f"largest sensitivity {_three(sensitivity)}",
         f"a step settles in {_time(step.settling)} with {_three(100.0 * step.overshoot)} % overshoot",
+        *_linear_range(found[-1]),
     ]
     return f"{label} is stable at {listed(angles)}: {', '.join(parts)}"
 
@@ -71,6 +77,21 @@ def _times(limit: Crossing) -> str:
 def _delay_margin(found: Sequence[LoopAnalysis]) -> str:
     least = min((each.margins for each in found), key=lambda each: each.delay)
     return "no delay is too long" if math.isinf(least.delay) else f"delay margin {_time(least.delay)}"
+
+
+def _linear_range(found: LoopAnalysis) -> list[str]:
+    """For which swings that holds; noise only adds to them."""
+    known = [each for each in found.limits if math.isfinite(each.swing) and each.what != NOISE]
+    low = max((each for each in known if not each.above), key=lambda each: each.swing, default=None)
+    high = min((each for each in known if each.above), key=lambda each: each.swing, default=None)
+    ends = [_end(each, "above" if each is low else "below") for each in (low, high) if each is not None]
+    if low is not None and high is not None and low.swing >= high.swing:
+        return [f"and yet no swing is linear, which it would be {' and '.join(ends)}"]
+    return [f"for swings {' and '.join(ends)}"] if ends else []
+
+
+def _end(limit: LinearityLimit, side: str) -> str:
+    return f"{side} {_three(math.degrees(limit.swing))} deg ({limit.what})"
 
 
 def _mended(worst: LoopAnalysis) -> str:

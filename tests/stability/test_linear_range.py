@@ -1,0 +1,98 @@
+"""Which swings a linearisation says nothing about."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.stability.conftest import CAMERA, LAGGED, PID, TENDON, row
+from wristctl.config.loop import Loop
+from wristctl.config.plant import Disturbances, Plant, Push, Sensor, TrueActuator
+from wristctl.stability.linear_range import LinearityLimit
+from wristctl.stability.loop_analysis import AnalysedRow
+
+BEHIND = Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA)
+
+
+def _limits(own: AnalysedRow, degrees: float = 0.0) -> dict[str, LinearityLimit]:
+    found = own.analysed(math.radians(degrees))
+    assert found is not None
+    return {each.what: each for each in found.limits}
+
+
+def _with(loop: Loop, **plant: object) -> Loop:
+    return loop.model_copy(update={"plant": Plant.model_validate(plant)})
+
+
+def test_saturation_is_felt_where_a_swing_uses_up_the_tension_that_is_left() -> None:
+    """At its margin, half the control rate, a PD loop's torque is its derivative's: Kd |rate|."""
+    own = row("pid", PID, Loop())
+    found, linear = _limits(own)["saturation"], own.linear(0.0)
+    assert linear is not None
+    (tick,) = linear.closed.ticks
+    state = linear.closed.modes(own.analysed(0.0).margins.most.value)[0].states[0]  # type: ignore[union-attr]
+    torque = abs((tick.outputs["torque_wanted"] @ state) / (tick.outputs["theta"] @ state))
+    left = (own.wrist.tension_limit - own.wrist.pretension) * 2.0 * own.wrist.tendon_offset
+    assert found.above and found.swing == pytest.approx(left / torque, rel=1e-5)
+    assert "saturation" not in _limits(row("pid", PID, Loop(limits=False)))
+    assert _limits(own, 30.0)["saturation"].swing < found.swing
+
+
+def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
+    gains = {"lambda": 20.0, "kappa": 250.0, "k": 100.0, "phi": 10.0}
+    narrow, wide = (_limits(row("smc-tracking", gains | {"phi": phi}, BEHIND)) for phi in (1.0, 10.0))
+    name = "the boundary layer's end"
+    assert wide[name].above and wide[name].swing == pytest.approx(10.0 * narrow[name].swing, rel=1e-4)
+    assert name not in _limits(row("computed-torque", "default", BEHIND))
+
+
+def test_limits_of_motors_scale_with_what_the_motors_are() -> None:
+    gains = "stepper"
+    plain = _limits(row("smc-tracking", gains, BEHIND))
+    fine = _limits(
+        row("smc-tracking", gains, BEHIND.model_copy(update={"actuator": TENDON.model_copy(update={"microstep": 32})}))
+    )
+    assert fine["a motor's microstep"].swing == pytest.approx(0.5 * plain["a motor's microstep"].swing, rel=1e-6)
+    assert fine["the stepper's acceleration"].swing == pytest.approx(0.5 * plain["the stepper's acceleration"].swing)
+    slow = _limits(row("smc-tracking", gains, _with(BEHIND, actuator={"step_acceleration": "x0.25"})))
+    assert slow["the stepper's acceleration"].swing == pytest.approx(0.25 * plain["the stepper's acceleration"].swing)
+    assert slow["a motor's speed"].swing == pytest.approx(plain["a motor's speed"].swing)
+    assert plain["a motor's microstep"].above is False and plain["the stepper's acceleration"].above
+
+
+def test_a_tendon_goes_slack_where_a_turn_takes_up_its_stretch() -> None:
+    own = row("smc-tracking", "stepper", BEHIND)
+    stretch = own.wrist.pretension / TENDON.tendon_stiffness
+    assert _limits(own)["a slack tendon"].swing == pytest.approx(stretch / own.wrist.tendon_offset, rel=1e-6)
+
+
+def test_friction_is_read_one_way_and_felt_the_other() -> None:
+    turned = TENDON.presliding / row("pid", PID, BEHIND).wrist.tendon_offset
+    sliding, stuck = (_limits(row("smc-tracking", "stepper", BEHIND, each)) for each in ("slipping", "stuck"))
+    assert (sliding["friction that sticks"].above, stuck["friction that slips"].above) == (False, True)
+    assert sliding["friction that sticks"].swing == stuck["friction that slips"].swing == pytest.approx(turned)
+    smooth = BEHIND.model_copy(update={"actuator": TENDON.model_copy(update={"friction": 0.0})})
+    assert not any("friction" in each for each in _limits(row("smc-tracking", "stepper", smooth)))
+
+
+def test_what_happens_at_times_is_listed_as_left_out() -> None:
+    loop = _with(BEHIND, end_stop_deg=40.0, actuator={"backlash": 1e-4, "torque": 0.4, "broken_at": 1.0})
+    loop = loop.model_copy(
+        update={"disturbances": Disturbances(push=Push(force=1.0)), "sensor": Sensor(level="camera")}
+    )
+    found = _limits(row("smc-tracking", "stepper", loop), 10.0)
+    assert found["the end stops"].swing == pytest.approx(math.radians(30.0))
+    assert found["backlash"].swing == pytest.approx(1e-4 / row("pid", PID, loop).wrist.tendon_offset)
+    assert math.degrees(found["the camera's noise"].swing) == pytest.approx(0.1)
+    for name in ("a person's push", "a tendon that breaks", "a motor that stalls"):
+        assert found[name].read_as == "left out" and math.isnan(found[name].swing)
+    assert "a spool that slips" not in found
+    assert not TrueActuator().backlash and "backlash" not in _limits(row("smc-tracking", "stepper", BEHIND))
+
+
+def test_lagged_motors_have_steps_and_a_speed() -> None:
+    found = _limits(row("computed-torque", "default", Loop(actuator=LAGGED)))
+    assert {"a motor's microstep", "a motor's speed", "saturation"} == set(found)
+    assert np.isfinite([each.swing for each in found.values()]).all()

@@ -1,0 +1,45 @@
+"""The simulated loop begins to oscillate where its linearisation says; docs/loop_analysis.py tries all of it."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.fixture(scope="module")
+def measured() -> ModuleType:
+    """docs/loop_analysis.py"""
+    spec = importlib.util.spec_from_file_location("loop_analysis_of_docs", DOCS / "loop_analysis.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look for their module there
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_a_loop_rests_within_its_margins_and_swings_beyond(measured: ModuleType, number: int) -> None:
+    """An ideal loop, and one with lagged motors behind a camera, 15 % on either side; delays by whole periods."""
+    judged = measured.ROWS[number]
+    found, still, period = judged.row.analysed(0.0), measured.STILL, judged.loop.control_period
+    assert found is not None and found.margins.stable
+    factors = found.margins.most.value * np.array([0.85, 1.15])
+    rests, swings = measured.swings(judged, 1.0, factors, np.zeros(2))
+    assert rests <= still < swings
+    ticks = np.array([np.floor(found.margins.delay / period * 0.95), np.ceil(found.margins.delay / period * 1.05)])
+    rests, swings = measured.swings(judged, 1.0, np.ones(2), ticks * period)
+    assert rests <= still < swings
+
+
+def test_the_page_is_of_the_rows_that_the_script_has(measured: ModuleType) -> None:
+    page = (DOCS / "loop_analysis.md").read_text(encoding="utf-8")
+    for each in measured.ROWS:
+        assert each.label.replace(" | ", ", ") in page
+    assert "| **" in page and "images/loop-analysis.png" in page and (DOCS / "images/loop-analysis.png").is_file()

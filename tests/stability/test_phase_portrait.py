@@ -1,0 +1,33 @@
+"""The sliding laws' surfaces, and how loops come to them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.stability.conftest import row
+from wristctl.config.loop import Loop
+from wristctl.control.table import CONTROLLERS
+from wristctl.simulation.draws import Draws
+from wristctl.stability.phase_portrait import phase_portrait
+
+SLIDING = [name for name in CONTROLLERS if CONTROLLERS[name].surface is not None]
+
+
+def test_the_sliding_laws_say_what_their_surface_is() -> None:
+    assert SLIDING == ["smc", "smc-tracking", "super-twisting"]
+
+
+@pytest.mark.parametrize("name", SLIDING)
+def test_courses_come_into_the_layer_and_end_at_rest(name: str) -> None:
+    own = row(name, {"smc": "stepper"}.get(name, "default"), Loop())
+    theta = math.radians(15.0)
+    found = phase_portrait(own.law, own.gains, own.loop, own.wrist, theta, 1.5, Draws(0))
+    assert found is not None and len(found.courses) == 4
+    assert [np.degrees(each.error[0]) for each in found.courses] == pytest.approx([-20.0, -10.0, 10.0, 20.0], abs=0.1)
+    for each in found.courses:
+        assert 0.0 <= each.reached < 0.5 and abs(each.error[-1]) < math.radians(0.2)
+        late = each.time >= each.reached
+        assert np.abs(each.sigma[late]).max() <= own.law.surface.layer(own.gains)  # type: ignore[union-attr]
