@@ -15,8 +15,11 @@ from wristctl.config.load import load_study
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records.formats import write_figure
+from wristctl.report.hysteresis_figures import loops as loops_by_speed
 from wristctl.report.loop_figures import errors
 from wristctl.report.wrist_drawing import directions
+from wristctl.simulation.hysteresis import loops
+from wristctl.simulation.strokes import strokes
 from wristctl.vision.annotate import annotate
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Tracker
@@ -63,8 +66,16 @@ def keep(name: str, figure: Figure) -> None:
     (HERE / "images" / f"{name}.svg").unlink()
 
 
+def hysteresis() -> None:
+    """Outer loops by sheath and speed, with the roots of the statics."""
+    study = load_study([HERE.parent / "experiments" / "hysteresis.yaml"], ["ranges_deg=[[0, 30]]"], "hysteresis")
+    own = strokes(study.wrist, study.hysteresis)
+    keep("hysteresis", loops_by_speed(own, loops(own)))
+
+
 def main() -> None:
     camera()
+    hysteresis()
     study = load_study([], [f"rows={ROWS}", "inverses=[none]"], "compare")
     results = compare(study)
     shown = ("smc/exchanged", "smc/initial", "pid/printed", "computed-torque/default")

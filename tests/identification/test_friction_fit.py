@@ -47,7 +47,8 @@ def test_intervals_hold_the_truth(what: Measured, capsys: pytest.CaptureFixture[
         with capsys.disabled():
             print(f"\n{what}: of {len(found)} loops ({refused} refused) intervals hold {told}")
         assert len(found) >= 80 and all(0.9 * len(found) <= each <= 0.99 * len(found) + 0.5 for each in told.values())
-    assert sum(told.values()) >= 3 * len(found) - 1
+    else:
+        assert sum(told.values()) >= 3 * len(found) - 1
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +85,10 @@ def test_the_exponent_is_told_best_where_its_error_is_least(wide: FrictionFit) -
         row = np.array([1.0, 0.0]) + (at - mean) * by
         return float(np.sqrt(row @ own @ row))
 
+    furthest = float(np.abs(wide.problem.measured[0]).max())
+    assert mean < bend <= furthest
     assert 2.0 * 1.959964 * deviation(bend) == pytest.approx(best.high - best.low, rel=1e-6)
-    assert deviation(bend) < min(deviation(bend + 0.01), deviation(bend - 0.01), deviation(mean))
+    assert deviation(bend) <= min(deviation(at) for at in np.linspace(0.0, furthest, 200)) * (1.0 + 1e-4)
     assert best.value == pytest.approx(wide.friction.value * (bend + wide.sheath.value), rel=1e-9)
 
 

@@ -77,6 +77,17 @@ def test_it_turns_where_what_drives_it_turns_whatever_trembles(tmp_path: Path) -
     np.testing.assert_allclose(other.time[other.turns], [5.0, 7.5], atol=0.15)
 
 
+def test_noise_in_pulls_that_drive_it_is_told_from_their_course(tmp_path: Path) -> None:
+    still = read(text_of(without("spool")), tmp_path)
+    noise = 0.03 * np.random.default_rng(0).standard_normal((2, len(TIME)))
+    rough = {
+        name: each + (noise[0] if "plus" in name else noise[1] if "minus" in name else 0.0)
+        for name, each in without("spool").items()
+    }
+    assert still.tremble < 2e-3 and read(text_of(rough), tmp_path).tremble == pytest.approx(0.03, rel=0.2)
+    assert read(text_of(COLUMNS), tmp_path).tremble == 0.0
+
+
 IN_UM = {name.replace("[mm]", "[um]"): each for name, each in COLUMNS.items()}
 STILL = {name: each if name == "time [s]" else 0.0 * each for name, each in COLUMNS.items()}
 ONE_WAY = {name: each if name == "time [s]" else each[:51].repeat(4)[:201] for name, each in COLUMNS.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,16 @@ def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(
     coarse = made_loop(CABLE, 3, SHORT._replace(rate=20.0, cycles=2.0)).loop
     wristctl.hysteresis(study(f"hysteresis.measured={written(coarse, tmp_path / 'coarse.csv')}"))
     assert any("leaps" in said and "sample more often" in said for said in caplog.messages)
+
+
+def test_pulls_that_tremble_are_warned_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    loop = made_loop(CABLE, 4, SHORT._replace(what="tensions")).loop
+    assert loop.tensions is not None
+    noise = 0.05 * np.random.default_rng(0).standard_normal(loop.tensions.shape)
+    for own, told in ((loop, False), (replace(loop, tensions=loop.tensions + noise), True)):
+        caplog.clear()
+        wristctl.hysteresis(study(f"hysteresis.measured={written(own, tmp_path / 'pulls.csv')}"))
+        assert any("tremble" in said for said in caplog.messages) == told
 
 
 def test_a_file_that_is_no_loop_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -31,9 +31,9 @@ class HysteresisSettings(Section):
     """Loops of every range, speed, friction, sheath and presliding, and the dead band at angles."""
 
     drive: Literal["spools", "tensions"] = choice(
-        "spools", "what is moved: spools' positions, or pulls at the spools; both as a wrist without friction needs"
+        "spools", "what moves the wrist, as it would without friction: positions of its spools, or pulls at them"
     )
-    shape: Literal["sine", "triangle"] = choice("sine", "course of that wrist's angle, from the range's low end")
+    shape: Literal["sine", "triangle"] = choice("sine", "of the way to and fro, from a range's low end")
     ranges_deg: tuple[tuple[float, float], ...] = quantity(
         ((0.0, 30.0), (10.0, 20.0), (14.0, 16.0)), "deg", "angles between which it goes: outer loop, then inner ones",
         min_length=1,
@@ -54,7 +54,7 @@ class HysteresisSettings(Section):
     segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "longest integration step", "as simulated", gt=0, le=5e-3)
     samples: int = choice(200, "samples kept of each cycle, a multiple of 4", ge=40, le=10_000, multiple_of=4)
-    measured: str | None = choice(None, "a measured loop (CSV, see docs/friction.md) to overlay and to fit")
+    measured: str | None = choice(None, "a measured loop (CSV, see docs/hysteresis.md) to overlay and to fit")
     known: KnownBeforehand = KnownBeforehand()
 
     @model_validator(mode="after")

@@ -106,10 +106,11 @@ class FrictionFit:
 
     @property
     def told_best(self) -> tuple[float, FrictionEstimate]:
-        """The bend [rad] at which the capstan's exponent is told best, and the exponent there."""
+        """The bend [rad] of the loop's at which the capstan's exponent is told best, and the exponent there."""
         own, by = self.covariance[:2, :2], self._friction_by
         both, spread = float((own @ by)[EXPONENT]), float(by @ own @ by)
-        further = max(-both / spread, -self.problem.bend)
+        furthest = float(np.abs(self.problem.measured[0]).max()) - self.problem.bend
+        further = min(max(-both / spread, -self.problem.bend), furthest)
         value = float(self.x[EXPONENT]) + self.friction.value * further
         half = NORMAL_95 * math.sqrt(max(0.0, own[EXPONENT, EXPONENT] + further * (2.0 * both + further * spread)))
         return self.problem.bend + further, FrictionEstimate(value, max(0.0, value - half), value + half)

@@ -35,6 +35,8 @@ _HEAD = re.compile(r"\s*(\w+)\s*\[\s*(\w+)\s*\]\s*")
 _FEWEST = 100
 _TREMBLE = 0.05
 """Share of its whole way that what drives a loop goes back by before that is a turn."""
+_MEDIAN = 0.6745
+"""Median of the absolute value of a normal variable, over its standard deviation."""
 _NOISE = 0.05
 """Share of the largest tension by which noise may take one below nothing."""
 _APART = 3.0
@@ -62,6 +64,15 @@ class MeasuredLoop:
         found = self.tensions if self.spools is None else self.spools
         assert found is not None
         return found
+
+    @property
+    def tremble(self) -> float:
+        """Standard deviation [N] of noise in pulls that drive it, by how far a sample lies beside its neighbours' mean;
+        0 where spools do."""
+        if not self.winch:
+            return 0.0
+        beside = np.abs(np.diff(self.drive, 2, axis=0)) / math.sqrt(6.0)
+        return float(np.median(beside)) / _MEDIAN
 
     @cached_property
     def turns(self) -> NDArray[np.int64]:
@@ -92,7 +103,7 @@ def read_loop(file: Path, wrist: WristParameters) -> MeasuredLoop:
     except (OSError, UnicodeDecodeError) as error:
         told = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
         raise UserError(
-            f"cannot read the measured loop: {told}", str(file), "a CSV file, see docs/friction.md"
+            f"cannot read the measured loop: {told}", str(file), "a CSV file, see docs/hysteresis.md"
         ) from error
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:

@@ -27,6 +27,9 @@ FITTED = {
 _COARSE = 0.25
 """Share of the presliding by which a loop may leap between two samples at its turns."""
 
+_TREMBLE = 0.01
+"""Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble."""
+
 
 def problem_of(study: Study) -> LoopProblem:
     """The study's measured loop. Raises UserError for a file that is none."""
@@ -54,6 +57,11 @@ def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
         fix = "sample more often, or turn more softly"
         told = "the loop leaps %.2g um between two samples at its turns, and presliding is some %.2g um: %s - fix: %s"
         log.warning(told, leap, path, "values may be off by more than their intervals", fix)
+    loop = found.problem.loop
+    if loop.winch and loop.tremble > _TREMBLE * found.exponent.value * float(loop.drive.mean()):
+        fix = "measure the spools' positions too, or hang weights"
+        told = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
+        log.warning(told, loop.tremble, fix)
     findings.plain("data/source.json", {"name": str(source), "sha256": sha256_of(source)})
     _write(findings, found)
     findings.figure("measured", measured, found)
