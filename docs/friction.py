@@ -22,10 +22,11 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.closed_loop import Repeated, repeat
+from wristctl.simulation.closed_loop import repeat
 from wristctl.simulation.draws import Draws
 from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.reference import motion
+from wristctl.simulation.repetitions import Repeated
 
 HERE = Path(__file__).parent
 WRIST, NOMINAL = WristParameters(), (5e-3, 20e3)

@@ -18,6 +18,7 @@ from wristctl.stability.loop_analysis import AnalysedRow
 from wristctl.stability.sampled_loop import LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading
 
+
 @pytest.fixture(autouse=True, scope="session")
 def one_thread() -> Iterator[None]:
     """Small matrices: more threads are slower."""
