@@ -9,12 +9,10 @@ warnings go to the logger "wristctl". What is wrong is a UserError that says wha
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from wristctl.config.errors import UserError
 from wristctl.config.load import load_study as _load_study
 from wristctl.config.study import Study
 from wristctl.records import Run
@@ -22,37 +20,20 @@ from wristctl.records import open_run as _open_run
 from wristctl.studies.analyse import ANALYSE, Analysed
 from wristctl.studies.audit import AUDIT, Audited
 from wristctl.studies.compare import COMPARE, Compared
-from wristctl.studies.counting import Watch, watched
+from wristctl.studies.counting import Watch
 from wristctl.studies.gen_data import GEN_DATA, Generated
 from wristctl.studies.hysteresis import HYSTERESIS, Hysteresis
 from wristctl.studies.identify import IDENTIFY, Identified
-from wristctl.studies.perform import perform, prepare, recording
-from wristctl.studies.procedure import Found, Procedure
+from wristctl.studies.in_python import RESULTS, Folder, Ref, carry_out, in_python
 from wristctl.studies.simulate import SIMULATE, Simulated
 from wristctl.studies.train import TRAIN, Trained
 from wristctl.studies.tune import TUNE, Tuned
-from wristctl.studies.unattended import Unattended
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Ref = str | Path | Run
-Folder = str | Path
-RESULTS = "results"
-"""Where runs are looked for when no folder is given."""
 
-
-@contextmanager
-def _in_python() -> Iterator[None]:
-    """Let errors speak of arguments and functions."""
-    try:
-        yield
-    except UserError as error:
-        error.in_python = True
-        raise
-
-
-@_in_python()
+@in_python()
 def load_study(file: str | Path | None = None, *overrides: str) -> Study:
     """The study of a YAML file, or of defaults only.
 
@@ -63,7 +44,7 @@ def load_study(file: str | Path | None = None, *overrides: str) -> Study:
     return _load_study([Path(file)] if file else [], list(overrides))
 
 
-@_in_python()
+@in_python()
 def gen_data(
     study: Study, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
@@ -76,10 +57,10 @@ def gen_data(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(GEN_DATA, study, {"run": run}, out, label, progress)
+    return carry_out(GEN_DATA, study, {"run": run}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def train(
     study: Study, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
@@ -94,10 +75,10 @@ def train(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress)
+    return carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def tune(
     study: Study, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
@@ -112,10 +93,10 @@ def tune(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress)
+    return carry_out(TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def compare(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
@@ -130,10 +111,10 @@ def compare(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
+    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def simulate(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
@@ -150,10 +131,10 @@ def simulate(
     figures)` is called as it goes on.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return _carry_out(SIMULATE, study, given, out, label, progress)
+    return carry_out(SIMULATE, study, given, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def analyse(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
@@ -167,10 +148,10 @@ def analyse(
     `progress(what, count, total, figures)` is called as it goes on.
     """
     inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return _carry_out(ANALYSE, study, inputs, out, label, progress)
+    return carry_out(ANALYSE, study, inputs, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def hysteresis(
     study: Study, *, out: Folder | None = None, label: str = "", progress: Watch | None = None
 ) -> Hysteresis:
@@ -183,10 +164,10 @@ def hysteresis(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(HYSTERESIS, study, {}, out, label, progress)
+    return carry_out(HYSTERESIS, study, {}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def identify(
     study: Study, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
@@ -200,10 +181,10 @@ def identify(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(IDENTIFY, study, {"runs": runs}, out, label, progress)
+    return carry_out(IDENTIFY, study, {"runs": runs}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def audit(
     study: Study, *, table1: Ref | Trained | None = None, selection: Ref | Trained | None = None,
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
@@ -217,10 +198,10 @@ def audit(
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return _carry_out(AUDIT, study, {"table1": table1, "selection": selection}, out, label, progress)
+    return carry_out(AUDIT, study, {"table1": table1, "selection": selection}, out, label, progress)
 
 
-@_in_python()
+@in_python()
 def runs(
     where: str | Sequence[str] = (), *, kind: str | None = None, label: str | None = None, state: str | None = None,
     tag: str | None = None, newer: str | None = None, older: str | None = None, sort: str = "started",
@@ -244,7 +225,7 @@ def runs(
     return pd.DataFrame(rows[::-1] if reverse else rows, columns=None if rows else own)
 
 
-@_in_python()
+@in_python()
 def open_run(ref: str | Path, out: Folder = RESULTS) -> Run:
     """The run directory that `ref` names: a path, an id in `out` or its beginning, or latest:<kind> (that ended ok).
 
@@ -252,16 +233,3 @@ def open_run(ref: str | Path, out: Folder = RESULTS) -> Run:
     UserError where there is none, more than one, or what is there is not a run.
     """
     return _open_run(ref, Path(out))
-
-
-def _carry_out(
-    procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
-    progress: Watch | None,
-) -> Found:  # fmt: skip
-    folder, show = Path(RESULTS if out is None else out), watched(progress)
-    prepared = prepare(procedure, study, folder, given)
-    prepared.plan()
-    if out is None:
-        return perform(prepared, None, show, Unattended())
-    with recording(prepared, folder, label, [f"wristctl.{procedure.kind.replace('-', '_')}()"]) as run:
-        return perform(prepared, run, show, Unattended())
