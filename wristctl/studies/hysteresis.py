@@ -148,11 +148,15 @@ def _write(findings: Findings, found: Hysteresis) -> None:
         findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
 
 
+_MOST = 60
+"""Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data."""
+
+
 def _tables(
     findings: Findings, driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase
 ) -> list[Table]:
     """The outer loops, under what they say in words, and the dead bands."""
-    first = driven[0].case
+    first, many = driven[0].case, len(driven) + len(bands) > _MOST
     outer = [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
     heads = ("friction", "sheath [rad]", "presliding [um]")
     loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]")
@@ -160,6 +164,7 @@ def _tables(
         (*_in_um(each.case.tendons), each.case.frequency, math.degrees(each.width), math.degrees(each.exact_width),
          *(1e3 * work for work in (each.friction_work, each.damped_work, each.raw_work)))
         for each in outer
+        if not many or each.case.tendons.presliding == main.presliding
     ]  # fmt: skip
     tables = [Table(_told(findings, outer, bands, main), (*heads, *loop_heads), rows)]
     if bands:
@@ -167,6 +172,7 @@ def _tables(
         rests = [
             (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid)
             for each in bands
+            if not many or each.tendons.presliding == main.presliding
         ]
         tables.append(Table("Where ramps leave the wrist", (*heads, *held), rests))
     return tables
