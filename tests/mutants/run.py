@@ -55,6 +55,7 @@ NEIGHBOURS = {
     ],
     "report": ["tests/report", "tests/cli/test_loop_commands.py"],
     "simulation": ["tests/simulation", "tests/newcomers/test_plants.py", "tests/comparison", "tests/tuning"],
+    "stability": ["tests/stability", "tests/studies/test_analyse.py"],
     "studies": ["tests/studies", "tests/cli"],
     "trial": ["tests/trial", "tests/cli/test_hw_run.py", "tests/cli/test_hw_run_stops.py"],
     "tuning": ["tests/tuning", "tests/cli/test_loop_commands.py"],

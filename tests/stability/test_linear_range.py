@@ -37,7 +37,9 @@ def test_saturation_is_felt_where_a_swing_uses_up_the_tension_that_is_left() -> 
     left = (own.wrist.tension_limit - own.wrist.pretension) * 2.0 * own.wrist.tendon_offset
     assert found.above and found.swing == pytest.approx(left / torque, rel=1e-5)
     assert "saturation" not in _limits(row("pid", PID, Loop(limits=False)))
-    assert _limits(own, 30.0)["saturation"].swing < found.swing
+    bent = own.linear(math.radians(30.0))
+    assert bent is not None and bent.tensions[0] > bent.tensions[1]
+    assert f"{own.wrist.tension_limit - bent.tensions[0]:.3g} N below" in _limits(own, 30.0)["saturation"].read_as
 
 
 def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
@@ -45,6 +47,10 @@ def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
     narrow, wide = (_limits(row("smc-tracking", gains | {"phi": phi}, BEHIND)) for phi in (1.0, 10.0))
     name = "the boundary layer's end"
     assert wide[name].above and wide[name].swing == pytest.approx(10.0 * narrow[name].swing, rel=1e-4)
+    found = row("smc-tracking", gains, BEHIND).analysed(0.0)
+    assert found is not None
+    omega = found.margins.most.omega
+    assert wide[name].swing == pytest.approx(10.0 / abs(20.0 + 250.0 / (1j * omega) + 1j * omega), rel=0.06)
     assert name not in _limits(row("computed-torque", "default", BEHIND))
 
 
@@ -60,6 +66,30 @@ def test_limits_of_motors_scale_with_what_the_motors_are() -> None:
     assert slow["the stepper's acceleration"].swing == pytest.approx(0.25 * plain["the stepper's acceleration"].swing)
     assert slow["a motor's speed"].swing == pytest.approx(plain["a motor's speed"].swing)
     assert plain["a motor's microstep"].above is False and plain["the stepper's acceleration"].above
+
+
+def test_a_microstep_swallows_what_makes_a_motor_swing_by_half_of_it() -> None:
+    """A lagged motor's pull is the torque over the arm, less by its lag."""
+    own = row("pid", {"Kp": 0.05, "Ki": 1.0, "Kd": 1e-4}, Loop(plant_segments=1, actuator=LAGGED))
+    found, linear = _limits(own)["a motor's microstep"], own.analysed(0.0)
+    assert linear is not None
+    (tick,) = linear.linear.closed.ticks
+    mode = linear.linear.closed.modes(linear.margins.most.value)[0]
+    torque = abs((tick.outputs["torque_wanted"] @ mode.states[0]) / (tick.outputs["theta"] @ mode.states[0]))
+    pull = 2.0 * LAGGED.tendon_stiffness * LAGGED.step_length
+    lag = math.hypot(1.0, 2.0 * math.pi * mode.frequency * LAGGED.lag)
+    assert found.swing == pytest.approx(0.5 * pull * lag * own.wrist.tendon_offset / torque, rel=0.03)
+
+
+def test_a_controller_sees_as_much_of_a_swing_whatever_stands_behind_its_motors() -> None:
+    """With pulleys of twice the size a loop begins to swing at half the gain, and its motors turn for it as before."""
+    limits = []
+    for pulley in ("x1", "x2"):
+        found = _limits(row("smc-tracking", "stepper", _with(BEHIND, actuator={"pulley_radius": pulley})))
+        limits.append(
+            [found[each].swing for each in ("saturation", "the stepper's acceleration", "a motor's microstep")]
+        )
+    assert limits[1] == pytest.approx(limits[0], rel=0.02)
 
 
 def test_a_tendon_goes_slack_where_a_turn_takes_up_its_stretch() -> None:

@@ -12,7 +12,7 @@ from tests.stability.conftest import CAMERA, LAGGED, PID, TENDON, linear, row
 from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.plant import Plant, TrueActuator, TrueSensor
+from wristctl.config.plant import Disturbances, Plant, Push, TrueActuator, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS
 from wristctl.simulation.batch import sample_period
@@ -120,6 +120,18 @@ def test_every_law_rests_and_its_open_loop_closes_again(name: str) -> None:
             tick, own = found.closed.ticks[0], np.eye(len(found.names))
             opened = tick.transition - np.outer(tick.into, tick.back)
             assert answer == pytest.approx(tick.back @ np.linalg.solve(each * own - opened, tick.into), rel=1e-6)
+
+
+def test_a_law_that_is_a_line_over_next_to_nothing_is_told_by_its_bend() -> None:
+    assert linear("smc", "printed", Loop()).bend > 0.1 > 1e-3 > linear("pid", PID, Loop()).bend
+
+
+def test_a_load_that_stays_is_held_and_a_push_that_passes_is_not_there() -> None:
+    loop = Loop(disturbances=Disturbances(load=0.5, push=Push(force=5.0)))
+    torque = [linear("pid", PID, each, 0.0).torque for each in (loop, Loop())]
+    assert torque[0] == pytest.approx(-0.5 * 0.5 * WRIST.length, rel=0.05) and torque[1] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_an_unstable_loop_is_found_where_it_rests() -> None:

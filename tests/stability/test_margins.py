@@ -159,6 +159,22 @@ def test_what_is_added_at_uneven_cuts_is_amplified_by_the_loop(seed: int) -> Non
     assert np.mean(seen) == pytest.approx(amplified, abs=5e-3)
 
 
+@pytest.mark.parametrize("name", ["integrator", "resonances, many crossings", "nearly marginal"])
+def test_a_loop_written_out_over_several_ticks_is_the_same_loop(name: str) -> None:
+    """Its modes turn further in a cycle than one can see at its end, and its cuts are as many as its ticks."""
+    _, loop = _open(name)
+    (tick,) = loop.ticks
+    long = SampledLoop(loop.period, [tick] * 4)
+    assert long.growth() == pytest.approx(loop.growth(), rel=1e-9) and not long.is_steady
+    ours, theirs = ([(m.growth, m.frequency) for m in each.modes() if m.growth > -100.0] for each in (long, loop))
+    np.testing.assert_allclose(sorted(ours), sorted(theirs), rtol=1e-6, atol=1e-6)
+    omega = np.array([0.3, 7.0, 40.0, 150.0])
+    np.testing.assert_allclose(long.response(omega), loop.response(omega), rtol=1e-6)
+    one, other = margins(loop), margins(long)
+    assert (other.most.value, other.delay) == pytest.approx((one.most.value, one.delay), rel=0.02)
+    assert other.sensitivity.value == pytest.approx(one.sensitivity.value, rel=1e-6)
+
+
 def test_a_sharp_resonance_between_the_decades_is_seen() -> None:
     sharp = control.c2d(control.ss(1.0 / (S * S + 2e-4 * S + 700.0)), PERIOD)
     loop = closed(np.array(sharp.A), np.array(sharp.B)[:, 0], np.array(sharp.C)[0], PERIOD)

@@ -16,6 +16,14 @@ from wristctl.stability.phase_portrait import phase_portrait
 SLIDING = [name for name in CONTROLLERS if CONTROLLERS[name].surface is not None]
 
 
+WEIGHTS: dict[str, tuple[str, str | None, str | None]] = {
+    "smc": ("P1", "P2", None),
+    "smc-tracking": ("lambda", None, "kappa"),
+    "super-twisting": ("lambda", None, None),
+}
+"""Gains by which each law's sigma weighs error, rate (None: by 1) and integral (None: not)."""
+
+
 def test_the_sliding_laws_say_what_their_surface_is() -> None:
     assert SLIDING == ["smc", "smc-tracking", "super-twisting"]
 
@@ -29,5 +37,10 @@ def test_courses_come_into_the_layer_and_end_at_rest(name: str) -> None:
     assert [np.degrees(each.error[0]) for each in found.courses] == pytest.approx([-20.0, -10.0, 10.0, 20.0], abs=0.1)
     for each in found.courses:
         assert 0.0 <= each.reached < 0.5 and abs(each.error[-1]) < math.radians(0.2)
+        a, b, c = WEIGHTS[name]
+        integral = np.cumsum(each.error) * 1e-3 * (own.gains[c] if c else 0.0)
+        sigma = own.gains[a] * each.error + (own.gains[b] if b else 1.0) * each.rate + integral
+        np.testing.assert_allclose(each.sigma, sigma)
+        assert found.slope == pytest.approx(own.gains[a] / (own.gains[b] if b else 1.0))
         late = each.time >= each.reached
         assert np.abs(each.sigma[late]).max() <= own.law.surface.layer(own.gains)  # type: ignore[union-attr]

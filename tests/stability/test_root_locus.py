@@ -31,6 +31,16 @@ def test_poles_of_an_integrator_go_along_the_axis_and_its_limit_is_known() -> No
     assert found.least == 0.0 and math.isnan(found.swings[0])
 
 
+def test_a_loop_that_needs_some_gain_has_a_lower_limit() -> None:
+    """z = 1.2 - k of an unstable plant: stable from k = 0.2, where it runs away, to 2.2."""
+
+    def at(factor: float) -> SampledLoop:
+        return closed(np.array([[1.2]]), np.array([factor]), np.array([1.0]), 0.1)
+
+    found = root_locus("k", at, 10.0)
+    assert (found.least, found.most) == pytest.approx((0.2, 2.2), rel=1e-3) and found.swings[0] == 0.0
+
+
 def test_over_the_loops_gain_the_limits_are_the_margins() -> None:
     own = row("pid", PID, Loop())
     found, linear = own.locus(THETA, "loop", 10.0), own.linear(THETA)

@@ -38,21 +38,32 @@ class LinearityLimit(NamedTuple):
 
 @dataclass(frozen=True)
 class Swing:
-    """A loop that swings with an amplitude of 1 rad, in one of its modes; None: it does not swing."""
+    """A loop that swings with an amplitude of 1 rad, in one of its modes; None: it does not swing.
+
+    Its gain is times a factor, by which what stands behind its motors is stronger (larger pulleys, say): what its
+    controller sees, and its motors count, is as without the factor.
+    """
 
     linear: LinearLoop
     mode: Mode | None
+    factor: float
 
-    def of(self, **weights: complex) -> float:
-        """The amplitude of a weighted sum of outputs; nan where nothing swings."""
-        return self._size(np.sum([weight * self._output(name) for name, weight in weights.items()], axis=0))
+    def angle(self, error: complex, rate: complex) -> float:
+        """The amplitude of a weighted sum of the angle and its rate; nan where nothing swings."""
+        return self._size(error * self._output("theta") + rate * self._output("rate"))
+
+    def tension(self) -> float:
+        """Of what is commanded of the two sides against each other [N]."""
+        commanded = self._size(self._output("tension_plus") - self._output("tension_minus"))
+        return commanded / (self.factor if self.linear.at_frames else 1.0)
 
     def motor(self, order: int = 0) -> float:
-        """Of what the motors of the two sides do against each other, or of its derivative [1/s^order]."""
+        """Of what the motors of the two sides count against each other, or of its derivative [1/s^order]."""
         sides = np.array(self.linear.names) == "motor"
         if self.mode is None:
             return math.nan
-        return self._size(self.mode.states[:, sides] @ np.array([1.0, -1.0], complex)) * abs(self.turning) ** order
+        both = self.mode.states[:, sides] @ np.array([1.0, -1.0], complex)
+        return self._size(both) / self.factor * abs(self.turning) ** order
 
     @property
     def turning(self) -> complex:
@@ -98,11 +109,11 @@ def linearity_limits(
         found += [*_friction(world, friction), _slack(world, swing.linear)]
     if loop.limits:
         left = wrist.tension_limit - max(swing.linear.tensions)
-        most = _over(left, swing.of(tension_plus=1.0, tension_minus=-1.0))
+        most = _over(left, swing.tension())
         found.append(LinearityLimit("saturation", True, most, f"none: tensions rest {left:.3g} N below their limit"))
     if surface is not None:
         error, rate, integral = surface.weights(gains)
-        sigma = swing.of(theta=error + (integral / swing.turning if swing.mode else 0.0), rate=rate)
+        sigma = swing.angle(error + (integral / swing.turning if swing.mode else 0.0), rate)
         most = _over(surface.layer(gains), sigma)
         found.append(LinearityLimit("the boundary layer's end", True, most, "the sliding term as inside the layer"))
     if loop.plant.end_stop_deg is not None:

@@ -40,6 +40,8 @@ class LinearLoop:
     tensions: tuple[float, float]
     names: Sequence[str]
     """What each of the closed loop's variables is."""
+    at_frames: bool
+    """Whether it is cut where frames are taken."""
     bend: float
     """By how much of its size the law's slope differs over a hundred times the small change."""
 
@@ -73,6 +75,7 @@ def linearise(
         torque=torque,
         tensions=(point.recorded("tension_plus"), point.recorded("tension_minus")),
         names=ticks.names,
+        at_frames=camera,
         bend=_bend(ticks, point),
     )
 

@@ -67,7 +67,7 @@ class AnalysedRow:
             found, omega = margins(linear.closed), frequencies(linear.closed)
             factor = found.most.value if found.stable and np.isfinite(found.most.value) else 1.0
             swings = [each for each in linear.closed.modes(factor) if each.frequency > 0.0]
-            swing = Swing(linear, swings[0] if swings else None)
+            swing = Swing(linear, swings[0] if swings else None, factor)
             limits = linearity_limits(swing, self.loop, self.wrist, self.friction, self.law.surface, self.gains)
             response, plant = linear.closed.response(omega), linear.plant.response(omega)
             return LoopAnalysis(linear, found, step_response(linear.closed), limits, omega, response, plant)

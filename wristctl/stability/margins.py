@@ -117,7 +117,7 @@ def crossings(loop: SampledLoop, omega: Array, response: Complex) -> tuple[list[
         Crossing(at, float(np.angle(-_at(loop, at))))
         for at in _zeros(omega, np.log(np.abs(response) + 1e-300), lambda at: math.log(abs(_at(loop, at)) + 1e-300))
     ]
-    end = len(omega) - loop.is_steady  # at half the rate rounding decides the sign of what is 0
+    end = len(omega) - 1  # at half the rate rounding decides the sign of what is 0
     turns = _zeros(omega[:end], response.imag[:end], lambda at: _at(loop, at).imag)
     turns += omega[end:].tolist()
     values = [(at, _at(loop, at).real) for at in turns]
@@ -173,45 +173,26 @@ def _stable_gains(
     loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing], stable: bool
 ) -> tuple[Crossing, Crossing]:
     """The factors between which the loop is stable: about 1, or, where it is not stable there, the nearest to it."""
-    at = sorted(crossed, key=lambda each: each.value)
-    edges = [0.0, *(each.value for each in at), math.inf]
-    between = [_between(low, high) for low, high in pairwise(edges)]
-    good = [poles.unstable(each) == 0 for each in between]
-    here = next(k for k in range(len(between)) if edges[k] <= 1.0 <= edges[k + 1])
-    if stable:
-        good[here] = True
-    if not any(good):
-        nothing = Crossing(math.nan, math.nan)
-        return nothing, nothing
-    chosen = min((k for k, each in enumerate(good) if each), key=lambda k: abs(k - here))
-    low = high = chosen
-    while low > 0 and good[low - 1]:
-        low -= 1
-    while high + 1 < len(good) and good[high + 1]:
-        high += 1
-    inside = 1.0 if stable else between[chosen]
-    least = Crossing(math.nan, 0.0) if low == 0 else _limit(loop, poles, at[low - 1], between[low - 1], inside)
-    most = Crossing(math.nan, math.inf) if high == len(at) else _limit(loop, poles, at[high], between[high + 1], inside)
+    tried = _tried([each.value for each in crossed], *_FACTORS)
+    good = [factor for factor in tried if poles.unstable(factor) == 0]
+    if not stable and not good:
+        return Crossing(math.nan, math.nan), Crossing(math.nan, math.nan)
+    inside = 1.0 if stable else min(good, key=lambda factor: abs(math.log(factor)))
+    above = next((factor for factor in tried if factor > inside and factor not in good), None)
+    below = next((factor for factor in reversed(tried) if factor < inside and factor not in good), None)
+    least = Crossing(math.nan, 0.0) if below is None else _gain_limit(loop, poles, crossed, inside, below)
+    most = Crossing(math.nan, math.inf) if above is None else _gain_limit(loop, poles, crossed, inside, above)
     return least, most
 
 
-def _between(low: float, high: float) -> float:
-    if low == 0.0:
-        return 0.5 * high if math.isfinite(high) else 1.0
-    return math.sqrt(low * high) if math.isfinite(high) else 2.0 * low
-
-
-def _limit(loop: SampledLoop, poles: PoleCount, crossing: Crossing, bad: float, good: float) -> Crossing:
-    """A limit near this crossing: the crossing itself in a loop of one rate, else by halving."""
+def _gain_limit(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing], good: float, bad: float) -> Crossing:
+    """Where it turns unstable between these factors: at a crossing, or, of a loop of several rates, close to one."""
+    limit = math.exp(_halved(lambda at: poles.unstable(math.exp(at)) == 0, math.log(good), math.log(bad)))
     if loop.is_steady:
-        return crossing
-    while abs(bad - good) > _EXACT * good:
-        middle = math.sqrt(bad * good)
-        bad, good = (bad, middle) if poles.unstable(middle) == 0 else (middle, good)
-    return Crossing(2.0 * math.pi * loop.modes(bad)[0].frequency, good)
-
-
-_EXACT = 1e-6
+        nearest = min(crossed, key=lambda each: abs(math.log(each.value / limit)), default=None)
+        if nearest is not None and abs(math.log(nearest.value / limit)) < _ALIKE:
+            return nearest
+    return Crossing(2.0 * math.pi * loop.modes(limit)[0].frequency, limit)
 
 
 def _delay(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing]) -> tuple[float, float]:
@@ -219,19 +200,39 @@ def _delay(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing]) -> 
 
     A crossing of a loop of one rate counts where one of the two whole ticks that follow makes it unstable.
     """
-    at, good = sorted(crossed, key=lambda each: each.delay), 0.0
-    for k, each in enumerate(at):
-        if loop.is_steady:
-            next_ = math.ceil(each.delay / loop.period)
-            if any(poles.unstable(1.0, loop.period * ticks) for ticks in (next_, next_ + 1)):
+    at = sorted(crossed, key=lambda each: each.delay)
+    if loop.is_steady:
+        for each in at:
+            whole = math.ceil(each.delay / loop.period)
+            if any(poles.unstable(1.0, loop.period * ticks) for ticks in (whole, whole + 1)):
                 return each.delay, each.omega
-            continue
-        bad = 0.5 * (each.delay + at[k + 1].delay) if k + 1 < len(at) else 1.1 * each.delay
-        if poles.unstable(1.0, bad) == 0:
-            good = bad
-            continue
-        while bad - good > _EXACT * bad:
-            middle = 0.5 * (bad + good)
-            bad, good = (bad, middle) if poles.unstable(1.0, middle) == 0 else (middle, good)
-        return good, each.omega
+        return math.inf, math.nan
+    good = 0.0
+    for tried in _tried([each.delay for each in at], *_DELAYS):
+        if poles.unstable(1.0, tried) > 0:
+            limit = _halved(lambda delay: poles.unstable(1.0, delay) == 0, good, tried)
+            nearest = min(at, key=lambda each: abs(each.delay - limit), default=Crossing(math.nan, math.nan))
+            return limit, nearest.omega
+        good = tried
     return math.inf, math.nan
+
+
+_FACTORS, _DELAYS = (1e-3, 1e3, 61), (1e-3, 1.0, 31)
+"""Factors of the gain, and delays [s], that are tried besides those between crossings: least, most, how many."""
+_EXACT, _ALIKE = 1e-7, 1e-2
+
+
+def _tried(edges: Sequence[float], least: float, most: float, count: int) -> list[float]:
+    """Values between all edges and beyond them, and others of a grid."""
+    at = sorted(each for each in edges if each > 0.0)
+    between = [math.sqrt(low * high) for low, high in pairwise(at)]
+    ends = [0.5 * at[0], 1.1 * at[-1]] if at else []
+    return sorted({*np.geomspace(least, most, count).tolist(), *between, *ends})
+
+
+def _halved(is_good: Callable[[float], bool], good: float, bad: float) -> float:
+    """The last good value before a bad one."""
+    while abs(bad - good) > _EXACT * max(abs(good), abs(bad), _EXACT):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if is_good(middle) else (good, middle)
+    return good
