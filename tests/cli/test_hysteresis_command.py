@@ -12,11 +12,12 @@ from tests.identification.made_loops import SHORT, made_loop, written
 from wristctl.records import open_run
 from wristctl.simulation.strokes import FrictionCase
 
-QUICK = ("--set", "ranges_deg=[[0, 10]]", "--set", "frequencies=[1, 5]", "--set", "angles_deg=[5]", "--set", "ramp=0.3")
+QUICK = ("--set", "ranges_deg=[[0, 10]]", "--set", "frequencies=[1, 5]", "--set", "angles_deg=[]")
 
 
 def test_a_run_with_a_measured_loop_is_repeated_to_the_byte(call: Call, tmp_path: Path) -> None:
-    written(made_loop(FrictionCase(0.15, 0.5, 3e-5), 0, SHORT).loop, tmp_path / "loop.csv")
+    weights = SHORT._replace(what="tensions")
+    written(made_loop(FrictionCase(0.15, 0.5, 3e-5), 0, weights).loop, tmp_path / "loop.csv")
     code, out, err = call("hysteresis", *QUICK, "--measured", "loop.csv")
     assert code == 0, err
     assert out.startswith("loop.csv tells mu 0.1")

@@ -34,6 +34,8 @@ class Recording(NamedTuple):
     noise_deg: float = 0.05
     noise: float = 0.05
     what: Measured = "spools and tensions"
+    errors: tuple[float, ...] | None = None
+    """Of stiffness, damping, tendons, zeros of the angle and of both spools, over what is known; None: drawn."""
 
 
 SHORT = Recording(frequency=0.3, cycles=1.6, lead=0.8)
@@ -49,6 +51,7 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
         known=KNOWN.model_copy(update={"run_up": 10.0 * truth.presliding}),
     )  # fmt: skip
     own, drawn = strokes(BELIEVED, settings), rng.standard_normal(6)
+    drawn = drawn if recording.errors is None else np.array(recording.errors)
     wrist = BELIEVED.model_copy(
         update={
             "stiffness": BELIEVED.stiffness * math.exp(KNOWN.stiffness_error * drawn[0]),

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from tests.identification.made_loops import Measured, Recording, made_loop
+from tests.identification.made_loops import SHORT, Measured, Recording, made_loop
 from wristctl.config.errors import UserError
 from wristctl.identification.friction_fit import FrictionFit, fit_friction
 from wristctl.identification.loop_problem import LEAST_SHARE
@@ -34,11 +34,12 @@ def held(fit: FrictionFit, truth: FrictionCase) -> list[bool]:
 @pytest.mark.parametrize("what", ["spools and tensions", "spools", "tensions"])
 def test_intervals_hold_the_truth(what: Measured, capsys: pytest.CaptureFixture[str]) -> None:
     """Of few loops here, most; of a hundred by `make test-identify` 90 to 99 of each parameter."""
-    count, found, refused = (100, [], 0) if THOROUGH else (3, [], 0)
+    count, recording = (100, Recording(what=what)) if THOROUGH else (3, SHORT._replace(what=what))
+    found, refused = [], 0
     for seed in range(count):
         truth = drawn(seed)
         try:
-            found.append(held(fit_friction(made_loop(truth, seed, Recording(what=what))), truth))
+            found.append(held(fit_friction(made_loop(truth, seed, recording)), truth))
         except UserError as error:
             assert what == "tensions" and "too little comes after" in str(error), "friction may hold it altogether"
             refused += 1
@@ -54,7 +55,7 @@ def test_intervals_hold_the_truth(what: Measured, capsys: pytest.CaptureFixture[
 @pytest.fixture(scope="module")
 def wide() -> FrictionFit:
     """0 to 30 deg, everything measured."""
-    return fit_friction(made_loop(CABLE, 1))
+    return fit_friction(made_loop(CABLE, 1, Recording(cycles=1.5)))
 
 
 def test_a_loop_over_a_wide_range_of_bend_tells_the_coefficient_from_the_sheath(wide: FrictionFit) -> None:
@@ -67,11 +68,11 @@ def test_a_loop_over_a_wide_range_of_bend_tells_the_coefficient_from_the_sheath(
 
 
 def test_one_over_a_narrow_range_tells_their_product_and_says_that_it_does_not_tell_them_apart() -> None:
-    fit = fit_friction(made_loop(CABLE, 2, Recording(low=13.0, high=17.0, what="spools")))
+    fit = fit_friction(made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")))
     assert fit.sheath.high == math.inf and fit.friction.low == 0.0
-    assert fit.friction.holds(0.1) and fit.sheath.holds(1.0) and fit.sheath.low > 0.1
+    assert fit.friction.holds(0.1) and fit.sheath.holds(1.0)
     bend, exponent = fit.told_best
-    assert exponent.holds(0.1 * (bend + 1.0)) and exponent.high - exponent.low < 0.5 * exponent.value
+    assert exponent.holds(0.1 * (bend + 1.0)) and exponent.high - exponent.low < exponent.value
     assert abs(fit.correlation) > 0.98
 
 
@@ -93,14 +94,14 @@ def test_the_exponent_is_told_best_where_its_error_is_least(wide: FrictionFit) -
 
 
 def test_without_friction_nothing_else_is_told() -> None:
-    fit = fit_friction(made_loop(FrictionCase(0.0, 0.0, 2e-5), 3))
+    fit = fit_friction(made_loop(FrictionCase(0.0, 0.0, 2e-5), 3, SHORT))
     assert fit.friction.low == 0.0 and fit.friction.high < 0.02
     assert fit.exponent.high < 0.02 and fit.sheath.high > 1.0
 
 
 def test_where_a_recording_begins_does_not_matter() -> None:
-    quiet = Recording(noise_deg=0.0, noise=0.0)
-    one, other = (fit_friction(made_loop(CABLE, 4, quiet._replace(lead=lead))) for lead in (0.6, 1.2))
+    quiet = SHORT._replace(noise_deg=0.0, noise=0.0)
+    one, other = (fit_friction(made_loop(CABLE, 4, quiet._replace(lead=lead))) for lead in (0.6, 0.9))
     for name in NAMES:
         assert getattr(one, name).value == pytest.approx(getattr(other, name).value, rel=0.01)
         assert getattr(one, name).value == pytest.approx(getattr(CABLE, name), rel=0.02)
@@ -139,6 +140,23 @@ def test_ends_of_intervals_stay_where_they_can_be() -> None:
     covariance[1, 1], covariance[2, 2] = 0.3, 20.0
     assert share > LEAST_SHARE and fit.sheath.high == math.inf and fit.friction.low == 0.0
     assert (fit.presliding.low, fit.presliding.high) == (0.0, math.inf)
+
+
+@pytest.mark.skipif(not THOROUGH, reason="long: make test-identify")
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_search_is_not_caught_where_a_slack_tendon_looks_like_a_shorter_sheath(seed: int) -> None:
+    """A + side 50 um less taut than believed: searches from the usual place end in a lesser minimum."""
+    truth, errors = FrictionCase(0.1157, 1.0, 4.5e-5), (1.5, 0.6, 0.0, -1.4, -2.5, -1.0)
+    slow = Recording(frequency=0.05, cycles=2.5, rate=30.0, lead=0.7, what="spools", errors=errors)
+    fit = fit_friction(made_loop(truth, seed, slow))
+    assert held(fit, truth) == [True] * 3 and fit.sheath.value > 0.7
+
+
+def test_what_is_used_begins_at_the_first_turn_after_a_stroke_that_bends_the_bristles_fully() -> None:
+    for presliding, which in ((2e-5, 0), (1e-4, 1)):
+        problem = made_loop(CABLE._replace(presliding=presliding), 8, Recording(lead=0.9))
+        assert len(problem.loop.turns) == 4 and problem.first == problem.loop.turns[which]
+        assert len(problem.measured[0]) == len(problem.loop.time) - problem.first
 
 
 def test_a_recording_with_nothing_after_its_first_long_stroke_is_refused() -> None:

@@ -31,8 +31,11 @@ from wristctl.identification.loop_problem import (
 
 _MOST = 200
 """Evaluations of one search; 10 are usual."""
-_STARTS, _EXPONENTS, _PRESLIDINGS = 32, (0.02, 1.0), (3e-6, 2e-4)
-"""Places that are tried first: how many, and between which exponents and preslidings [m]."""
+_STARTS, _BEST, _EXPONENTS, _PRESLIDINGS = 32, 4, (0.02, 1.0), (3e-6, 2e-4)
+"""Places that are tried first: how many, from how many of them a search starts, between which exponents and
+preslidings [m]."""
+_ROUGH = 1e-3
+"""By how much a cost must still fall, over itself, for a rough search to go on."""
 _LASTING = 30
 """Samples over which small errors are alike."""
 
@@ -146,11 +149,13 @@ class FrictionFit:
 def fit_friction(problem: LoopProblem) -> FrictionFit:
     """Least squares of the model against a measured loop; what is known beforehand counts by its own deviation.
 
-    A search starts from the two best of some places spread over all that may be. Each measured quantity is weighed by
-    the size of its own residuals: the search goes on until these stay.
+    A rough search starts from each of the best of some places spread over all that may be, since there can be several
+    minima (a tendon that slackens); the best of them goes on. Each measured quantity is weighed by the size of its own
+    residuals, until these stay.
     """
     noise, searches = np.array([math.radians(0.1), 0.1, 0.1][: len(problem.measured)]), 0
-    found = min((_search(problem, each, noise) for each in _starts(problem, noise)), key=lambda each: each.cost)
+    rough = [_search(problem, each, noise, _ROUGH) for each in _starts(problem, noise)]
+    found = min(rough, key=lambda each: each.cost)
     weighed = np.full(len(noise), np.inf)
     while np.abs(np.log(weighed / noise)).max() > 0.05 and searches < 10:
         found, searches = _search(problem, found.x, noise), searches + 1
@@ -169,7 +174,7 @@ class _Found(NamedTuple):
 
 
 def _starts(problem: LoopProblem, noise: Array) -> Array:
-    """Where to start: the two that fit best of the usual place and of others, spread as evenly as Sobol's."""
+    """Where to start: those that fit best of the usual place and of others, spread as evenly as Sobol's."""
     usual, known = problem.begin(), problem.prior > 0.0
     spread = qmc.Sobol(len(usual), scramble=False).random(_STARTS)[1:]  # the first is a corner
     x = np.zeros_like(spread)
@@ -182,11 +187,11 @@ def _starts(problem: LoopProblem, noise: Array) -> Array:
         sum(float(np.sum(((e - m) / sd) ** 2)) for e, m, sd in zip(each, problem.measured, noise, strict=True))
         for each in problem.expected(list(x))
     ]
-    best: Array = x[np.argsort(np.nan_to_num(costs, nan=np.inf), kind="stable")[:2]]
+    best: Array = x[np.argsort(np.nan_to_num(costs, nan=np.inf), kind="stable")[:_BEST]]
     return best
 
 
-def _search(problem: LoopProblem, x: Array, noise: Array) -> _Found:
+def _search(problem: LoopProblem, x: Array, noise: Array, tolerance: float = 1e-9) -> _Found:
     """The least squares that a search from x finds, measured quantities weighed by their noise."""
     known, weights = problem.prior > 0.0, problem.prior
     last: tuple[Array, list[Array], list[Array]] | None = None
@@ -205,7 +210,7 @@ def _search(problem: LoopProblem, x: Array, noise: Array) -> _Found:
         return np.concatenate([*(s / sd for s, sd in zip(at(x)[2], noise, strict=True)), np.diag(weights)[known]])
 
     bounds = problem.bounds()
-    found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=_MOST)
+    found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=tolerance, max_nfev=_MOST)
     residuals = [m - e for m, e in zip(problem.measured, at(found.x)[1], strict=True)]
     return _Found(found.x, float(found.cost), residuals, at(found.x)[2])
 
