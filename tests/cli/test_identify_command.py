@@ -48,7 +48,7 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
 def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_path: Path) -> None:
     run = write_run(tmp_path / "results", 1, UPRIGHT, SLOW, sides=("ulnar",))
     code, out, err = call("identify", run.id)
-    assert code == 3 and "not identify stiffness" in err and "add " in err and "--set fix." in err
+    assert code == 3 and "not identify damping" in err and "add " in err and "--set fix." in err
     assert "What to add" in err and "condition number" in err and out == ""
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
     assert failed.state == "failed" and failed.manifest.exit_code == 3
@@ -71,12 +71,14 @@ def test_without_logged_runs_there_is_nothing_to_identify(call: Call, arguments:
 
 
 def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -> None:
-    values = {"stiffness": 0.4, "damping": 0.09, "tendon_radius": 0.021, "tendon_stiffness": 9e3, "friction": 0.2}
+    wrist = {"stiffness": 0.4, "flexion_ratio": 1.1, "damping": 0.09, "tendon_radius": 0.021}
+    tendons = {"tendon_stiffness": 9e3, "friction": 0.2, "presliding": 3e-5}
+    values = wrist | tendons | {"sheath_friction": 0.3}
     text = identified_yaml(values, {"frame_rate": 30.0, "delay_frames": 1.5})
     study = Study(simulate={"loop": Loop(actuator=Actuator(level="tendon"))})  # type: ignore[arg-type]
     simulated = with_identified(study, "simulate", text)
-    assert (simulated.wrist.stiffness, simulated.wrist.hand_mass) == (0.4, study.wrist.hand_mass)
-    assert simulated.simulate.loop.actuator == Actuator(level="tendon", tendon_stiffness=9e3, friction=0.2)
+    assert simulated.wrist == study.wrist.model_copy(update=wrist)
+    assert simulated.simulate.loop.actuator == Actuator(level="tendon", sheath=0.3 / 0.2, **tendons)
     tuned = with_identified(study, "tune", text).tune
     assert {loop.sensor.delay_frames for loop in tuned.loops.values()} == {1.5}
     assert {loop.sensor.level for loop in tuned.loops.values()} == {"ideal"}

@@ -106,6 +106,12 @@ def test_an_unstable_loop_tells_where_it_would_be_stable() -> None:
     assert low.stable and 0.0 < low.least.value < 1.0
 
 
+def test_a_narrow_range_of_stable_gains_is_found() -> None:
+    """z = 14 - 10 k: stable from k = 1.3 to 1.5."""
+    found = margins(closed(np.array([[14.0]]), np.array([10.0]), np.array([1.0]), PERIOD))
+    assert not found.stable and (found.least.value, found.most.value) == pytest.approx((1.3, 1.5), rel=1e-9)
+
+
 @st.composite
 def loops(draw: st.DrawFn) -> tuple[Array, Array, Array]:
     """A stable open loop of random poles and residues."""

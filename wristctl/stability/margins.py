@@ -188,10 +188,8 @@ def _stable_gains(
 def _gain_limit(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing], good: float, bad: float) -> Crossing:
     """Where it turns unstable between these factors: at a crossing, or, of a loop of several rates, close to one."""
     limit = math.exp(_halved(lambda at: poles.unstable(math.exp(at)) == 0, math.log(good), math.log(bad)))
-    if loop.is_steady:
-        nearest = min(crossed, key=lambda each: abs(math.log(each.value / limit)), default=None)
-        if nearest is not None and abs(math.log(nearest.value / limit)) < _ALIKE:
-            return nearest
+    if loop.is_steady and crossed:
+        return min(crossed, key=lambda each: abs(math.log(each.value / limit)))
     return Crossing(2.0 * math.pi * loop.modes(limit)[0].frequency, limit)
 
 
@@ -219,7 +217,7 @@ def _delay(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing]) -> 
 
 _FACTORS, _DELAYS = (1e-3, 1e3, 61), (1e-3, 1.0, 31)
 """Factors of the gain, and delays [s], that are tried besides those between crossings: least, most, how many."""
-_EXACT, _ALIKE = 1e-7, 1e-2
+_EXACT = 1e-7
 
 
 def _tried(edges: Sequence[float], least: float, most: float, count: int) -> list[float]:
