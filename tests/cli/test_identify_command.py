@@ -78,7 +78,7 @@ def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -
     study = Study(simulate={"loop": Loop(actuator=Actuator(level="tendon"))})  # type: ignore[arg-type]
     simulated = with_identified(study, "simulate", text)
     assert simulated.wrist == study.wrist.model_copy(update=wrist)
-    assert simulated.simulate.loop.actuator == Actuator(level="tendon", sheath=0.3 / 0.2, **tendons)
+    assert simulated.simulate.loop.actuator == Actuator(level="tendon", sheath=0.3 / 0.2).model_copy(update=tendons)
     tuned = with_identified(study, "tune", text).tune
     assert {loop.sensor.delay_frames for loop in tuned.loops.values()} == {1.5}
     assert {loop.sensor.level for loop in tuned.loops.values()} == {"ideal"}
