@@ -12,7 +12,7 @@ from wristctl.bench.fault_injection import Faults
 from wristctl.board.board_errors import PortLost
 from wristctl.board.driver import Board
 from wristctl.board.emulator import Atmega2560
-from wristctl.config.bench import FaultKind, InjectedFault
+from wristctl.config.injected import FaultKind, InjectedFault
 
 
 def wire(

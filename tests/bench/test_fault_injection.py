@@ -7,7 +7,7 @@ import math
 import pytest
 
 from wristctl.bench.fault_injection import Faults
-from wristctl.config.bench import InjectedFault
+from wristctl.config.injected import InjectedFault
 
 
 def faults() -> Faults:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wristctl.bench.bench_wrist import BenchWrist
-from wristctl.bench.motors import stepper_of
+from wristctl.bench.motors import spool_state_of, stepper_of
 from wristctl.board.emulator.atmega2560 import EDGE
 from wristctl.config.bench import BenchSettings, Motors, StepperActuator
 from wristctl.config.plant import Disturbances, Push
@@ -147,11 +147,11 @@ def test_a_motor_switched_on_takes_the_nearest_place_that_fits_its_count(away: i
 
 def test_what_the_motors_have_in_common_is_the_settings() -> None:
     settings = BenchSettings(
-        motors=Motors(holding_torque=1.5, detent_torque=0.06, release_time=4e-3),
+        motors=Motors(step_scale=(1.0, 2.0, 1.0, 1.0), holding_torque=1.5, detent_torque=0.06, release_time=4e-3),
         actuator=StepperActuator(microstep=8, motor_steps=400, pulley_radius=0.01),
     )
     motor = stepper_of(settings)
-    assert motor.step == pytest.approx(2.0 * math.pi * 0.01 / 3200)
+    assert spool_state_of(settings).step == pytest.approx([2.0 * math.pi * 0.01 / 3200 * k for k in (1, 2, 1, 1)])
     assert motor.turn == pytest.approx(2.0 * math.pi * 0.01 / 100), "four full steps of 400"
     assert (motor.holding, motor.detent, motor.release) == pytest.approx((150.0, 6.0, 0.2))
 

@@ -30,7 +30,8 @@ from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.driver import Board
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import Flag, Target
-from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
+from wristctl.config.bench import BenchSettings, RenderedCamera
+from wristctl.config.injected import InjectedFault
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame

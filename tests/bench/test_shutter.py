@@ -9,7 +9,8 @@ import pytest
 
 from wristctl.bench.fault_injection import Faults
 from wristctl.bench.shutter import Shutter
-from wristctl.config.bench import InjectedFault, RenderedCamera
+from wristctl.config.bench import RenderedCamera
+from wristctl.config.injected import InjectedFault
 
 
 class Turning:
@@ -20,6 +21,9 @@ class Turning:
 
     def angles(self, times: np.ndarray) -> np.ndarray:
         return 0.5 * self.rate * np.stack([times, times], axis=-1)
+
+    def across(self, time: float) -> float:
+        return 0.1 * self.rate * time
 
     def tip_angle(self, coordinates: np.ndarray) -> np.ndarray:
         return np.asarray(coordinates.sum(axis=-1))

@@ -19,7 +19,7 @@ import pytest
 from tests.cli.conftest import Call
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
-from wristctl.config.bench import FAULTS
+from wristctl.config.injected import FAULTS
 from wristctl.config.study import Study
 from wristctl.records import list_runs, start_run
 from wristctl.records.run import Run

@@ -44,6 +44,7 @@ class RigBoard:
         self.pings: list[float] = []
         self.lapses = 0
         self.lives: list[float] = []
+        self.traffic = SimpleNamespace(resent=0)
         self.hello: Any = SimpleNamespace(boot_nonce=7)
 
     def read(self) -> Status:

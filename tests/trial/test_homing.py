@@ -13,7 +13,6 @@ from wristctl.board.driver import Board
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.prepare import prepare
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
 
@@ -28,7 +27,7 @@ def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, Vi
     board = Board(bench.transport)
     board.connect()
     prepare(board, settings)
-    return find_zero(board, tracking, spools_of(settings.actuator), settings.homing, "ulnar", signs), bench
+    return find_zero(board, tracking, settings, WRIST, "ulnar", signs), bench
 
 
 def test_slack_senses_and_steps_per_radian_are_found() -> None:
@@ -36,7 +35,8 @@ def test_slack_senses_and_steps_per_radian_are_found() -> None:
     assert zero.signs == (1, -1, 1, 1)
     assert zero.slack == pytest.approx(SLACK, abs=5e-5)
     step = settings_of().actuator.step_length
-    assert zero.steps_per_radian == pytest.approx([WRIST.tendon_offset / step] * 4, rel=0.12)
+    assert zero.steps_per_radian == pytest.approx([2.0 * WRIST.tendon_offset / step] * 4, rel=0.12), "bends askew"
+    assert max(zero.friction) < 5e-5
     assert bench.truth(bench.transport.now() - 0.01).reeled[-1] == pytest.approx(np.zeros(4), abs=5e-5)
 
 

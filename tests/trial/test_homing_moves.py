@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import JOG_RATE
 from wristctl.config.hw_run import Homing
@@ -18,7 +19,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 
 SPOOLS = spools_of(Actuator(level="tendon"))
-SLACK, PER_RADIAN = np.array([31, 52, 17, 44]), np.array([900.0, 1000.0, 1100.0, 950.0])
+SLACK, PER_RADIAN = np.array([31, 52, 17, 44]), np.array([1900.0, 2000.0, 2100.0, 1950.0])
 """Steps reeled in until taut, and then for one radian."""
 START, GLUED = np.array([5, -6, 7, -8]), 0.07
 
@@ -43,8 +44,8 @@ class Wrist:
 
     def homed(self, known: tuple[int, ...] | None = None, **settings: Any) -> Zero:
         board: Any = self.board
-        homing = Homing(frames=1, rest=0.0, **settings)
-        return find_zero(board, self.tracking, SPOOLS, homing, self.plane, known)
+        homing = {"frames": 1, "rest": 0.0, **settings}
+        return find_zero(board, self.tracking, settings_of(homing=homing), WRIST, self.plane, known)
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from wristctl.bench.fault_injection import Faults
 from wristctl.board.board_errors import PortLost
 from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.config.injected import FaultKind
 
 _USB_FRAME = FREQUENCY // 1000
 """Cycles between two times at which a board's USB chip hands over what has come."""
+_BUTTON = "G", 0
 
 
 class BenchTransport(VirtualTransport):
-    """The wire to an emulated chip in the same process, with faults: port-lost, board-reset and host-silent.
+    """The wire to an emulated chip in the same process, with the faults of cable, host and board.
 
     A lost port stays lost; the board runs on, also while the host can only `wait`.
     """
@@ -23,34 +27,52 @@ class BenchTransport(VirtualTransport):
     def __init__(self, chip: Atmega2560, faults: Faults) -> None:
         super().__init__(chip)
         self._faults, self._lost, self._reset = faults, False, -math.inf
+        self._noise = np.random.default_rng(0)
+        self._happened: set[tuple[FaultKind, float]] = set()
+        self._pressed = False
 
     def write(self, data: bytes) -> None:
         """Put bytes on the line. Raises PortLost."""
         self._see_port()
         if not self._faults.on("host-silent", self.now()):
-            super().write(data)
+            super().write(self._garbled(data))
 
     def read(self, timeout: float) -> bytes:
         """What the chip has sent; runs it for up to `timeout` s until there is something. Raises PortLost."""
         self._see_port()
+        self._stand_still("answers-held")
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
+        late = self._sizes("answers-late")
+        every = max(_USB_FRAME, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
         while not (data := self.chip.read()) and self.chip.cycles < end:
-            self._run(min(end, (self.chip.cycles // _USB_FRAME + 1) * _USB_FRAME))
+            self._run(min(end, (self.chip.cycles // every + 1) * every))
             self._see_port()
-        return data
+        if data and late:
+            self._run_until(self.chip.cycles + round(1e-3 * late * FREQUENCY))
+        return self._garbled(data)
 
     def wait(self, seconds: float) -> None:
         """Run the chip for so long."""
-        end = self.chip.cycles + round(seconds * FREQUENCY)
+        self._run_until(self.chip.cycles + round(seconds * FREQUENCY))
+        self._stand_still("host-pause")
+
+    def _run_until(self, end: int) -> None:
         while self.chip.cycles < end:
             self._run(end)
 
     def _run(self, end: int) -> None:
-        """Run towards `end`, at most to the next reset that is due, and do that."""
-        due = self._faults.next("board-reset", self._reset)
+        """Run towards `end`, at most to the next reset or press of the button that is due, and do that."""
+        pressing = self._faults.next("estop-pressed", -math.inf) if not self._pressed else math.inf
+        reset = self._faults.next("board-reset", self._reset)
+        due = min(reset, max(pressing, self.now()))
         cycle = math.inf if math.isinf(due) else round(due * FREQUENCY)
         self.chip.run(max(0, int(min(end, cycle)) - self.chip.cycles))
-        if self.chip.cycles >= cycle:
+        if self.chip.cycles < cycle:
+            return
+        if pressing <= due:
+            self.chip.drive(*_BUTTON, True)
+            self._pressed = True
+        else:
             self.chip.reset()
             self._reset = due
 
@@ -58,3 +80,19 @@ class BenchTransport(VirtualTransport):
         self._lost = self._lost or self._faults.on("port-lost", self.now())
         if self._lost:
             raise PortLost(self.name, OSError("injected fault"))
+
+    def _sizes(self, kind: FaultKind) -> float:
+        return sum(fault.size for fault in self._faults.active((kind,), self.now()))
+
+    def _stand_still(self, kind: FaultKind) -> None:
+        for fault in self._faults.active((kind,), self.now()):
+            if (kind, begun := self._faults.begun(fault)) not in self._happened:
+                self._happened.add((kind, begun))
+                self._run_until(self.chip.cycles + round(1e-3 * fault.size * FREQUENCY))
+
+    def _garbled(self, data: bytes) -> bytes:
+        if not data or not (probability := self._sizes("bytes-garbled")):
+            return data
+        hit = self._noise.random(len(data)) < probability
+        flipped = hit.astype(np.uint8) << self._noise.integers(0, 8, len(data), np.uint8)
+        return bytes(np.frombuffer(data, np.uint8) ^ flipped)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.bench.fault_injection import Faults
+from wristctl.bench.motor_faults import MotorFaults
 from wristctl.bench.motors import CYCLES, PERIOD, Hanging, follow, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
@@ -20,7 +22,8 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
+from wristctl.wrist.across import across_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.plant import kernel_of
 
 _KEPT = 60_000
@@ -43,6 +46,8 @@ class Truth(NamedTuple):
     reeled: Array
     """(T, 4) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
     straight wrist"""
+    across: Array
+    """(T,) [rad] bend across the plane, away from the camera, when the millisecond ended"""
 
 
 class MotorMotion(NamedTuple):
@@ -58,11 +63,16 @@ class MotorMotion(NamedTuple):
 class BenchWrist:
     """Straight and at rest at power-on, facing ulnar; it follows the board's pins in whole milliseconds.
 
-    `stream` draws what the settings leave to chance of the plant: a bench has one wrist for as long as it stands.
+    `stream` draws what the settings leave to chance of the plant: a bench has one wrist for as long as it stands. The
+    camera stands where it sees theta > 0 on its `positive` side.
     """
 
-    def __init__(self, settings: BenchSettings, wrist: WristParameters, stream: Entropy = (0,)) -> None:
-        self._settings, self._wrist = settings, wrist
+    def __init__(
+        self, settings: BenchSettings, wrist: WristParameters, stream: Entropy = (0,), faults: Faults | None = None,
+        positive: Literal["right", "left"] = "right",
+    ) -> None:  # fmt: skip
+        self._faults = MotorFaults(faults or Faults(()), settings.motors.order)
+        self._settings, self._wrist, self._positive = settings, wrist, positive
         self._drawn = drawn(settings.plant, stream)
         self._model = PLANTS[settings.plant.model]
         self._n = self._model.coordinates(settings.segments)
@@ -73,9 +83,9 @@ class BenchWrist:
         self._state = np.zeros(2 * self._n)
         self._axes = np.arange(AXES)
         self._tendons = unmoved(self._spools.reeled, np.zeros(3), np.zeros(AXES), self._state[: self._n])
-        self._edges = np.empty((0, 3), np.int64)
+        self._edges = self._heard = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
-        self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES))
+        self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES + 1))
         self.begin(Disturbances(), math.inf)  # no trial yet: nothing breaks while it is homed
         self._face("ulnar")
 
@@ -110,11 +120,18 @@ class BenchWrist:
         """Changes of the chip's output latches, as it gives them: to be followed later."""
         if len(edges):
             columns = [edges[name].astype(np.int64) for name in ("cycle", "port", "value")]
-            self._edges = np.concatenate([self._edges, np.stack(columns, axis=1)])
+            self._heard = np.concatenate([self._heard, np.stack(columns, axis=1)])
 
     def follow(self, cycles: int) -> None:
         """Go on to the last whole millisecond of the board's clock; all edges up to there have been heard."""
+        self._edges = np.concatenate([self._edges, self._faults.hear(self._heard, cycles)])
+        self._heard = self._heard[:0]
         while (count := min(cycles // CYCLES - self._periods, _KEPT)) > 0:
+            for axis, slack in self._faults.give_way(self.time):
+                self._spools.slack[axis] += slack
+                self._spools.reeled[axis] -= slack
+            if (due := self._faults.next(self.time)) < math.inf:
+                count = min(count, max(1, math.ceil((due - self.time) / PERIOD - 1e-9)))
             self._make_room(count)
             time = PERIOD * np.arange(self._periods, self._periods + count, dtype=np.float64)
             disturbed = acting(self._disturbances, time - self._start)
@@ -123,7 +140,7 @@ class BenchWrist:
             out = self._record[self._rows : self._rows + count]
             hanging = Hanging(
                 self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
-                self._stepper, self._sides
+                self._stepper, self._sides, self._across,
             )  # fmt: skip
             heard = self._follow(
                 hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._begun, out,
@@ -138,8 +155,8 @@ class BenchWrist:
         fresh = max(0, min(self._rows, self._periods - round(since / PERIOD)))
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
-        theta, rate, pull, reeled = np.split(rows, [n, 2 * n, 2 * n + AXES], axis=1)
-        return Truth(time, theta, self._model.angle(theta), rate, pull, reeled)
+        theta, rate, pull, reeled, across = np.split(rows, [n, 2 * n, 2 * n + AXES, 2 * n + 2 * AXES], axis=1)
+        return Truth(time, theta, self._model.angle(theta), rate, pull, reeled, across[:, 0])
 
     def tip_angle(self, coordinates: Array) -> Array:
         """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
@@ -152,9 +169,18 @@ class BenchWrist:
         known = self.truth(first * PERIOD)
         return np.stack([np.interp(times, known.time, angle) for angle in known.theta.T], axis=-1)
 
+    def across(self, time: float) -> float:
+        """The bend across the plane at a time within what `truth` remembers [rad]."""
+        known = self.truth(max(0.0, time - 2.0 * PERIOD))
+        return float(np.interp(time, known.time, known.across))
+
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
         plant = plant_of(*facing(self._wrist, self._drawn, direction))
+        other = next(each for each in DIRECTIONS.values() if each.plane != self._plane)
+        beside = plant_of(*facing(self._wrist, self._drawn, other.name))
+        self._across = across_of(beside, away_of(self._plane, self._positive))
+        self._spools.bent[:] = 0.0
         self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.bench.picture_faults import spoiled
+from wristctl.config.injected import FaultKind
 from wristctl.seeds import Entropy
 from wristctl.vision.camera import Frame, Image
 
@@ -14,7 +16,10 @@ from wristctl.vision.camera import Frame, Image
 class Painter(Protocol):
     """What draws the wrist: `vision.scene.Scene`."""
 
-    def render(self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False) -> Image:
+    def render(
+        self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
+        across: float = 0.0, turned: float = 0.0,
+    ) -> Image:  # fmt: skip
         """The picture of segment angles (k, n) at k instants of the exposure."""
 
 
@@ -31,11 +36,21 @@ class Exposure(NamedTuple):
     swapped: bool
     noise: Entropy
     """of the `shown` frame's random stream: its first number decides whether it is lost, the others are its noise"""
+    across: float = 0.0
+    """bend across the plane, away from the camera [rad]"""
+    turned: float = 0.0
+    """by how much the tip's marker has slipped [rad]"""
+    spoiled: tuple[tuple[FaultKind, float], ...] = ()
+    """kinds and sizes of what spoils the picture"""
 
 
 def picture(exposure: Exposure, painter: Painter) -> Frame:
     """Draw it; of one `shown` frame always the same."""
     rng = np.random.default_rng(exposure.noise)
     rng.random()
-    image = painter.render(exposure.theta, rng, covered=exposure.covered, swapped=exposure.swapped)
+    image = painter.render(
+        exposure.theta, rng, exposure.covered, exposure.swapped, exposure.across, exposure.turned
+    )  # fmt: skip
+    for kind, size in exposure.spoiled:
+        image = spoiled(image, kind, size, exposure.number, rng)
     return Frame(image, exposure.time, exposure.number)

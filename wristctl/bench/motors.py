@@ -32,7 +32,6 @@ _PORT_A, _PORT_C = ord("A"), ord("C")
 class Stepper(NamedTuple):
     """What the four motors have in common; lengths of tendon [m] and pulls [N] at the spool."""
 
-    step: float
     turn: float  # of the field: four full steps
     holding: float
     top_speed: float  # at which it holds nothing; inf: it holds as much at any speed
@@ -44,7 +43,6 @@ def stepper_of(settings: BenchSettings) -> Stepper:
     """The motors of these settings."""
     actuator, motors = settings.actuator, settings.motors
     return Stepper(
-        step=actuator.step_length,
         turn=electrical_turn(actuator),
         holding=motors.holding_torque / actuator.pulley_radius,
         top_speed=math.inf if motors.top_speed is None else motors.top_speed * actuator.step_length,
@@ -59,6 +57,7 @@ class SpoolState(NamedTuple):
     `reeled` [m] counts from where the tendon of the straight wrist is taut without pulling.
     """
 
+    step: Any  # [m] of tendon that a microstep reels in
     counted: Any  # microsteps reeled in
     slipped: Any  # electrical turns that the rotor is ahead of the count
     energised: Any
@@ -68,6 +67,7 @@ class SpoolState(NamedTuple):
     latch: Any
     reeled: Any
     pull: Any
+    bent: Any  # (1,) [rad] across the plane, away from the camera
 
 
 def spool_state_of(settings: BenchSettings) -> SpoolState:
@@ -75,6 +75,7 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
     slack = np.array(settings.motors.slack)
     none = np.zeros(AXES, np.int64)
     return SpoolState(
+        step=settings.actuator.step_length * np.array(settings.motors.step_scale),
         counted=none.copy(),
         slipped=none.copy(),
         energised=none.copy(),
@@ -84,6 +85,7 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
         latch=np.zeros(1, np.int64),
         reeled=-slack,
         pull=np.zeros(AXES),
+        bent=np.zeros(1),
     )
 
 
@@ -102,7 +104,7 @@ def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
         for axis in range(AXES):
             on = 1 - (value >> axis & 1)
             if on and not spools.energised[axis]:
-                counted = motor.step * spools.counted[axis] - spools.slack[axis]
+                counted = spools.step[axis] * spools.counted[axis] - spools.slack[axis]
                 spools.slipped[axis] = int(np.rint((spools.reeled[axis] - counted) / motor.turn))
             spools.energised[axis] = on
 
@@ -113,7 +115,7 @@ def _turn(spools: Any, motor: Any, stiffness: float) -> None:
     for axis in range(AXES):
         pull = spools.pull[axis]
         if spools.energised[axis]:
-            stepped = motor.step * spools.counted[axis] - spools.slack[axis]
+            stepped = spools.step[axis] * spools.counted[axis] - spools.slack[axis]
             speed = abs(stepped + motor.turn * spools.slipped[axis] - spools.reeled[axis]) / PERIOD
             if pull > motor.holding * max(0.0, 1.0 - speed / motor.top_speed):
                 spools.slipped[axis] -= 1
@@ -124,8 +126,8 @@ def _turn(spools: Any, motor: Any, stiffness: float) -> None:
 
 class Hanging(NamedTuple):
     """What hangs on the board: the plant (its model and the values of its parameters), a tendon's stiffness [N/m], the
-    values of Nonideal and the state that go with four of them, the motors, and the axes of two tendons on the + and two
-    on the - side."""
+    values of Nonideal and the state that go with four of them, the motors, the axes of two tendons on the + and two on
+    the - side, and what bends across the plane (wrist.across.Across)."""
 
     model: Any
     values: Any
@@ -134,6 +136,20 @@ class Hanging(NamedTuple):
     tendons: Any
     motor: Any
     sides: Any
+    across: Any
+
+
+@compiled
+def _bend_across(spools: Any, across: Any, stiffness: float) -> None:
+    """A period of the bend across the plane: damping carries what tendons, springs and gravity leave, no mass."""
+    resisting = across.stiffness
+    moment = across.moment - across.stiffness * spools.bent[0]
+    for axis in range(AXES):
+        lever, pull = across.levers[axis], spools.pull[axis]
+        moment += lever * pull
+        if pull > 0.0:
+            resisting += stiffness * lever * lever
+    spools.bent[0] += PERIOD * moment / (across.damping + PERIOD * resisting)
 
 
 def follow(
@@ -143,10 +159,12 @@ def follow(
 
     `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on. A row of
     `out` is what is so at a period's end: coordinates, rates; and what was in its middle: pulls at the spools, reeled
-    lengths. Tendons break and slip so long after `start` [s].
+    lengths; and the bend across. Tendons break and slip so long after `start` [s].
     """
     undisturbed = parameters_of(hanging.model, rows_of(hanging.values))
     motor, sides = hanging.motor, hanging.sides
+    across, bent = hanging.across, rows_of(spools.bent)
+    levers = rows_of(across.levers)
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
@@ -163,19 +181,21 @@ def follow(
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
         given = (
-            worn_tendon(tendons, 0, reeled[ahead], zero, time, path[0], 0.0),
-            worn_tendon(tendons, 1, reeled[behind], zero, time, path[1], 1.0),
-            worn_tendon(tendons, 2, reeled[ahead_too], zero, time, path[0], 1.0),
-            worn_tendon(tendons, 3, reeled[behind_too], zero, time, path[1], 1.0),
+            worn_tendon(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),
+            worn_tendon(tendons, 1, reeled[behind] - levers[behind] * bent[0], zero, time, path[1], 1.0),
+            worn_tendon(tendons, 2, reeled[ahead_too] - levers[ahead_too] * bent[0], zero, time, path[0], 1.0),
+            worn_tendon(tendons, 3, reeled[behind_too] - levers[behind_too] * bent[0], zero, time, path[1], 1.0),
         )
         pull[ahead] = spool_pull(tendons, given[0], 0, path[0])
         pull[behind] = spool_pull(tendons, given[1], 1, path[1])
         pull[ahead_too] = spool_pull(tendons, given[2], 2, path[0])
         pull[behind_too] = spool_pull(tendons, given[3], 3, path[1])
+        _bend_across(spools, across, hanging.stiffness)
         advance_or_stop(plant, q, rate, given, tendons, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]
         for axis in range(AXES):
             out[k, 2 * n + axis] = spools.pull[axis]
             out[k, 2 * n + AXES + axis] = spools.reeled[axis]
+        out[k, 2 * n + 2 * AXES] = spools.bent[0]
     return at

@@ -37,7 +37,8 @@ class Rig:
         self.settings = settings
         self.chip = chip or Atmega2560()
         self.faults = Faults(settings.faults)
-        self.wrist = BenchWrist(settings, wrist, stream(seed, "bench plant"))
+        positive = (markers or Markers()).positive
+        self.wrist = BenchWrist(settings, wrist, stream(seed, "bench plant"), self.faults, positive)
         self.shutter = Shutter(settings.camera, self.faults, self.wrist, stream(seed, "bench camera"))
         self._drawn = settings.camera.scene, wrist, markers, settings.plant.model
 

@@ -9,6 +9,7 @@ import numpy as np
 from wristctl.bench.bench_wrist import BenchWrist
 from wristctl.bench.exposure import Exposure
 from wristctl.bench.fault_injection import Faults
+from wristctl.bench.picture_faults import PICTURE_FAULTS
 from wristctl.config.bench import RenderedCamera
 from wristctl.seeds import Entropy
 
@@ -45,22 +46,44 @@ class Shutter:
     def arrives(self, number: int) -> bool:
         """Whether this frame gets through."""
         dropped = np.random.default_rng(self._noise(number)).random() < self._settings.dropped
-        return not (dropped or self._faults.on("frames-dropped", self._time(number)))
+        faults, time = self._faults, self._time(number)
+        thinned = any(number % round(each.size) for each in faults.active(("frames-thinned",), time))
+        return not (dropped or thinned or faults.on("frames-dropped", time))
 
     def expose(self, number: int) -> Exposure:
         """What this frame is made of; its exposure is over, and not longer ago than the wrist remembers."""
-        time = self._time(number)
-        frozen = self._faults.since("camera-frozen", time)
-        shown = number if frozen is None else math.floor(frozen * self._settings.frame_rate)
-        at = self._time(shown)
+        faults, time = self._faults, self._time(number)
+        shown = self._shown(number, time)
+        late = sum(each.size for each in faults.active(("pictures-late",), time))
+        at = self._time(shown) - late
         half = 0.5 * self._settings.exposure
         ends = self._wrist.angles(np.array([at - half, at + half]))
         turned = abs(float(np.diff(self._wrist.tip_angle(ends))[0]))
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
         moments = at + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
-        covered, swapped = (self._faults.on(kind, at) for kind in ("marker-covered", "markers-swapped"))
-        return Exposure(number, time, shown, parts, covered, swapped, self._noise(shown))
+        covered, swapped = (faults.on(kind, at) for kind in ("marker-covered", "markers-swapped"))
+        turned = math.radians(sum(each.size for each in faults.active(("marker-turned",), at)))
+        spoiled = tuple((each.kind, each.size) for each in faults.active(PICTURE_FAULTS, time))
+        across = self._wrist.across(at)
+        stamp = self._stamp(time)
+        return Exposure(
+            number, stamp, shown, parts, covered, swapped, self._noise(shown), across, turned, spoiled
+        )  # fmt: skip
+
+    def _shown(self, number: int, time: float) -> int:
+        """The frame whose picture this one shows."""
+        shown = [number]
+        for each in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
+            first = math.floor(self._faults.begun(each) * self._settings.frame_rate)
+            shown.append(first - (number % round(each.size) if each.kind == "camera-repeats" else 0))
+        return min(shown)
+
+    def _stamp(self, time: float) -> float:
+        stuck = self._faults.since("stamps-stuck", time)
+        return (time if stuck is None else stuck) + sum(
+            each.size for each in self._faults.active(("stamps-shifted",), time)
+        )
 
     def _noise(self, number: int) -> Entropy:
         first, stream = next(each for each in reversed(self._streams) if each[0] <= number)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wristctl.bench.exposure import picture
 from wristctl.bench.rig import Rig
-from wristctl.vision.camera import Frame
+from wristctl.vision.camera import CameraError, Frame
 
 
 class VirtualCamera:
@@ -16,8 +16,10 @@ class VirtualCamera:
         self._rig, self._seen = rig, -1
 
     def newest(self) -> Frame | None:
-        """The newest frame that has arrived since the last call, None if none has."""
+        """The newest frame that has arrived since the last call, None if none has. Raises CameraError."""
         self._rig.catch_up()
+        if self._rig.faults.on("camera-lost", self._rig.wrist.time):
+            raise CameraError("the camera gives no more pictures", self.name, "injected fault")
         shutter = self._rig.shutter
         newest = shutter.newest(shutter.delay)
         unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)

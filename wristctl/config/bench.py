@@ -6,36 +6,10 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.injected import InjectedFault
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import SceneSettings
-
-FAULTS = {
-    "port-lost": "the cable is pulled: the port is gone for good",
-    "board-reset": "the board restarts once: drives off, positions lost",
-    "frames-dropped": "no frame arrives",
-    "marker-covered": "something covers the marker on the last disc",
-    "markers-swapped": "the two markers change places",
-    "camera-frozen": "frames keep coming, with new times, but show what the last one before showed",
-    "host-silent": "nothing that the host sends reaches the board",
-    "controller-exception": "the controller raises an exception",
-    "model-nan": "the model gives NaN",
-    "disk-full": "nothing can be written to the run",
-}
-"""Every kind of fault that can be injected: the last three are the control loop's, the others the bench's."""
-
-FaultKind = Literal[
-    "port-lost", "board-reset", "frames-dropped", "marker-covered", "markers-swapped", "camera-frozen", "host-silent",
-    "controller-exception", "model-nan", "disk-full",
-]  # fmt: skip
-
-
-class InjectedFault(Section):
-    """Something that goes wrong during each trial."""
-
-    kind: FaultKind = choice("port-lost", "; ".join(f"{kind}: {what}" for kind, what in FAULTS.items()))
-    at: float = quantity(1.0, "s", "time since the start of the trial's motion", ge=0)
-    duration: float | None = quantity(None, "s", "how long it lasts; null: for good", gt=0)
 
 
 class Motors(Section):
@@ -46,6 +20,12 @@ class Motors(Section):
     )
     reversed: tuple[bool, bool, bool, bool] = choice(
         (False, False, False, False), "whether the motor is wired the other way round, so that it pays out"
+    )
+    order: tuple[int, int, int, int] = choice(
+        (0, 1, 2, 3), "axis of the board to whose cable the motor of tendon 1, 2, 4 and 5 is connected"
+    )
+    step_scale: tuple[float, float, float, float] = quantity(
+        (1.0, 1.0, 1.0, 1.0), "", "tendon per step, over what actuator says: a drive's own switches, or its pulley"
     )
     holding_torque: float = quantity(1.2, "N m", "beyond it an energised motor slips four full steps", "assumed", gt=0)
     top_speed: float | None = quantity(
@@ -105,4 +85,4 @@ class BenchSettings(Section):
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
     person: Person = Person()
-    faults: tuple[InjectedFault, ...] = choice((), "what goes wrong in each trial")
+    faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")

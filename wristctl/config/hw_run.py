@@ -28,6 +28,11 @@ class Homing(Section):
     rest: float = quantity(0.15, "s", "pause after a move before the marker is read", "assumed", ge=0)
     frames: int = choice(5, "frames whose mean is one reading", ge=1)
     let_go: float = quantity(3.0, "s", "longest wait for the wrist to straighten again", "assumed", gt=0)
+    steps_tolerance: float = quantity(
+        0.15, "", "steps per radian may differ from the model's by this share", "measured", gt=0
+    )
+    taut: float = quantity(0.15e-3, "m", "by how much a tendon may be taut when homing begins", "assumed", ge=0)
+    sticks: float = quantity(0.3e-3, "m", "path between reeling in and letting go: friction", "assumed", gt=0)
 
 
 class Safety(Section):
@@ -37,6 +42,20 @@ class Safety(Section):
     rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
     tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
+    follow_deg: float = quantity(
+        3.5, "deg", "furthest that the marker may be from where the spools should have the wrist", "measured", gt=0
+    )
+    jump_deg: float = quantity(
+        2.0, "deg", "furthest that it may come off that from a frame to the next", "measured", gt=0
+    )
+    softest: float = quantity(
+        5e3, "N/m", "stiffness that tendons have at least: how far spools may lead", "assumed", gt=0
+    )
+    load: float = quantity(1.6, "N m", "largest load torque that the observer may find", "measured", gt=0)
+    across_deg: float = quantity(
+        1.2, "deg", "largest bend across the plane, by the size of the tip's marker", "measured", gt=0
+    )
+    odd_for: float = quantity(0.06, "s", "how long follow_deg, load or across_deg may be exceeded", "assumed", ge=0)
     stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
     late: float = quantity(0.05, "s", "longest delay of one tick; with its period below the watchdog", "assumed", gt=0)
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)

@@ -15,6 +15,9 @@ class Markers(Section):
     base: int = choice(0, "id of the marker on the clamp", ge=0, lt=50)
     tip: int = choice(1, "id of the marker on the last disc", ge=0, lt=50)
     side: float = quantity(0.020, "m", "side of the black square", "assumed", gt=0)
+    distance: float = quantity(
+        0.25, "m", "from the lens to the markers; scales the bend across the plane", "assumed", gt=0.02
+    )
     positive: Literal["right", "left"] = choice(
         "right", "side of the picture, hand up, toward which the angle counts positive"
     )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from wristctl.trial.calibration import WristCalibration
 
-_COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]")
+_COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]", "friction [mm]")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -53,6 +53,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated:
     import numpy as np
 
     from wristctl.trial.calibration import FILE, calibrated
+    from wristctl.trial.expected_moves import ExpectedMoves
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
     from wristctl.wrist.directions import ACTIVE
@@ -63,17 +64,17 @@ def calibrate_wrist(session: Session) -> WristCalibrated:
     with session.progress("opening board and camera"):
         testbed = open_testbed(settings, study.wrist, study.seed, view, session.operator.confirm)
     with session.progress("homing"):
-        found = calibrated(testbed, settings)
+        found = calibrated(testbed, settings, study.wrist)
     findings.plain(FILE, found.plain())
     zero = found.zero
     findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
-    by_model = settings.actuator.step_length / study.wrist.tendon_offset
+    by_model = ExpectedMoves(settings, study.wrist, settings.plane).steps()
     rows = []
     for axis, tendon in enumerate(ACTIVE):
         slope, slack, near = zero.steps_per_radian[axis], zero.slack[axis], f"tendon {tendon}, near the straight wrist"
         findings.metric(f"steps_per_radian_{tendon}", slope, "1/rad", meaning=near)
         findings.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")
-        rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, 1.0 / by_model, 1e3 * slack))
+        rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, by_model, 1e3 * slack, 1e3 * zero.friction[axis]))
     findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.marker):.3f} deg")
     return WristCalibrated(study, findings, [Table("Zero", _COLUMNS, rows)], found)
 

@@ -39,6 +39,7 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
     "controller": ("", "name in the table of controllers"),
     "gains": ("", "preset, tuned or own"),
     "outcome": ("", "ok, or why it ended early"),
+    "odd": ("", "what was odd all the same: beyond what a sound rig shows, within the limits"),
     **{name: (metric.unit, metric.formula) for name, metric in METRICS.items()},
     **{f"true_{name}": (METRICS[name].unit, f"{METRICS[name].formula}; of the true angle") for name in JUDGED},
     "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the move"),
@@ -115,6 +116,7 @@ def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, tri
                 "controller": row.controller,
                 "gains": row.gains_name,
                 "outcome": experiment.outcomes[trial.number],
+                "odd": experiment.odd.get(trial.number, ""),
                 **evaluated(trial, course, followed, settings.push, settings.control_period, truth),
             }
         )
@@ -141,6 +143,7 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
         )
         session.operator.tell(text)
         findings.summary(text)
+    _tell_oddities(session, experiment)
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:
@@ -152,6 +155,26 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     text = _last_second(trial_log).text()
     findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
     log.warning("%s\n%s", stop.reason, text)
+
+
+def _tell_oddities(session: Session, experiment: Experiment) -> None:
+    """How near trials came to the limits of what a wrist may do otherwise than its motors, and what was odd."""
+    findings, limits, greatest = session.findings, session.study.hw_run.safety, experiment.greatest
+    known = {
+        "apart": (np.degrees(greatest.apart), limits.follow_deg, "deg", "marker from where the spools should have it"),
+        "jump": (np.degrees(greatest.jump), limits.jump_deg, "deg", "of the marker, off that, between two frames"),
+        "load": (greatest.load, limits.load, "N m", "load torque as estimated"),
+        "across": (np.degrees(greatest.across), limits.across_deg, "deg", "bend across the plane"),
+    }
+    for name, (value, limit, unit, meaning) in known.items():
+        findings.metric(f"greatest_{name}", float(value), unit, "lower", meaning=f"{meaning}; limit {limit:g} {unit}")
+    parts = ", ".join(f"{name} {value:.2g} of {limit:g} {unit}" for name, (value, limit, unit, _) in known.items())
+    findings.summary(f"Greatest of what the model of the rig does not explain, and the limit: {parts}.")
+    for number, words in experiment.odd.items():
+        if words and experiment.outcomes.get(number) == "ok":
+            text = f"Trial {number} went through, but was odd: {words}"
+            log.warning(text)
+            findings.summary(text)
 
 
 def _last_second(trial_log: TrialLog) -> Table:

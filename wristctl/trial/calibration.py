@@ -10,6 +10,7 @@ from wristctl.board.board_errors import BoardError
 from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.interrupt import undisturbed
 from wristctl.records import Run
 from wristctl.trial.halt import halt
@@ -19,7 +20,7 @@ from wristctl.trial.prepare import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import Testbed
 
-FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
+FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/2"
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class WristCalibration:
             if found["schema"] != SCHEMA:
                 raise ValueError(found["schema"])
             signs, slopes, slack = (tuple(found[name]) for name in ("signs", "steps_per_radian", "slack"))
-            zero = Zero(signs, slopes, float(found["marker"]), slack)
+            zero = Zero(signs, slopes, float(found["marker"]), slack, tuple(found["friction"]))
             return cls(zero, found["plane"], found["boot_nonce"], tuple(found["position"]))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UserError("not a wrist calibration", str(file), "wristctl hw calibrate wrist") from error
@@ -66,7 +67,7 @@ class WristCalibration:
         raise BoardError("host", what, board.transport.name, fix)
 
 
-def calibrated(testbed: Testbed, settings: CalibrateWristSettings) -> WristCalibration:
+def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristParameters) -> WristCalibration:
     """Home a rig, slacken its tendons again, and say what was found. Closes the stand.
 
     Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
@@ -81,7 +82,7 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings) -> WristCalib
             patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
             testbed.confirm(patience.pulse)
             prepare(board, settings)
-            zero = find_zero(board, tracking, spools, settings.homing, settings.plane)
+            zero = find_zero(board, tracking, settings, wrist, settings.plane)
             position = slacken(board, spools, settings.homing, zero.signs)
         except BaseException:
             with undisturbed():

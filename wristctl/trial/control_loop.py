@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,12 +19,15 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.simulation.reference import Motion
+from wristctl.trial.following import Following
 from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog, of_axes
+from wristctl.trial.oddities import Oddities
 from wristctl.trial.patience import InSight, Patience
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, Estimate, Steering
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 
 Shown = Callable[[dict[str, Any]], None]
@@ -39,21 +41,6 @@ longer [s] that takes for each step/s of all axes together, whose interrupts com
 _COMING_TO_REST = 0.5
 """Seconds within which motors at any speed have ramped down."""
 _NO_ANSWER = Answer(math.nan, math.nan, math.nan, math.nan, False)
-
-
-@dataclass
-class TickTiming:
-    """When ticks began, against when they were due."""
-
-    period: float
-    late: list[float] = field(default_factory=list)
-    """Of each tick [s]."""
-    overruns: int = 0
-    """Ticks that were skipped because one before took too long."""
-
-    def jitter(self, share: float) -> float:
-        """This quantile of lateness [s]."""
-        return float(np.quantile(self.late, share)) if self.late else math.nan
 
 
 class Task(NamedTuple):
@@ -80,6 +67,8 @@ class ControlLoop:
         self._life = settings.rate_life
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
         self._monitor = Monitor(settings.safety, self._spools)
+        self._following = Following(settings, wrist, plane, timing.period)
+        self._settings, self.oddities = settings, Oddities(settings)
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
@@ -101,9 +90,13 @@ class ControlLoop:
         Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
         """
         self._steering.use(controller, gains)
+        self.oddities = Oddities(self._settings)
+        resent, skipped = self._board.traffic.resent, self._timing.overruns
         task, first = Task(motion, trial, self.next_tick, faults or HostFaults(())), self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
+        self.oddities.resent = self._board.traffic.resent - resent
+        self.oddities.skipped = self._timing.overruns - skipped
         self._come_to_rest(task._replace(trial=-1))
 
     def patience(self) -> Patience:
@@ -126,6 +119,7 @@ class ControlLoop:
         seen = self._look(task)
         estimate, position = steering.estimate, self._reeled()
         self._watch(estimate, position, clock, clock - due)
+        self._following.see(clock, estimate.load, position)
         if k is None:
             reference, answer = (float(motion.theta_ref[-1]), 0.0, 0.0), _NO_ANSWER
             tension, target = np.full(AXES, math.nan), position
@@ -158,6 +152,7 @@ class ControlLoop:
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
+        self.oddities.tick(row, clock - self._last_usable, self._following.greatest)
         self._timing.late.append(clock - due)
         self._go_on()
 
@@ -168,6 +163,7 @@ class ControlLoop:
             found["verdict"] = self._verdict = str(seen.verdict)
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time
+                self._following.saw(seen, seen.time - self._epoch)
                 found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
             if task.trial >= 0:
                 used = self._clock.now() - task.begin
@@ -211,10 +207,10 @@ class ControlLoop:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
         middle = self._reeled() + self._sent * (0.5 * self._period - self._underway)
         plus, minus = self._paths.sides(self._spools.step * middle)
-        self._steering.predict(plus, minus)
-        self._skipped = max(0, int((self._clock.now() - self.next_tick) / self._period))
-        for _ in range(self._skipped):
+        self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
+        for _ in range(1 + self._skipped):
             self._steering.predict(plus, minus)
+            self._following.predict(plus, minus)
         self._timing.overruns += self._skipped
 
     def _reeled(self) -> Array:

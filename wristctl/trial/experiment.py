@@ -15,9 +15,10 @@ from wristctl.control.table import controller, gains_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop, Shown, TickTiming
+from wristctl.trial.control_loop import ControlLoop, Shown
+from wristctl.trial.following import Greatest
 from wristctl.trial.halt import Halt, halt
-from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, check_zero, find_zero, slacken
 from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog
 from wristctl.trial.patience import Patience
@@ -26,6 +27,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Steering
 from wristctl.trial.testbeds import Testbed
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trial_motions import at_rest, back, motion_of
 from wristctl.trial.trials import Trial
@@ -63,7 +65,8 @@ class Stop:
 
 
 class Experiment:
-    """Trials; `outcomes` holds how each trial that began has ended, `stop` why they ended early.
+    """Trials; `outcomes` holds how each trial that began has ended, `odd` what was odd in it, `greatest`
+    what came nearest to the limits in any, `stop` why they ended early.
 
     Raises UserError for what is wrong with controllers, gains or motions.
     """
@@ -83,6 +86,7 @@ class Experiment:
         self.outcomes: dict[int, str] = {}
         self.stop: Stop | None = None
         self.zero: Zero | None = None
+        self.greatest, self.odd = Greatest(), dict[int, str]()
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
 
     def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
@@ -142,6 +146,8 @@ class Experiment:
             prepare(board, settings)
             self.zero = self._home(board, tracking, plane)
             marker = self.zero.marker
+        else:
+            check_zero(board, tracking, settings, self._wrist, plane, self.zero)
         tracking.zero = marker
         loop = ControlLoop(
             board, tracking, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log,
@@ -154,9 +160,11 @@ class Experiment:
         settings, known = self._settings, self._calibration
         if known is not None and settings.positions == "stored":
             known.restore(board)
+            slacken(board, spools_of(settings.actuator), settings.homing, known.zero.signs)
+            check_zero(board, tracking, settings, self._wrist, plane, known.zero)
             return known.zero
         signs = known.zero.signs if known else None
-        return find_zero(board, tracking, spools_of(settings.actuator), settings.homing, plane, signs)
+        return find_zero(board, tracking, settings, self._wrist, plane, signs)
 
     def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
@@ -167,7 +175,11 @@ class Experiment:
         disturbances = Disturbances(push=settings.push.model_copy(update={"force": against}))
         testbed.begin(start, disturbances, self._draws.camera(trial.scenario, trial.repetition))
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
-        loop.follow(followed, law, gains, trial.number, faults)
+        try:
+            loop.follow(followed, law, gains, trial.number, faults)
+        finally:
+            self.greatest = Greatest(*map(max, self.greatest, loop.oddities.greatest))
+            self.odd[trial.number] = loop.oddities.words()
         self._trial_ended(testbed, "ok")
         loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
 

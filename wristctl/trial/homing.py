@@ -18,15 +18,19 @@ import numpy as np
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
-from wristctl.config.hw_run import Homing
+from wristctl.config.hw_run import Homing, RigSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.patience import Patience
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import Spools, on_plus_side
+from wristctl.trial.spools import Spools, spools_of
 from wristctl.trial.tracking import Tracking
 from wristctl.wrist.directions import ACTIVE
 
 log = logging.getLogger(__name__)
 
+_CHECKED = 1.2
+"""Share of `homing.pull` by which a tendon is reeled in to check it."""
 _FURTHEST_DEG = 10.0
 """A bend at which homing stops."""
 
@@ -43,6 +47,8 @@ class Zero:
     """Angle between the markers on the straight wrist [rad]."""
     slack: tuple[float, ...]
     """Reeled in until the tendon was taut [m]."""
+    friction: tuple[float, ...] = (0.0,) * AXES
+    """Path between reeling in and letting go for the same bend [m]."""
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -52,24 +58,33 @@ class Zero:
 class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
-    def __init__(self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, plane: str) -> None:
-        self._board, self._tracking, self._settings = board, tracking, settings
-        self._plus = on_plus_side(plane)
+    def __init__(
+        self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves
+    ) -> None:  # fmt: skip
+        self._board, self._tracking, self._settings, self._expected = board, tracking, settings, expected
+        self._spools = spools
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
         )
         self._start = board.read().position
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
-        self.straight = Patience(board).angle(tracking, 4 * settings.frames)
+        self._straight = Patience(board).reading(tracking, 4 * settings.frames)
+
+    @property
+    def straight(self) -> float:
+        """Marker angle of the straight wrist [rad]."""
+        return self._straight.theta
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
         """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
         for self._signs[axis] in tried:
             for reeled in range(2 * self._move, self._slack + 2 * self._move, 2 * self._move):
                 self._reel(axis, reeled)
-                if abs(self._bent(axis)) > self._bend:
+                bend = self._bent(axis)
+                if abs(bend.theta) > self._bend:
                     self._let_go(axis, 0)
+                    self._expected.judge_side(axis, bend)
                     return reeled
             self._let_go(axis, 0)
         slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
@@ -81,23 +96,26 @@ class _Finder:
         self._at[:] = -2 * self._pull
         self._go()
 
-    def taut(self, axis: int, about: int) -> tuple[float, float]:
-        """The taut point [steps] and steps per radian of an axis that bends the wrist at `about`. Lets go again."""
+    def taut(self, axis: int, about: int) -> tuple[float, float, float]:
+        """Taut point [steps], steps per radian and friction [steps] of an axis that bends at `about`. Lets go again."""
         reeled, bends = [], []
         for at in range(about - 3 * self._move, about + self._pull, self._move):
             self._reel(axis, at)
             bend = self._bent(axis)
-            if abs(bend) > self._bend:
+            if abs(bend.theta) > self._bend:
                 reeled.append(at)
-                bends.append(bend)
-        self._let_go(axis, -2 * self._pull)
+                bends.append(bend.theta)
         if len(reeled) < 3:
+            self._let_go(axis, -2 * self._pull)
             raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, bends, 1)
-        if (slope > 0.0) != bool(self._plus[axis]):
-            what = f"axis {axis} bends the wrist to the other side than tendon {ACTIVE[axis]} should"
-            raise SafetyStop(what, "homing", "check which tendon is on which motor, and markers.positive")
-        return float(-offset / slope), float(1.0 / abs(slope))
+        self._reel(axis, reeled[len(reeled) // 2])
+        friction = (self._bent(axis).theta - offset) / slope - reeled[len(reeled) // 2]
+        self._let_go(axis, -2 * self._pull)
+        self._expected.judge_side(axis, bend)
+        self._expected.judge_slack(axis, -offset / slope * self._spools.step)
+        self._expected.judge_steps(axis, float(1.0 / abs(slope)))
+        return float(-offset / slope), float(1.0 / abs(slope)), float(friction)
 
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
         """Take up every tendon's slack, all at once, and call that zero. Senses of turning."""
@@ -106,14 +124,14 @@ class _Finder:
         self._board.home()
         return tuple(map(int, self._signs))
 
-    def _bent(self, axis: int) -> float:
-        """Angle [rad] from straight. Raises SafetyStop where it is too large."""
+    def _bent(self, axis: int) -> Bend:
+        """From straight. Raises SafetyStop where it is too far."""
         patience = Patience(self._board)
         patience.wait(self._settings.rest)
-        bend = patience.angle(self._tracking, self._settings.frames) - self.straight
-        if abs(bend) > math.radians(_FURTHEST_DEG):
+        bend = self._expected.bend(self._straight, patience.reading(self._tracking, self._settings.frames))
+        if abs(bend.theta) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
-            what = f"axis {axis} bent the wrist by {math.degrees(bend):.1f} deg while homing"
+            what = f"axis {axis} bent the wrist by {math.degrees(bend.theta):.1f} deg while homing"
             raise SafetyStop(what, "homing", "slacken all tendons first")
         return bend
 
@@ -121,7 +139,7 @@ class _Finder:
         self._reel(axis, reeled)
         clock = self._board.transport
         deadline = clock.now() + self._settings.let_go
-        while abs(self._bent(axis)) > 0.5 * self._bend and clock.now() < deadline:
+        while abs(self._bent(axis).theta) > 0.5 * self._bend and clock.now() < deadline:
             pass
 
     def _reel(self, axis: int, reeled: int) -> None:
@@ -140,18 +158,54 @@ def slacken(board: Board, spools: Spools, settings: Homing, signs: Sequence[int]
 
 
 def find_zero(
-    board: Board, tracking: Tracking, spools: Spools, settings: Homing, plane: str, signs: Sequence[int] | None = None
-) -> Zero:
+    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
+    signs: Sequence[int] | None = None,
+) -> Zero:  # fmt: skip
     """Find zero of an enabled board with slack tendons, and home the board there; `signs` where they are known.
 
-    Raises SafetyStop where a tendon does not bend the wrist, bends it too far or the wrong way, or the marker is lost.
+    Raises SafetyStop where a tendon does not bend the wrist, bends it too far, the wrong way or by another's steps, was
+    taut before or sticks, or where the marker is lost.
     """
-    finder = _Finder(board, tracking, spools, settings, plane)
+    expected, spools = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator)
+    finder = _Finder(board, tracking, spools, settings.homing, expected)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
-    taut, slopes = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
+    taut, slopes, friction = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
+    slack, sticking = (tuple(spools.step * each for each in lengths) for lengths in (taut, friction))
+    for axis in range(AXES):
+        expected.judge_friction(axis, sticking[axis])
     senses = finder.settle(taut)
-    slack = tuple(spools.step * each for each in taut)
     for each in zip(ACTIVE, senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", each[0], each[1], 1e3 * each[2], each[3])
-    return Zero(senses, slopes, finder.straight, slack)
+    return Zero(senses, slopes, finder.straight, slack, sticking)
+
+
+def check_zero(
+    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero
+) -> None:
+    """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
+
+    Raises SafetyStop where a motor turns the wrong way or winds another tendon than its own.
+    """
+    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
+    patience = Patience(board)
+    straight = patience.reading(tracking, homing.frames)
+    for axis in range(AXES):
+        at = np.full(AXES, slack)
+        at[axis] = reeled
+        one, two, four, five = map(int, np.array(zero.signs) * at)
+        board.go_to((one, two, four, five), JOG_RATE)
+        patience = Patience(board)
+        patience.wait(2.0 * homing.rest)
+        bend = expected.bend(straight, patience.reading(tracking, homing.frames))
+        slacken(board, spools, homing, zero.signs)
+        expected.judge_small_move(axis, reeled, bend)
+        _straighten(board, tracking, homing, straight.theta)
+
+
+def _straighten(board: Board, tracking: Tracking, homing: Homing, straight: float) -> None:
+    patience, clock = Patience(board), board.transport
+    deadline = clock.now() + homing.let_go
+    while abs(patience.angle(tracking, 1) - straight) > 0.5 * math.radians(homing.bend_deg) and clock.now() < deadline:
+        pass

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from wristctl.bench.fault_injection import Faults
-from wristctl.config.bench import InjectedFault
+from wristctl.config.injected import InjectedFault
 from wristctl.trial.steering import Answer
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,15 @@ _LOOK = 0.05
 """Seconds between two looks at a wrist that stands."""
 _READING = 2.0
 """Seconds within which the marker must be read."""
+
+
+class Reading(NamedTuple):
+    """The marker of a wrist that stands."""
+
+    theta: float
+    """Its angle [rad]."""
+    size: float
+    """Over the base's; nan where it is not measured."""
 
 
 class Patience:
@@ -51,7 +61,11 @@ class Patience:
 
     def angle(self, tracking: Tracking, frames: int) -> float:
         """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
-        found: list[float] = []
+        return self.reading(tracking, frames).theta
+
+    def reading(self, tracking: Tracking, frames: int) -> Reading:
+        """Medians of the next usable frames. Raises SafetyStop where none come."""
+        found: list[tuple[float, float]] = []
         tracking.look()
         began, verdict = self._board.transport.now(), "no frame"
         while len(found) < frames:
@@ -59,11 +73,12 @@ class Patience:
             for seen in tracking.look():
                 verdict = str(seen.verdict)
                 if seen.time >= began and math.isfinite(seen.theta):
-                    found.append(seen.theta)
+                    found.append((seen.theta, seen.size))
             if self._board.transport.now() - began > _READING:
                 fix = "see that the camera sees both markers, sharp and well lit"
                 raise SafetyStop(f"the marker's angle could not be read ({verdict})", "homing", fix)
-        return float(np.median(found))
+        theta, size = np.median(found, axis=0)
+        return Reading(float(theta), float(size))
 
     def _see(self, status: Status) -> None:
         stood = self._stood

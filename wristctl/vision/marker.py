@@ -57,6 +57,8 @@ class Sighting(NamedTuple):
     verdict: SightingVerdict
     corners: Array
     """(2, 4, 2) [px] of the base's and the tip's marker, nan where it is not seen"""
+    size: float = math.nan
+    """Of the tip's marker over the base's, by the edges that a bend across the plane does not foreshorten"""
 
 
 class _Base(NamedTuple):
@@ -87,10 +89,12 @@ class Tracker:
         found = self._find(frame)
         bases, tips = (found.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)
-        if verdict is SightingVerdict.OK:
+        size = math.nan
+        if verdict is SightingVerdict.OK and self._base is not None:
             self._used = frame.time, theta
+            size = _width(self._view.rectify(tips[0])) / _width(self._base.corners)
         shown = np.stack([each[0] if each else _UNSEEN for each in (bases, tips)])
-        return Sighting(frame.time, frame.number, theta, verdict, shown)
+        return Sighting(frame.time, frame.number, theta, verdict, shown, size)
 
     def _find(self, frame: Frame) -> dict[int, list[Array]]:
         wanted = (self._markers.base, self._markers.tip)
@@ -165,3 +169,8 @@ def _ahead(base: Array, tip: Array) -> bool:
     """Whether the tip's marker lies before the base's, in the direction of its top edge, by a side at least."""
     up = base[0] + base[1] - base[2] - base[3]
     return float(up @ (tip.mean(axis=0) - base.mean(axis=0))) > 0.5 * float(up @ up)
+
+
+def _width(corners: Array) -> float:
+    """Mean length of the top and the bottom edge."""
+    return 0.5 * (math.dist(corners[0], corners[1]) + math.dist(corners[3], corners[2]))

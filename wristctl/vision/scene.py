@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +18,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Image
 from wristctl.vision.detector import print_of
 from wristctl.vision.pinhole import Pinhole
-from wristctl.vision.scene_parts import BASE_AT, Stroke, clamp, fingers, last_disc, moving
+from wristctl.vision.scene_parts import BASE_AT, Stroke, bent_across, clamp, fingers, last_disc, moving
 from wristctl.vision.view import View
 
 _CELL, _FINE, _BITS = 16, 6, 4
@@ -38,6 +39,7 @@ class Scene:
         numbers = self._markers.base, self._markers.tip
         self._prints = [self._printed(each) for each in numbers]
         self._film = Film(settings)
+        self._across = 0.0
         still = np.full((settings.height, settings.width), _WALL, np.uint8)
         self._draw(still, *self._projected([clamp()]))
         self._still = [self._with_marker(still.copy(), each, complex(BASE_AT), 1.0) for each in self._prints]
@@ -47,21 +49,26 @@ class Scene:
         """What a perfect calibration of this camera finds."""
         return self.camera.view
 
-    def render(self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False) -> Image:
+    def render(
+        self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
+        across: float = 0.0, turned: float = 0.0,
+    ) -> Image:  # fmt: skip
         """A picture (height, width) of the plant's coordinates (k, q) at k instants of the exposure, which it averages.
 
-        `covered`: a hand lies over the tip's marker; `swapped`: the two markers have changed places.
+        `covered`: a hand lies over the tip's marker; `swapped`: the two markers have changed places; `across`: the
+        wrist is bent away from the camera [rad]; `turned`: the tip's marker has slipped on its flag [rad].
         """
+        self._across = across
         instants = np.atleast_2d(theta)
         total = np.zeros(self._still[0].shape, np.float32)
-        drawings = self._projected([moving(self._backbone, each, self._wrist) for each in instants])
+        drawings = self._projected([self._bent(moving(self._backbone, each, self._wrist)) for each in instants])
         for angles, drawing in zip(instants, drawings, strict=True):
             image = self._still[swapped].copy()
             self._draw(image, drawing)
             place = last_disc(self._backbone, angles, self._wrist)
-            self._with_marker(image, self._prints[not swapped], *place)
+            self._with_marker(image, self._prints[not swapped], place[0], place[1] * cmath.exp(1j * turned), True)
             if covered:
-                self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)]))
+                self._draw(image, *self._projected([self._bent(fingers(*place, -self._settings.marker_offset))]))
             cv2.accumulate(image, total)
         return self._film.expose(total, len(instants), rng)
 
@@ -69,6 +76,12 @@ class Scene:
         """A marker as ink on paper."""
         grey = 128 + self._settings.contrast * (print_of(number).astype(float) - 128)
         return np.rint(grey).astype(np.uint8).repeat(_CELL, axis=0).repeat(_CELL, axis=1)
+
+    def _bent(self, strokes: Sequence[Stroke]) -> list[Stroke]:
+        if not self._across:
+            return list(strokes)
+        bent = self._across, self._wrist.length
+        return [stroke._replace(points=bent_across(stroke.points, *bent)) for stroke in strokes]
 
     def _projected(self, drawings: Sequence[Sequence[Stroke]]) -> list[list[tuple[Stroke, Array]]]:
         """Each stroke with its pixels; all are projected at once."""
@@ -88,13 +101,16 @@ class Scene:
             elif self.camera.side * cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0.0:
                 cv2.fillConvexPoly(image, _fixed(pixels), stroke.grey, cv2.LINE_AA, _BITS)
 
-    def _with_marker(self, image: Image, print_: Image, centre: complex, along: complex) -> Image:
+    def _with_marker(self, image: Image, print_: Image, centre: complex, along: complex, moving: bool = False) -> Image:
         """Paint a print on its flag, its top edge toward `along`. The lens's distortion within it is left out."""
         half = 0.5 * self._markers.side * print_.shape[0] / (print_.shape[0] - 2 * _CELL)
         right = 1j * self.camera.side
         places = centre + along * half * np.array([1 - right, 1 + right, -1 + right, -1 - right])
         depth = np.full(4, -self._settings.marker_offset)
-        corners = self.camera.project(np.stack([places.real, places.imag, depth], axis=-1))
+        points = np.stack([places.real, places.imag, depth], axis=-1)
+        if moving:
+            points = bent_across(points, self._across, self._wrist.length)
+        corners = self.camera.project(points)
         start = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
         width, height = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 2, self.camera.size) - start
         if width <= 0 or height <= 0:

@@ -70,6 +70,24 @@ def moving(backbone: Backbone, q: Array, wrist: WristParameters) -> list[Stroke]
     return parts + _pairs(frames, c, behind=False)
 
 
+def bent_across(points: Array, bend: float, length: float) -> Array:
+    """Points (m, 3) that a bend [rad] away from the camera carries along, of constant curvature up to x = `length`.
+
+    The bend goes by the height x of a point, though a wrist that is bent in its plane too is a little longer than it
+    is high: at 30 degrees by 4 %.
+    """
+    if not bend:
+        return points
+    x, y, depth = points.T
+    along = np.clip(x, 0.0, length)
+    angle = bend / length * along
+    beyond = x - along
+    ahead = 0.5 * along * np.sinc(0.5 * angle / np.pi)  # the chord is twice that long, and half the angle off
+    raised = 2.0 * ahead * np.cos(0.5 * angle) + beyond * np.cos(angle) - depth * np.sin(angle)
+    away = 2.0 * ahead * np.sin(0.5 * angle) + beyond * np.sin(angle) + depth * np.cos(angle)
+    return np.stack([raised, y, away], axis=-1)
+
+
 def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:
     """Two fingers of somebody who holds the last disc, over its marker."""
     return [Stroke(_flat(tip + along * capsule(*ends, 0.0085), depth), 172, "hull") for ends in _FINGERS]

@@ -32,6 +32,16 @@ ACTIVE = tuple(number for number, place in TENDONS.items() if any(place))
 """Tendons that a motor winds, in the order of the board's axes; the one in the centre bends nothing."""
 
 
+def away_of(plane: str, positive: str) -> tuple[int, ...]:
+    """1 for each tendon of `ACTIVE` that pulls the wrist away from a camera that looks at this bending plane, -1 for
+    one that pulls it toward the camera, which sees theta > 0 on its `positive` side, right or left.
+
+    Tangent, ulnar and flexion are right-handed axes.
+    """
+    side = 1 if positive == "right" else -1
+    return tuple(side * (TENDONS[tendon][1] if plane == "ulnar" else -TENDONS[tendon][0]) for tendon in ACTIVE)
+
+
 def tendons_of(plane: str) -> tuple[int, int, int, int]:
     """The four tendons as a bending plane (ulnar or flexion) sees them: two of its + side, two of its - side."""
     plus, minus = (each.tendons for each in DIRECTIONS.values() if each.plane == plane)

@@ -1,0 +1,72 @@
+"""What was odd in a trial that went on all the same: beyond what a sound rig shows, within the limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.trial.following import Greatest
+
+_SHARE = 0.6
+"""Of a limit from which a value is worth a word."""
+_UNSEEN, _RESENT, _SKIPPED = 0.1, 0.002, 0.01
+"""Shares beyond what is believed that are: of frames without an angle, of commands sent again, of ticks skipped."""
+
+
+@dataclass
+class Oddities:
+    """Collected tick by tick over a trial; `words` says what was odd, nothing for a sound one."""
+
+    settings: HwRunSettings
+    greatest: Greatest = field(default_factory=Greatest)
+    gap: float = 0.0
+    """Longest time since the capture of a usable angle [s]."""
+    late: float = 0.0
+    span: float = 0.0
+    """How long it went on [s]."""
+    ticks: int = 0
+    skipped: int = 0
+    usable: int = 0
+    """Frames whose angle was used."""
+    resent: int = 0
+    """Commands that had to be sent again."""
+    reasons: dict[str, int] = field(default_factory=dict)
+    """How often each verdict but ok came."""
+
+    def tick(self, row: dict[str, Any], age: float, greatest: Greatest) -> None:
+        """Take in a tick of the log, the age of the newest usable angle [s], and what has been greatest."""
+        self.greatest = Greatest(*map(max, self.greatest, greatest))
+        self.gap, self.late = max(self.gap, age), max(self.late, row["late"])
+        self.span, self.ticks = row["time"], self.ticks + 1
+        self.usable += math.isfinite(row["theta_measured"])
+        if row["verdict"] not in ("", "ok"):
+            self.reasons[row["verdict"]] = self.reasons.get(row["verdict"], 0) + 1
+
+    def words(self) -> str:
+        """What was odd, in one line."""
+        limits, sensor = self.settings.safety, self.settings.sensor
+        degrees = {"apart": limits.follow_deg, "jump": limits.jump_deg, "across": limits.across_deg}
+        told = {"apart": "off its motors", "jump": "of jump between frames", "across": "across the plane"}
+        found = [
+            f"{value:.1f} deg {told[name]} (limit {limit:g})"
+            for name, limit in degrees.items()
+            if (value := math.degrees(getattr(self.greatest, name))) > _SHARE * limit
+        ]
+        if self.greatest.load > _SHARE * limits.load:
+            found.append(f"a load of {self.greatest.load:.1f} N m (limit {limits.load:g})")
+        if self.gap > _SHARE * limits.stale:
+            found.append(f"no usable marker angle for {1e3 * self.gap:.0f} ms (limit {1e3 * limits.stale:g})")
+        rate, believed = self.usable / max(self.span, 1e-9), sensor.frame_rate * (1.0 - sensor.dropped)
+        if self.span > 0.5 and rate < (1.0 - _UNSEEN) * believed:
+            why = max(self.reasons, key=lambda each: self.reasons[each], default="")
+            what = f"{rate:.0f} usable angles per second instead of {believed:.0f}"
+            found.append(f"{what} ({why})" if why else what)
+        if self.late > _SHARE * limits.late:
+            found.append(f"a tick {1e3 * self.late:.0f} ms late (limit {1e3 * limits.late:g})")
+        if self.skipped > _SKIPPED * self.ticks:
+            found.append(f"{self.skipped} of {self.ticks + self.skipped} ticks skipped")
+        if self.resent > _RESENT * self.ticks:
+            found.append(f"{self.resent} commands sent again: see the cable")
+        return "; ".join(found)

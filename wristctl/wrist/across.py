@@ -1,0 +1,37 @@
+"""What bends the wrist across the plane in which it moves: small bends, of constant curvature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
+
+
+class Across(NamedTuple):
+    """The bend across, linear in it; SI units, positive away from the camera."""
+
+    stiffness: float
+    """Springs, less what upright gravity takes [N m/rad]."""
+    damping: float
+    moment: float
+    """Of gravity across the straight wrist [N m]."""
+    levers: Array
+    """(4,) by axis: what a tendon's pull bends by, and what the bend takes off its path [m]."""
+
+
+def across_of(wrist: WristParameters, away: Sequence[int]) -> Across:
+    """Of a wrist as its other plane knows it; `away` says to which side each axis pulls (`away_of`).
+
+    A bend b of constant curvature moves the point s by s^2 b/(2 L) aside and lowers it by s^3 b^2/(6 L^2); the hand,
+    h beyond the tip, by (L/2 + h) b and (L/6 + h/2) b^2. That plane's + side is the last tendon's, 5.
+    """
+    length, hand = wrist.length, wrist.hand_offset
+    along, aside = wrist.gravity
+    lowering = wrist.mass * length / 12.0 + wrist.hand_mass * (length / 3.0 + hand)
+    beside = wrist.mass * length / 6.0 + wrist.hand_mass * (0.5 * length + hand)
+    levers = wrist.tendon_offset * np.array(away, float)
+    return Across(wrist.stiffness + along * lowering, wrist.damping, aside * beside * float(away[-1]), levers)
