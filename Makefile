@@ -50,8 +50,10 @@ test-identify: .venv/dev
 test-vision: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/vision tests/cli/test_vision_commands.py
 
-# Faults of host, cable, board and camera, one by one and in pairs; hw-run stopped, killed and interrupted.
+# Faults of motors, tendons, camera, cable, host and board at every phase, one by one and in pairs, and sound rigs;
+# hw-run stopped, killed and interrupted.
 test-faults: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/trial/test_fault_table.py
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
 
 bench-peers: .venv/run

@@ -25,8 +25,12 @@ class Case:
     duration: float | None = None
     bench: Mapping[str, Any] = field(default_factory=dict)
     ends: Mapping[Phase, tuple[End, ...]] = field(default_factory=dict)
-    shows: Literal["at once", "wrist", "motion"] = "wrist"
-    """What shows it first: frames and status as they come, the wrist by being elsewhere, or a picture in motion."""
+    shows: Literal["at once", "wrist", "motion", "by chance"] = "wrist"
+    """What shows it first: frames and status as they come, the wrist by being elsewhere, a picture in motion, or
+    nothing but what stops the run."""
+
+    mended: tuple[Phase, ...] = ()
+    """Phases in which it is found and allowed for, so that nothing is odd any more."""
 
     def right(self, phase: Phase) -> tuple[End, ...]:
         """Ends that are right; caught unless the case says otherwise."""
@@ -45,16 +49,17 @@ def _everywhere(*ends: End) -> dict[Phase, tuple[End, ...]]:
     return dict.fromkeys(PHASES, ends)
 
 
-GOES_ON: dict[Phase, tuple[End, ...]] = _everywhere("tolerated")
 EITHER: dict[Phase, tuple[End, ...]] = _everywhere("caught", "tolerated")
+
+HOMED: dict[Phase, tuple[End, ...]] = {"homing": ("tolerated",)}
 
 CASES = (
     Case("dirflip0", "direction-flipped", axis=0),
     Case("dirflip2", "direction-flipped", axis=2),
     Case("dirstuck2", "direction-stuck", axis=2),
-    Case("rev0", bench={"motors": {"reversed": (True, False, False, False)}}),
-    Case("rev2", bench={"motors": {"reversed": (False, False, True, False)}}),
-    Case("revall", bench={"motors": {"reversed": (True, True, True, True)}}),
+    Case("rev0", ends=HOMED, mended=("homing",), bench={"motors": {"reversed": (True, False, False, False)}}),
+    Case("rev2", ends=HOMED, mended=("homing",), bench={"motors": {"reversed": (False, False, True, False)}}),
+    Case("revall", ends=HOMED, mended=("homing",), bench={"motors": {"reversed": (True, True, True, True)}}),
     Case("exch01", bench={"motors": {"order": (1, 0, 2, 3)}}),
     Case("exch02", bench={"motors": {"order": (2, 1, 0, 3)}}),
     Case("exch0123", bench={"motors": {"order": (2, 3, 0, 1)}}),
@@ -66,7 +71,7 @@ CASES = (
     Case("stall2 100 ms", "motor-stalled", axis=2, duration=0.1, ends=EITHER),
     Case("drive2 off", "drive-off", axis=2),
     Case("supply off", "supply-off"),
-    Case("supply blip", "supply-off", duration=0.5),
+    Case("supply blip", "supply-off", duration=0.5, ends=EITHER),
     Case("microsteps 8", bench={"actuator": {"microstep": 8}}),
     Case("microsteps 32", bench={"actuator": {"microstep": 32}}),
     Case("one drive's microsteps", bench={"motors": {"step_scale": (1.0, 1.0, 2.0, 1.0)}}),
@@ -113,8 +118,8 @@ CASES = (
     Case("answers 8 ms late", "answers-late", 8.0, ends=EITHER, shows="at once"),
     Case("answers held 50 ms", "answers-held", 50.0, ends=EITHER, shows="at once"),
     Case("answers held 200 ms", "answers-held", 200.0, ends=EITHER, shows="at once"),
-    Case("bit errors 1e-4", "bytes-garbled", 1e-4, ends=EITHER, shows="at once"),
-    Case("bit errors 1e-3", "bytes-garbled", 1e-3, ends=EITHER, shows="at once"),
+    Case("bit errors 1e-4", "bytes-garbled", 1e-4, ends=EITHER, shows="by chance"),
+    Case("bit errors 1e-3", "bytes-garbled", 1e-3, ends=EITHER, shows="by chance"),
     Case("pause 30 ms", "host-pause", 30.0, ends=EITHER, shows="at once"),
     Case("pause 200 ms", "host-pause", 200.0, shows="at once"),
     Case("board resets", "board-reset", shows="at once"),
@@ -122,3 +127,11 @@ CASES = (
     Case("host silent", "host-silent", shows="at once"),
     Case("emergency stop", "estop-pressed", shows="at once"),
 )
+
+EXCEPTED = {
+    "a second marker 1": "seen only when the markers are searched for, in the next plane: while they are followed it does "
+    "no harm, and nothing looks elsewhere in the picture",
+    "a second marker 0": "as a second marker 1",
+    "blurred 2 px": "angles are right until the base has not been seen whole for gates.base_memory, 0.5 s",
+}
+"""Kinds that need not be caught in time, and why: docs/hardware/faults.md."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import pickle
 import tempfile
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from tests.trial.conftest import WRIST
 from tests.trial.fault_cases import AT, Case, End, Phase
@@ -18,6 +20,7 @@ from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.injected import InjectedFault
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.homing import Zero
@@ -30,6 +33,9 @@ WITHIN, PULL, LITTLE_PULL, LITTLE_ERROR = 0.4, 60.0, 30.0, 2.0
 """Of what is caught: seconds and true newtons; of what is tolerated: newtons and true degrees."""
 _SHOWN, _CAMERA = np.deg2rad(1.0), 3.0 / 60.0
 """Difference from a sound wrist that a frame can show, and how long after."""
+_ALIKE = np.deg2rad(0.5), 2.0
+"""Radians and newtons that a sound run's own noise makes up to."""
+_AHEAD, _FIRST = 0.01, ("homing", "moving")
 _FULL = {
     "directions": ("ulnar", "flexion"), "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
     "reference": {"duration": 1.0, "angle_deg": 30.0}, "horizon": 2.0, "back": 1.0, "rest": 0.3,
@@ -53,7 +59,6 @@ def over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
 class Course(NamedTuple):
     """What the wrist did, against the board's clock, and how the run ended."""
 
-    settings: HwRunSettings
     first: float
     """Start of the first trial's motion, nan if none began."""
     time: Array
@@ -88,39 +93,97 @@ class _Watched(Experiment):
         super()._stopped(testbed, board, error)
 
 
-def perform(changes: Mapping[str, Any], seed: int = 0) -> Course:
-    """Do the experiment of these settings."""
+def perform(
+    changes: Mapping[str, Any], seed: int = 0, prepared: Callable[[VirtualBench], None] | None = None
+) -> Course:
+    """Do the experiment of these settings; its bench can be prepared."""
     settings = HwRunSettings.model_validate(changes)
     bench = VirtualBench(settings.bench, WRIST, seed, settings.markers)
+    if prepared is not None:
+        prepared(bench)
     stored = _at_zero() if settings.positions == "stored" else None
-    with tempfile.TemporaryDirectory() as folder:
-        log = TrialLog(Path(folder), settings.bench.segments, settings.control_period)
-        trials = trials_of(settings, np.random.default_rng(0))
-        done = _Watched(settings, WRIST, trials, log, calibration=stored, seed=seed)
-        reason, fix, code = "", "", 0
-        try:
-            done.run(EmulatedTestbed(bench, settings, View(), None))
-        except UserError as error:
-            reason, fix, code = error.what, str(error.fix), error.exit_code
+    rows: list[tuple[float, ...]] = []
+
+    def shown(row: dict[str, Any]) -> None:
+        rows.append((row["trial"], row["clock"], row["theta_ref"], row["rate_ref"]))
+
+    log = TrialLog(Path(tempfile.mkdtemp()), settings.bench.segments, settings.control_period)
+    trials = trials_of(settings, np.random.default_rng(0))
+    done = _Watched(settings, WRIST, trials, log, calibration=stored, seed=seed)
+    reason, fix, code = "", "", 0
+    try:
+        done.run(EmulatedTestbed(bench, settings, View(), None), shown)
+    except UserError as error:
+        reason, fix, code = error.what, str(error.fix), error.exit_code
+    finally:
         log.close()
-        rows = pd.read_csv(Path(folder) / "log.csv")
-        between = pd.read_csv(Path(folder) / "between.csv")
     stopped = bench.transport.now()
     bench.transport.wait(0.3)
     truth, start = bench.truth(), bench._rig.faults._starts["first trial"]
-    error = 0.0
-    if len(rows):
-        true = np.interp(rows["clock"], truth.time, truth.angle)
-        error = float(np.abs(true - rows["theta_ref"]).max())
-    both = pd.concat([rows, between])
-    moves = np.sort(both["clock"][both["rate_ref"].abs() > 0.05].to_numpy()) if len(both) else np.empty(0)
+    told = np.array(rows).reshape(-1, 4)
+    tried = told[told[:, 0] >= 0]
+    error = float(np.abs(np.interp(tried[:, 1], truth.time, truth.angle) - tried[:, 2]).max(initial=0.0))
     steps = [each for each in bench.motion().last_step if each is not None]
     odd = "; ".join(words for words in done.odd.values() if words)
-    decided = min(done.decided, stopped) if reason else np.inf
     return Course(
-        settings, start, truth.time, truth.angle, truth.across, truth.pull.max(axis=1), error, decided,
-        max(steps, default=0.0), reason, fix, code, odd, moves,
+        start, truth.time, truth.angle, truth.across, truth.pull.max(axis=1), error,
+        min(done.decided, stopped) if reason else np.inf, max(steps, default=0.0), reason, fix, code, odd,
+        told[np.abs(told[:, 3]) > 0.05, 1],
     )  # fmt: skip
+
+
+class _EndedByForks(BaseException):
+    """All that was to come has been done by others."""
+
+
+def fan_out(phase: Phase, groups: Sequence[Sequence[Case]], workers: int = 2) -> list[Judged]:
+    """Judge faults of one moment, alone or together: the experiment is done once up to there, and then once for each.
+
+    A process forks there; its children go on with one group of faults each.
+    """
+    sound, mine = sound_course(phase), []
+    with tempfile.TemporaryDirectory() as folder:
+
+        def fork(bench: VirtualBench) -> None:
+            children: set[int] = set()
+            for number, group in enumerate(groups):
+                while len(children) >= workers:
+                    children.discard(os.wait()[0])
+                if not (child := os.fork()):
+                    injected = [InjectedFault.model_validate(each) for case in group for each in case.faults(phase)]
+                    bench._rig.faults._faults = tuple(injected)
+                    mine.append(number)
+                    return
+                children.add(child)
+            while children:
+                children.discard(os.wait()[0])
+            raise _EndedByForks
+
+        def prepared(bench: VirtualBench) -> None:
+            transport, forked, starts = bench.transport, [False], bench._rig.faults._starts
+            run, since = transport._run, "power-on" if phase == "homing" else "first trial"
+
+            def watched(end: int) -> None:
+                if not forked[0] and transport.now() > starts[since] + AT[phase] - _AHEAD:
+                    forked[0] = True
+                    fork(bench)
+                run(end)
+
+            transport._run = watched  # type: ignore[method-assign]
+
+        try:
+            course = perform(_settings(phase), prepared=prepared)
+            judged = judge(groups[mine[0]], phase, course, sound)
+            Path(folder, str(mine[0])).write_bytes(pickle.dumps(judged))
+            os._exit(0)
+        except _EndedByForks:
+            found = [Path(folder, str(number)) for number in range(len(groups))]
+            return [pickle.loads(file.read_bytes()) for file in found if file.exists()]
+        except BaseException:
+            if mine:
+                traceback.print_exc()
+                os._exit(1)
+            raise
 
 
 class Judged(NamedTuple):
@@ -137,18 +200,21 @@ class Judged(NamedTuple):
     said: str
 
 
+def _settings(phase: Phase) -> dict[str, Any]:
+    return over(_FULL, _HOMED) if phase == "homing" else dict(_FULL)
+
+
 @cache
-def _sound(phase: Phase) -> Course:
-    return perform(over(_FULL, _HOMED) if phase == "homing" else _FULL)
+def sound_course(phase: Phase) -> Course:
+    """The same without a fault."""
+    return (
+        perform(_settings("homing" if phase == "homing" else "moving")) if phase in _FIRST else sound_course("moving")
+    )
 
 
-def run_case(cases: Sequence[Case], phase: Phase) -> Judged:
-    """Perform and judge one case, or several at once: then the earliest that is caught counts."""
-    changes = over(_FULL, _HOMED) if phase == "homing" else dict(_FULL)
-    for case in cases:
-        changes = over(changes, {"bench": case.bench})
-    changes = over(changes, {"bench": {"faults": tuple(fault for case in cases for fault in case.faults(phase))}})
-    return judge(cases, phase, perform(changes), _sound(phase))
+def from_power_on(case: Case, phase: Phase) -> Judged:
+    """Perform and judge a rig that is otherwise from the start."""
+    return judge([case], phase, perform(over(_settings(phase), {"bench": case.bench})), sound_course(phase))
 
 
 def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) -> Judged:
@@ -164,21 +230,33 @@ def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) ->
         begin = course.decided
     seen = min(_shown(case, begin, course, sound) for case in cases)
     seconds = max(0.0, stopped - seen) if course.reason else np.nan
+    name = " + ".join(case.name for case in cases)
     ends = {each for case in cases for each in case.right(phase)}
     right = end in ends if len(cases) == 1 else end == "caught" or all("tolerated" in c.right(phase) for c in cases)
+    if end == "tolerated" and _as_sound(course, sound):
+        return Judged(name, phase, "no effect", right, np.nan, pull, float(np.rad2deg(course.error)), course.odd)
     if end == "caught":
         creeping = phase in ("homing", "waiting")
         right &= course.code in (4, 5) and pull < PULL and (seconds <= WITHIN or creeping)
     else:
-        right &= pull <= LITTLE_PULL and np.rad2deg(course.error) <= LITTLE_ERROR and bool(course.odd)
-    name = " + ".join(case.name for case in cases)
+        right &= pull <= LITTLE_PULL and np.rad2deg(course.error) <= LITTLE_ERROR
+        right &= bool(course.odd) or any(phase in case.mended for case in cases)
     return Judged(name, phase, end, right, seconds, pull, float(np.rad2deg(course.error)), course.reason or course.odd)
+
+
+def _as_sound(course: Course, sound: Course) -> bool:
+    """Whether nothing was otherwise than in the sound run."""
+    angle = np.interp(course.time, sound.time, sound.angle)
+    alike = float(np.abs(course.angle - angle).max()) < _ALIKE[0]
+    return alike and float(course.pull.max() - sound.pull.max()) < _ALIKE[1]
 
 
 def _shown(case: Case, begin: float, course: Course, sound: Course) -> float:
     """When a frame or a status could first show this fault."""
     if case.shows == "at once":
         return begin
+    if case.shows == "by chance":
+        return course.decided
     if case.shows == "motion":
         moves = course.moves[course.moves >= begin]
         return float(moves[0]) + _CAMERA if len(moves) else begin
@@ -200,3 +278,27 @@ def table(judged: Sequence[Judged]) -> str:
         said = each.said[:110]
         lines.append(f"| {each.name} | {each.phase} | {end} | {ms} | {each.pull:.0f} | {each.error:.1f} | {said} |")
     return "\n".join(lines)
+
+
+def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:
+    """A sound rig drawn from those that there may be, homed, in one plane, pushed by a person."""
+    late = rng.uniform(-0.02, 0.02)
+    bench = {
+        "plant": {
+            "stiffness_scale": rng.uniform(0.6, 1.2), "tendon_radius": WRIST.tendon_radius * rng.uniform(0.97, 1.03),
+            "creep": 0.04,
+        },
+        "actuator": {
+            "tendon_stiffness": float(np.exp(rng.uniform(np.log(5e3), np.log(50e3)))), "sheath": rng.uniform(0.0, 2.0),
+            "creep": 0.04,
+        },
+        "camera": {"delay_frames": 2.0 + 60.0 * late},
+        "motors": {"slack": tuple(rng.uniform(1e-4, 5e-4, 4).tolist())},
+        "person": {"takes": 1.0},
+    }  # fmt: skip
+    own = {
+        "calibration": None, "positions": "find",
+        "directions": (("ulnar", "flexion", "radial", "extension")[number % 4],),
+        "horizon": 3.5, "push": {"force": 2.0, "start": 2.0}, "without_push": False,
+    }  # fmt: skip
+    return over(over(_FULL, own), {"bench": bench})

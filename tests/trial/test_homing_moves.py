@@ -59,8 +59,10 @@ def test_taut_points_steps_per_radian_senses_and_the_glued_on_angle_are_found(
     assert zero.slack == pytest.approx(SLACK * SPOOLS.step, abs=1e-9)
     assert zero.steps_per_radian == pytest.approx(PER_RADIAN, rel=1e-9)
     assert zero.marker == pytest.approx(GLUED)
+    assert zero.friction == pytest.approx([0.0] * 4, abs=1e-9)
     assert zero.plain() == {
         "signs": zero.signs, "steps_per_radian": zero.steps_per_radian, "marker": zero.marker, "slack": zero.slack,
+        "friction": zero.friction,
     }  # fmt: skip
     with pytest.raises(FrozenInstanceError):
         zero.marker = 0.0  # type: ignore[misc]

@@ -53,7 +53,7 @@ class Safety(Section):
     )
     load: float = quantity(1.6, "N m", "largest load torque that the observer may find", "measured", gt=0)
     across_deg: float = quantity(
-        1.2, "deg", "largest bend across the plane, by the size of the tip's marker", "measured", gt=0
+        1.0, "deg", "largest bend across the plane, by the size of the tip's marker", "measured", gt=0
     )
     odd_for: float = quantity(0.06, "s", "how long follow_deg, load or across_deg may be exceeded", "assumed", ge=0)
     stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)

@@ -161,6 +161,7 @@ class ControlLoop:
         found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
         for seen in self._tracking.look():
             found["verdict"] = self._verdict = str(seen.verdict)
+            self.oddities.base(seen.corners[0])
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time
                 self._following.saw(seen, seen.time - self._epoch)
@@ -212,6 +213,8 @@ class ControlLoop:
             self._steering.predict(plus, minus)
             self._following.predict(plus, minus)
         self._timing.overruns += self._skipped
+        self.oddities.round_trips.append(self._board.round_trip)
+        self._monitor.went_on(self._skipped, self._board.round_trip)
 
     def _reeled(self) -> Array:
         """What the spools hold [steps], by the last status."""

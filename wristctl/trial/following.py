@@ -90,7 +90,8 @@ class Following:
             self._past.popleft()
         limits = self._limits
         apart = now.seen - float(np.clip(now.seen, now.predicted.min(), now.predicted.max()))
-        known = Greatest(*(0.0 if math.isnan(each) else abs(each) for each in (apart, self._jump(), load, now.away)))
+        jump = _jump(*list(self._past)[-2:]) if len(self._past) > 1 else 0.0
+        known = Greatest(*(0.0 if math.isnan(each) else abs(each) for each in (apart, jump, load, now.away)))
         self.greatest = Greatest(*map(max, self.greatest, known))
         if known.jump > math.radians(limits.jump_deg):
             raise self._stop("jump", known.jump, math.radians(limits.jump_deg))
@@ -113,15 +114,6 @@ class Following:
             return
         raise self._stop(what, value, limit)
 
-    def _jump(self) -> float:
-        """By how much the newest frame came off the motion that the spools should have made since the one before."""
-        if len(self._past) < 2 or self._past[-1].captured == self._past[-2].captured:
-            return 0.0
-        one, two = self._past[-2], self._past[-1]
-        if two.captured - one.captured > _SUCCESSIVE:
-            return 0.0
-        return float(np.abs(two.seen - one.seen - (two.predicted - one.predicted)).min())
-
     def _stop(self, what: str, value: float, limit: float) -> SafetyStop:
         return SafetyStop(f"{self._told(what, value, limit)}; likely {', or '.join(self._causes()[:4])}", fix=_FIX)
 
@@ -137,7 +129,7 @@ class Following:
 
     def _causes(self) -> list[str]:
         first, last = self._past[0], self._past[-1]
-        jump = max((abs(b.seen - a.seen) for a, b in pairwise(self._past)), default=0.0)
+        jump = max((_jump(one, two) for one, two in pairwise(self._past)), default=0.0)
         evidence = Evidence(
             turned=last.position - first.position,
             load=last.load,
@@ -151,3 +143,10 @@ class Following:
 
 
 _FIX = "cut the motors' supply, slacken the tendons by hand, and look; docs/hardware/faults.md says how each shows"
+
+
+def _jump(one: Followed, two: Followed) -> float:
+    """By how much a second frame came off the motion that the spools should have made since the first."""
+    if not 0.0 < two.captured - one.captured <= _SUCCESSIVE:
+        return 0.0
+    return float(np.abs(two.seen - one.seen - (two.predicted - one.predicted)).min())

@@ -29,7 +29,7 @@ class Evidence(NamedTuple):
     meant: float
     """By how much the wrist has bent, and should have by its spools."""
     jump: float
-    """Largest change of the marker's angle from one frame to the next."""
+    """Largest change of the marker's angle from one frame to the next, off what the spools make."""
     bends: float
     """Bend across that is beyond the limit."""
 
@@ -41,11 +41,11 @@ def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> 
     more. Of each pair the bend across tells which: it is away from a camera for a tendon that pulls too much on the
     far side, or too little on the near one.
     """
-    if abs(seen.across) > 0.5 * seen.bends:
+    if abs(seen.across) > 0.5 * seen.bends and seen.jump <= _JUMP:
         return _of_one_tendon(seen, plus, away)
     causes, meant = [], abs(seen.meant) > _MEANT
-    if seen.jump > _JUMP and not meant:
-        causes.append("the tip's marker has slipped on its disc")
+    if seen.jump > _JUMP:
+        causes += ["the tip's marker has slipped on its disc", "the camera shows or dates pictures wrongly"]
     share = seen.bent / seen.meant if meant else math.nan
     if abs(share) < 0.15:
         causes.append("the motors have no supply")
@@ -59,8 +59,8 @@ def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> 
         causes.append("motors exchanged, detached or slipped tendons on a side, or a stalled motor")
     else:
         causes.append("a side's tendons slipped or came off, or the motors' supply was lost")
-    if seen.jump <= _JUMP or meant:
-        causes.append("the tip's marker has slipped on its disc")
+    if seen.jump <= _JUMP:
+        causes += ["the camera shows old pictures", "the tip's marker has slipped on its disc"]
     return [*dict.fromkeys(causes), "something holds or pushes the wrist"]
 
 

@@ -6,13 +6,18 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.following import Greatest
 
-_SHARE = 0.6
-"""Of a limit from which a value is worth a word."""
+_SHARE, _FOLLOWING = 0.6, {"apart": 0.35, "jump": 0.5, "across": 0.8}
+"""Of a limit from which a value is worth a word, above what sound rigs of the default settings show."""
 _UNSEEN, _RESENT, _SKIPPED = 0.1, 0.002, 0.01
 """Shares beyond what is believed that are: of frames without an angle, of commands sent again, of ticks skipped."""
+_MOVED, _LONG = 0.03, 0.85
+"""Of the marker's side, and of the control period."""
 
 
 @dataclass
@@ -34,6 +39,21 @@ class Oddities:
     """Commands that had to be sent again."""
     reasons: dict[str, int] = field(default_factory=dict)
     """How often each verdict but ok came."""
+    round_trips: list[float] = field(default_factory=list)
+    """From each tick's command to its answer [s]."""
+    moved: float = 0.0
+    """How far the base's marker was from where it was first, in its sides."""
+    _base: Array | None = None
+
+    def base(self, corners: Array) -> None:
+        """Take in the corners (4, 2) [px] of the base's marker, nan where it was not seen."""
+        if not np.isfinite(corners).all():
+            return
+        if self._base is None:
+            self._base = corners
+        side = math.dist(*self._base[:2])
+        if side > 0.0:
+            self.moved = max(self.moved, float(np.hypot(*(corners - self._base).mean(axis=0))) / side)
 
     def tick(self, row: dict[str, Any], age: float, greatest: Greatest) -> None:
         """Take in a tick of the log, the age of the newest usable angle [s], and what has been greatest."""
@@ -52,7 +72,7 @@ class Oddities:
         found = [
             f"{value:.1f} deg {told[name]} (limit {limit:g})"
             for name, limit in degrees.items()
-            if (value := math.degrees(getattr(self.greatest, name))) > _SHARE * limit
+            if (value := math.degrees(getattr(self.greatest, name))) > _FOLLOWING[name] * limit
         ]
         if self.greatest.load > _SHARE * limits.load:
             found.append(f"a load of {self.greatest.load:.1f} N m (limit {limits.load:g})")
@@ -67,6 +87,10 @@ class Oddities:
             found.append(f"a tick {1e3 * self.late:.0f} ms late (limit {1e3 * limits.late:g})")
         if self.skipped > _SKIPPED * self.ticks:
             found.append(f"{self.skipped} of {self.ticks + self.skipped} ticks skipped")
+        if self.moved > _MOVED:
+            found.append(f"the base's marker moved by {100.0 * self.moved:.0f} % of its side: camera or clamp is loose")
+        if self.round_trips and (taken := float(np.median(self.round_trips))) > _LONG * self.settings.control_period:
+            found.append(f"the board's answers took {1e3 * taken:.1f} ms, of {1e3 * self.settings.control_period:g} ms")
         if self.resent > _RESENT * self.ticks:
             found.append(f"{self.resent} commands sent again: see the cable")
         return "; ".join(found)

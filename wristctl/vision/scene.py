@@ -61,14 +61,14 @@ class Scene:
         self._across = across
         instants = np.atleast_2d(theta)
         total = np.zeros(self._still[0].shape, np.float32)
-        drawings = self._projected([self._bent(moving(self._backbone, each, self._wrist)) for each in instants])
+        drawings = self._projected([moving(self._backbone, each, self._wrist) for each in instants], True)
         for angles, drawing in zip(instants, drawings, strict=True):
             image = self._still[swapped].copy()
             self._draw(image, drawing)
             place = last_disc(self._backbone, angles, self._wrist)
             self._with_marker(image, self._prints[not swapped], place[0], place[1] * cmath.exp(1j * turned), True)
             if covered:
-                self._draw(image, *self._projected([self._bent(fingers(*place, -self._settings.marker_offset))]))
+                self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)], True))
             cv2.accumulate(image, total)
         return self._film.expose(total, len(instants), rng)
 
@@ -77,16 +77,13 @@ class Scene:
         grey = 128 + self._settings.contrast * (print_of(number).astype(float) - 128)
         return np.rint(grey).astype(np.uint8).repeat(_CELL, axis=0).repeat(_CELL, axis=1)
 
-    def _bent(self, strokes: Sequence[Stroke]) -> list[Stroke]:
-        if not self._across:
-            return list(strokes)
-        bent = self._across, self._wrist.length
-        return [stroke._replace(points=bent_across(stroke.points, *bent)) for stroke in strokes]
-
-    def _projected(self, drawings: Sequence[Sequence[Stroke]]) -> list[list[tuple[Stroke, Array]]]:
-        """Each stroke with its pixels; all are projected at once."""
+    def _projected(
+        self, drawings: Sequence[Sequence[Stroke]], moving: bool = False
+    ) -> list[list[tuple[Stroke, Array]]]:
+        """Each stroke with its pixels, bent across where it moves; all are projected at once."""
         strokes = [stroke for drawing in drawings for stroke in drawing]
-        pixels = self.camera.project(np.concatenate([stroke.points for stroke in strokes]))
+        points = np.concatenate([stroke.points for stroke in strokes])
+        pixels = self.camera.project(bent_across(points, self._across if moving else 0.0, self._wrist.length))
         parts = iter(np.split(pixels, np.cumsum([len(stroke.points) for stroke in strokes])[:-1]))
         return [[(stroke, next(parts)) for stroke in drawing] for drawing in drawings]
 

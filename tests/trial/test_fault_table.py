@@ -1,0 +1,94 @@
+"""Every fault of the table at every phase of an experiment: caught in time, or tolerated and named."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.trial.fault_cases import CASES, EXCEPTED, PHASES, Case, Phase
+from tests.trial.fault_runs import Judged, fan_out, from_power_on, perform, rig_settings, sound_course, table
+
+THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
+thorough = pytest.mark.skipif(not THOROUGH, reason="with WRISTCTL_THOROUGH: takes minutes")
+WORKERS, PAIRS, RIGS = 2, 300, 100
+INJECTED = [case for case in CASES if case.kind]
+BUILT = [case for case in CASES if not case.kind]
+SAMPLE = ("dirflip2", "detach2", "supply off", "marker slips 5 deg", "ring of 4", "covered 100 ms")
+
+
+def wrong(judged: list[Judged]) -> list[Judged]:
+    """Those that did not end as they were to, and are not excepted."""
+    return [each for each in judged if not each.right and each.name not in EXCEPTED]
+
+
+def test_there_are_enough_kinds_and_few_exceptions() -> None:
+    assert len(INJECTED) >= 30 and len({case.name for case in CASES}) == len(CASES)
+    assert len(EXCEPTED) <= 5 and set(EXCEPTED) <= {case.name for case in CASES}
+
+
+def test_some_faults_in_motion_end_as_they_are_to() -> None:
+    judged = fan_out("moving", [[case] for case in CASES if case.name in SAMPLE])
+    assert len(judged) == len(SAMPLE)
+    assert not wrong(judged), table(judged)
+    causes = {each.name: each.said for each in judged}
+    assert "axis 2 (tendon 4) turns the wrong way" in causes["dirflip2"]
+    assert "the tendon of axis 2 (tendon 4) is off its pulley" in causes["detach2"]
+    assert "no supply" in causes["supply off"]
+    assert "the tip's marker has slipped" in causes["marker slips 5 deg"]
+
+
+@thorough
+@pytest.mark.parametrize("phase", PHASES)
+def test_each_fault_alone_ends_as_it_is_to(phase: Phase) -> None:
+    judged = fan_out(phase, [[case] for case in INJECTED], WORKERS)
+    assert len(judged) == len(INJECTED)
+    print(f"\n{table(judged)}")
+    assert not wrong(judged)
+
+
+@thorough
+@pytest.mark.parametrize("phase", ["homing", "moving"])
+def test_a_rig_that_is_built_wrong_is_refused_before_it_moves(phase: Phase) -> None:
+    """Homed from scratch, and with a calibration that was of the rig as it had been."""
+    sound_course(phase)
+    with ProcessPoolExecutor(WORKERS, get_context("fork")) as pool:
+        judged = list(pool.map(from_power_on, BUILT, itertools.repeat(phase)))
+    print(f"\n{table(judged)}")
+    assert not wrong(judged)
+
+
+@thorough
+@pytest.mark.parametrize("phase", PHASES)
+def test_two_faults_at_once_are_caught(phase: Phase) -> None:
+    """Pairs drawn by a seed, as many in each phase."""
+    rng = np.random.default_rng(20261123)
+    pairs: list[list[Case]] = []
+    for number in range(PAIRS):
+        one, other = (INJECTED[k] for k in rng.choice(len(INJECTED), 2, replace=False))
+        if PHASES[number % len(PHASES)] == phase:
+            pairs.append([one, other])
+    judged = fan_out(phase, pairs, WORKERS)
+    assert len(judged) == len(pairs)
+    print(f"\n{table([each for each in judged if not each.right])}\n{len(judged)} pairs")
+    assert not [each for each in wrong(judged) if not set(each.name.split(" + ")) & set(EXCEPTED)]
+
+
+def _alarm(number: int) -> tuple[int, str, dict[str, Any]]:
+    settings = rig_settings(np.random.default_rng([20261123, number]), number)
+    return number, perform(settings, number).reason, settings
+
+
+@thorough
+def test_no_sound_rig_raises_a_false_alarm() -> None:
+    sound_course("homing")
+    with ProcessPoolExecutor(WORKERS, get_context("fork")) as pool:
+        ended = list(pool.map(_alarm, range(RIGS)))
+    alarms = [each for each in ended if each[1]]
+    print(f"\n{RIGS - len(alarms)} of {RIGS} sound rigs without a false alarm")
+    assert not alarms
