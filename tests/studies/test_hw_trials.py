@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
 from wristctl.studies import hw_trials
 from wristctl.studies.unattended import Unattended
+from wristctl.trial.following import Greatest
 from wristctl.trial.log import LOG, TrialLog
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tick_timing import TickTiming
@@ -61,12 +62,14 @@ class Bench:
     verified = True
     truth = True
     ticks = 100
+    odd: Mapping[int, str] = {}
 
     def __init__(self, settings: Any, wrist: Any, trials: Any, log: TrialLog, *others: Any) -> None:
         assert others == (None, None, None, 4) and wrist.stiffness == 77.0
         self.log, self.trials, self.timing = log, trials, TickTiming(settings.control_period, list(self.late), 7)
         self.motions = {"ulnar": motion_of(settings, wrist, "ulnar")}
         self.outcomes: dict[int, str] = {}
+        self.greatest = Greatest(math.radians(1.0), math.radians(2.0), 0.3, 0.0)
         self.zero = SimpleNamespace(plain=lambda: {"marker": 0.5})
         self.stop: Any = None
 
@@ -222,3 +225,16 @@ def test_a_log_that_cannot_be_closed_is_a_safety_stop_unless_something_stopped_i
             perform()
     _, run, _, _ = perform()
     assert "the log cannot be written: No space left on device" in run.file("run.json").read_text()
+
+
+def test_what_was_odd_and_how_near_it_came_to_the_limits_is_told(
+    perform: Perform, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        table, run, _, findings = perform(odd={0: "", 1: "no usable marker angle for 120 ms"})
+    assert table["odd"].tolist() == ["", "no usable marker angle for 120 ms"]
+    said = "Trial 1 went through, but was odd: no usable marker angle for 120 ms"
+    assert [record.getMessage() for record in caplog.records] == [said]
+    readme = run.file("README.md").read_text()
+    assert said in readme and "apart 1 of 3.5 deg, jump 2 of 2 deg, load 0.3 of 1.6 N m, across 0 of 1 deg" in readme
+    assert findings.metrics["greatest_load"]["value"] == 0.3

@@ -52,6 +52,8 @@ def _everywhere(*ends: End) -> dict[Phase, tuple[End, ...]]:
 EITHER: dict[Phase, tuple[End, ...]] = _everywhere("caught", "tolerated")
 
 HOMED: dict[Phase, tuple[End, ...]] = {"homing": ("tolerated",)}
+READ_ANEW: dict[Phase, tuple[End, ...]] = {"waiting": ("tolerated",), "homing": ("caught", "tolerated")}
+"""Markers are looked for anew in every plane, and the straight wrist's angle read."""
 
 CASES = (
     Case("dirflip0", "direction-flipped", axis=0),
@@ -78,8 +80,8 @@ CASES = (
     Case("pulley 15 mm", bench={"actuator": {"pulley_radius": 0.015}}),
     Case("tendons 2 kN/m", bench={"actuator": {"tendon_stiffness": 2000.0}}, ends=EITHER),
     Case("tendons 100 kN/m", bench={"actuator": {"tendon_stiffness": 100e3}}, ends=EITHER),
-    Case("marker slips 5 deg", "marker-turned", 5.0, shows="at once"),
-    Case("marker slips 15 deg", "marker-turned", 15.0, shows="at once"),
+    Case("marker slips 5 deg", "marker-turned", 5.0, ends=READ_ANEW, shows="at once"),
+    Case("marker slips 15 deg", "marker-turned", 15.0, ends=READ_ANEW, shows="at once"),
     Case("ring of 2", "camera-repeats", 2.0, shows="motion"),
     Case("ring of 4", "camera-repeats", 4.0, shows="motion"),
     Case("frozen", "camera-frozen", shows="at once"),
@@ -100,7 +102,7 @@ CASES = (
     Case("a second marker 1", "marker-twice", 1.0, ends=EITHER, shows="at once"),
     Case("a second marker 0", "marker-twice", 0.0, ends=EITHER, shows="at once"),
     Case("mirrored", "picture-mirrored", shows="at once"),
-    Case("upside down", "picture-turned", 180.0, shows="at once"),
+    Case("upside down", "picture-turned", 180.0, ends=READ_ANEW, shows="at once"),
     Case("overexposed x3", "picture-bright", 3.0, ends=EITHER, shows="at once"),
     Case("overexposed x1.5", "picture-bright", 1.5, ends=EITHER, shows="at once"),
     Case("dark", "picture-dark", 0.08, shows="at once"),
@@ -109,10 +111,10 @@ CASES = (
     Case("smeared 15 px", "picture-smeared", 15.0, shows="at once"),
     Case("camera lost", "camera-lost", shows="at once"),
     Case("another scene", "picture-other", shows="at once"),
-    Case("shifted 20 px", "picture-shifted", 20.0, shows="at once"),
+    Case("shifted 20 px", "picture-shifted", 20.0, ends=READ_ANEW, shows="at once"),
     Case("shifted 3 px", "picture-shifted", 3.0, ends=EITHER, shows="at once"),
     Case("turned 2 deg", "picture-turned", 2.0, ends=EITHER, shows="at once"),
-    Case("turned 15 deg", "picture-turned", 15.0, shows="at once"),
+    Case("turned 15 deg", "picture-turned", 15.0, ends=READ_ANEW, shows="at once"),
     Case("usb latency 16 ms", "usb-latency", 16.0, ends=EITHER, shows="at once"),
     Case("answers 1 ms late", "answers-late", 1.0, ends=EITHER, shows="at once"),
     Case("answers 8 ms late", "answers-late", 8.0, ends=EITHER, shows="at once"),
@@ -129,9 +131,11 @@ CASES = (
 )
 
 EXCEPTED = {
-    "a second marker 1": "seen only when the markers are searched for, in the next plane: while they are followed it does "
-    "no harm, and nothing looks elsewhere in the picture",
+    "a second marker 1": "seen only when the markers are searched for, in the next plane: while they are followed it "
+    "does no harm, and nothing looks elsewhere in the picture",
     "a second marker 0": "as a second marker 1",
+    "tendons 2 kN/m": "softer than safety.softest: the wrist lags by 3 deg, at 6 N; nothing but the lag shows it",
+    "tendons 100 kN/m": "the wrist goes where it should; only a gauge would show 30 N where the law wants 9",
     "blurred 2 px": "angles are right until the base has not been seen whole for gates.base_memory, 0.5 s",
 }
 """Kinds that need not be caught in time, and why: docs/hardware/faults.md."""

@@ -221,8 +221,10 @@ def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) ->
     """What ended it, and whether that is right."""
     end: End = "caught" if course.reason else "tolerated"
     begin = AT[phase] + (0.0 if phase == "homing" else course.first)
+    creeping = phase in ("homing", "waiting")
     if not any(case.kind for case in cases):
-        begin = 0.0
+        creeping = not np.isfinite(course.first)
+        begin = 0.0 if creeping else course.first
     after = course.time >= begin
     pull = float(course.pull[after].max(initial=0.0))
     stopped = min(course.decided, course.last_step)
@@ -236,7 +238,6 @@ def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) ->
     if end == "tolerated" and _as_sound(course, sound):
         return Judged(name, phase, "no effect", right, np.nan, pull, float(np.rad2deg(course.error)), course.odd)
     if end == "caught":
-        creeping = phase in ("homing", "waiting")
         right &= course.code in (4, 5) and pull < PULL and (seconds <= WITHIN or creeping)
     else:
         right &= pull <= LITTLE_PULL and np.rad2deg(course.error) <= LITTLE_ERROR

@@ -215,15 +215,11 @@ class Board:
         answer = self._exchange.ask(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
         result = Result(answer[0])
         kind = ANSWER_TO.get(command)
-        content: tuple[Any, ...] = ()
-        try:
-            content = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
-        except struct.error as error:  # a refusal may tell no more than why
-            if result == Result.OK:
-                what = f"an answer to {command.name} has {len(answer)} bytes"
-                raise BoardError("cable", what, self.transport.name, "see the cable, and flash again") from error
+        if kind and len(answer) != 1 + LAYOUTS[kind].struct.size:
+            raise BoardError("cable", f"{command.name} is answered by {len(answer)} bytes", self.transport.name)
+        content: tuple[Any, ...] = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
         if result == Result.FAULTED:
-            status = Status(*content) if content and kind is Status else self.read()
+            status = Status(*content) if kind is Status else self.read()
             raise self.faulted(status)
         if result != Result.OK:
             self.see_restart()

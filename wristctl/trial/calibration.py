@@ -20,7 +20,7 @@ from wristctl.trial.prepare import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import Testbed
 
-FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/2"
+FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class WristCalibration:
             if found["schema"] != SCHEMA:
                 raise ValueError(found["schema"])
             signs, slopes, slack = (tuple(found[name]) for name in ("signs", "steps_per_radian", "slack"))
-            zero = Zero(signs, slopes, float(found["marker"]), slack, tuple(found["friction"]))
+            zero = Zero(signs, slopes, float(found["marker"]), slack, tuple(found.get("friction", (0.0,) * len(signs))))
             return cls(zero, found["plane"], found["boot_nonce"], tuple(found["position"]))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UserError("not a wrist calibration", str(file), "wristctl hw calibrate wrist") from error

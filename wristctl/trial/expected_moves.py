@@ -15,6 +15,8 @@ from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, in_plane
 
 _HARDER = 1.5
 """Springs that are stiffer than believed and friction may ask for so many times the pull that the model says."""
+_LEAST, _MOST = 0.6, 1.35
+"""Shares of the believed bend that a small move may make: soft tendons and where zero was found."""
 _SCREWED = "check which tendon is on which motor, and markers.positive"
 
 
@@ -102,7 +104,7 @@ class ExpectedMoves:
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
         meant = reeled / self.steps()
-        if max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0) < 0.4 * meant:
+        if max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0) < _LEAST * meant:
             what = (
                 f"axis {axis} (tendon {ACTIVE[axis]}) bends the wrist by {math.degrees(bend.theta):.1f} deg instead of "
                 f"{math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, or it "
@@ -110,5 +112,5 @@ class ExpectedMoves:
             )
             raise SafetyStop(what, "homing", "calibrate the wrist again; see motor, drive and tendon")
         self.judge_side(axis, bend)
-        if abs(bend.theta) > 1.6 * meant:
+        if abs(bend.theta) > _MOST * meant:
             self.judge_steps(axis, reeled / abs(bend.theta))

@@ -109,8 +109,8 @@ class _Finder:
             self._let_go(axis, -2 * self._pull)
             raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, bends, 1)
-        self._reel(axis, reeled[len(reeled) // 2])
-        friction = (self._bent(axis).theta - offset) / slope - reeled[len(reeled) // 2]
+        self._reel(axis, reeled[0])
+        friction = (self._bent(axis).theta - offset) / slope - reeled[0]
         self._let_go(axis, -2 * self._pull)
         self._expected.judge_side(axis, bend)
         self._expected.judge_slack(axis, -offset / slope * self._spools.step)
