@@ -29,8 +29,9 @@ class Sketch(Scene):
         self.drawn: list[tuple[np.ndarray, bool, bool]] = []
 
     def render(
-        self, theta: np.ndarray, rng: np.random.Generator, covered: bool = False, swapped: bool = False
-    ) -> np.ndarray:
+        self, theta: np.ndarray, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
+        across: float = 0.0, turned: float = 0.0,
+    ) -> np.ndarray:  # fmt: skip
         self.drawn.append((theta, covered, swapped))
         return rng.integers(0, 256, (4, 4), np.uint8)
 

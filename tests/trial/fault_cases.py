@@ -52,12 +52,14 @@ def _everywhere(*ends: End) -> dict[Phase, tuple[End, ...]]:
 EITHER: dict[Phase, tuple[End, ...]] = _everywhere("caught", "tolerated")
 
 HOMED: dict[Phase, tuple[End, ...]] = {"homing": ("tolerated",)}
+FOUND: dict[Phase, tuple[End, ...]] = {"homing": ("caught", "tolerated")}
+"""Homing finds the sense of an axis, if that turns round before it is tried."""
 READ_ANEW: dict[Phase, tuple[End, ...]] = {"waiting": ("tolerated",), "homing": ("caught", "tolerated")}
 """Markers are looked for anew in every plane, and the straight wrist's angle read."""
 
 CASES = (
-    Case("dirflip0", "direction-flipped", axis=0),
-    Case("dirflip2", "direction-flipped", axis=2),
+    Case("dirflip0", "direction-flipped", axis=0, ends=FOUND, mended=("homing",)),
+    Case("dirflip2", "direction-flipped", axis=2, ends=FOUND, mended=("homing",)),
     Case("dirstuck2", "direction-stuck", axis=2),
     Case("rev0", ends=HOMED, mended=("homing",), bench={"motors": {"reversed": (True, False, False, False)}}),
     Case("rev2", ends=HOMED, mended=("homing",), bench={"motors": {"reversed": (False, False, True, False)}}),

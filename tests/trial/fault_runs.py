@@ -33,8 +33,8 @@ WITHIN, PULL, LITTLE_PULL, LITTLE_ERROR = 0.4, 60.0, 30.0, 2.0
 """Of what is caught: seconds and true newtons; of what is tolerated: newtons and true degrees."""
 _SHOWN, _CAMERA = np.deg2rad(1.0), 3.0 / 60.0
 """Difference from a sound wrist that a frame can show, and how long after."""
-_ALIKE = np.deg2rad(0.5), 2.0
-"""Radians and newtons that a sound run's own noise makes up to."""
+_ALIKE = np.deg2rad(0.5), 3.0
+"""True radians and newtons above a sound run's, below which a fault had no effect."""
 _AHEAD, _FIRST = 0.01, ("homing", "moving")
 _FULL = {
     "directions": ("ulnar", "flexion"), "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
@@ -246,10 +246,8 @@ def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) ->
 
 
 def _as_sound(course: Course, sound: Course) -> bool:
-    """Whether nothing was otherwise than in the sound run."""
-    angle = np.interp(course.time, sound.time, sound.angle)
-    alike = float(np.abs(course.angle - angle).max()) < _ALIKE[0]
-    return alike and float(course.pull.max() - sound.pull.max()) < _ALIKE[1]
+    """Whether it went as well as the sound run."""
+    return course.error - sound.error < _ALIKE[0] and float(course.pull.max() - sound.pull.max()) < _ALIKE[1]
 
 
 def _shown(case: Case, begin: float, course: Course, sound: Course) -> float:

@@ -188,5 +188,5 @@ def test_a_tendon_that_sticks_is_refused() -> None:
         return GLUED + float((wrist.sides * furthest * wrist.gain).sum())
 
     wrist.tracking = Marker(wrist.board, angle)
-    with pytest.raises(SafetyStop, match=r"tendon 1 sticks: 0\.3\d mm between reeling in and letting go"):
+    with pytest.raises(SafetyStop, match=r"tendon 1 sticks: 0\.44 mm between reeling in and letting go"):
         wrist.homed()

@@ -1,0 +1,197 @@
+"""What a wrist does otherwise than its motors: told when, by which limit, and with the likeliest cause first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.trial.conftest import WRIST, settings_of
+from wristctl.trial.blind_model import BlindModel
+from wristctl.trial.following import Following
+from wristctl.trial.likely_causes import Evidence, likely_causes
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import on_plus_side
+from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.wrist.directions import away_of
+
+PERIOD, FRAME = 5e-3, 3
+SETTINGS = settings_of()
+LIMITS = SETTINGS.safety
+PER_RADIAN = 2.0 * SETTINGS.markers.distance / WRIST.length
+"""Share of the marker's size for a radian of bend across, turned round."""
+
+Course = Callable[[float], float]
+
+
+def still(time: float) -> float:
+    """Nothing."""
+    return 0.0
+
+
+def watched(
+    theta: Course = still, away: Course = still, load: Course = still, seconds: float = 1.0, **changes: Any
+) -> tuple[Following, float]:
+    """A wrist whose spools stand at pretension and whose marker shows this; when it was stopped."""
+    settings = settings_of(**changes)
+    following = Following(settings, WRIST, "ulnar", PERIOD)
+    held = WRIST.pretension / settings.actuator.tendon_stiffness
+    for tick in range(round(seconds / PERIOD)):
+        time = tick * PERIOD
+        if tick % FRAME == 0:
+            size = math.exp(-away(time) / PER_RADIAN) * 0.9
+            following.saw(Sighting(time, tick, theta(time), SightingVerdict.OK, np.zeros((2, 4, 2)), size), time)
+        following.see(time, load(time), np.zeros(4))
+        following.predict(held, held)
+    return following, time
+
+
+def stopped(**given: Any) -> tuple[str, float]:
+    """What stopped it, and how long after 0.5 s."""
+    times: list[float] = []
+    load = given.pop("load", still)
+
+    def noted(time: float) -> float:
+        times.append(time)
+        return float(load(time))
+
+    with pytest.raises(SafetyStop) as error:
+        watched(load=noted, **given)
+    assert error.value.exit_code == 5
+    return str(error.value.what), times[-1] - 0.5
+
+
+def after(value: float, at: float = 0.5, until: float = math.inf) -> Course:
+    return lambda time: value if at - 1e-9 <= time < until else 0.0
+
+
+def slowly(value: float) -> Course:
+    """From 0.5 s on, in steps that no frame jumps by."""
+    return lambda time: value * min(1.0, max(0.0, (time - 0.5) / 0.2))
+
+
+def test_a_wrist_that_does_as_its_motors_do_goes_on_and_the_greatest_is_kept() -> None:
+    near = 0.9 * math.radians(LIMITS.across_deg)
+    following, _ = watched(away=after(near), load=after(-0.9 * LIMITS.load), theta=slowly(0.9 * math.radians(3.5)))
+    assert following.greatest.across == pytest.approx(near, rel=1e-6)
+    assert following.greatest.load == pytest.approx(0.9 * LIMITS.load)
+    assert math.degrees(following.greatest.apart) == pytest.approx(0.9 * 3.5, abs=0.05)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_each_limit_stops_once_it_is_exceeded_for_so_long(sign: float) -> None:
+    said, late = stopped(load=after(sign * 1.01 * LIMITS.load))
+    assert "a load of 1.62 N m, beyond 1.6 N m" in said and late == pytest.approx(LIMITS.odd_for, abs=2 * PERIOD)
+    said, late = stopped(away=after(sign * math.radians(1.05 * LIMITS.across_deg)))
+    assert "bends 1.1 deg across its plane, beyond 1.0 deg" in said and late < LIMITS.odd_for + 5 * PERIOD
+    said, _ = stopped(theta=slowly(sign * math.radians(1.2 * LIMITS.follow_deg)))
+    assert "deg from where they should have it, beyond 3.5 deg" in said
+
+
+def test_what_is_over_sooner_does_not_stop() -> None:
+    brief = {"at": 0.5, "until": 0.5 + LIMITS.odd_for - 2 * PERIOD}
+    watched(load=after(2.0 * LIMITS.load, **brief))
+    short: Course = lambda time: after(2.0 * LIMITS.load, **brief)(time) + after(1.7, 0.58, 0.62)(time)  # noqa: E731
+    watched(load=short)
+
+
+def test_another_limit_kept_does_not_forgive_one_that_is_not() -> None:
+    """Frames without a size, or a load that is well, say nothing of the bend across."""
+    said, _ = stopped(away=after(math.radians(3.0)), load=after(-0.1))
+    assert "across its plane" in said
+
+
+def test_a_jump_between_two_frames_stops_at_once() -> None:
+    said, late = stopped(theta=after(math.radians(2.2)))
+    assert "jumps by 2.2 deg from one frame to the next" in said and late <= FRAME * PERIOD
+    assert "likely the tip's marker has slipped" in said
+    watched(theta=after(math.radians(1.9)))
+
+
+def test_what_the_marker_shows_of_a_wrist_at_rest_is_no_bend_across() -> None:
+    watched(away=lambda time: math.radians(5.0))
+
+
+def test_a_marker_without_a_size_is_not_judged_across() -> None:
+    following = Following(SETTINGS, WRIST, "ulnar", PERIOD)
+    for tick in range(100):
+        following.saw(Sighting(tick * PERIOD, tick, 0.0, SightingVerdict.OK, np.zeros((2, 4, 2))), tick * PERIOD)
+        following.see(tick * PERIOD, 0.0, np.zeros(4))
+    assert following.greatest.across == 0.0
+
+
+def blind(softest: float, plus: float, minus: float) -> np.ndarray:
+    model = BlindModel(WRIST, SETTINGS.actuator, softest, SETTINGS.sensor, PERIOD)
+    for _ in range(400):
+        model.predict(plus, minus)
+    return model.angles(399 * PERIOD)
+
+
+def test_softer_tendons_bend_the_wrist_less_and_the_two_models_say_how_much() -> None:
+    """At rest a spool's lead over the straight path is shared by tendon and spring."""
+    stiff, soft = blind(5e3, 3e-3, -3e-3)
+    c, stiffness = (
+        WRIST.tendon_offset,
+        WRIST.stiffness
+        - 9.81 * (WRIST.mass * WRIST.length / 12.0 + WRIST.hand_mass * (WRIST.length / 3.0 + WRIST.hand_offset)),
+    )
+    for angle, k in ((stiff, SETTINGS.actuator.tendon_stiffness), (soft, 5e3)):
+        shared = 2.0 * k * c * 3e-3 / (stiffness + 2.0 * k * c * c)  # the - side is slack
+        assert angle == pytest.approx(shared, rel=0.03)
+    assert 0.0 < soft < stiff
+    same = blind(50e3, 3e-3, -3e-3)
+    assert same[0] == same[1], "tendons are never taken for stiffer than believed"
+
+
+def test_between_two_ticks_the_model_is_between_its_angles() -> None:
+    model = BlindModel(WRIST, SETTINGS.actuator, 5e3, SETTINGS.sensor, PERIOD)
+    for _ in range(20):
+        model.predict(2e-3, -2e-3)
+    before, after_ = model.angles(10 * PERIOD), model.angles(11 * PERIOD)
+    assert (before < after_).all()
+    assert model.angles(10.25 * PERIOD) == pytest.approx(0.75 * before + 0.25 * after_)
+    assert (model.angles(99.0) == model.angles(20 * PERIOD)).all(), "not beyond the present tick"
+
+
+PLUS, AWAY = tuple(on_plus_side("ulnar").tolist()), away_of("ulnar", "right")
+
+
+def test_tendons_that_pull_away_from_the_camera_are_those_on_its_far_side() -> None:
+    assert AWAY == (-1, 1, -1, 1), "toward flexion, which is behind a plane whose ulnar side is to the right"
+    assert away_of("flexion", "right") == (1, 1, -1, -1) and away_of("ulnar", "left") == (1, -1, 1, -1)
+
+
+def of(**seen: Any) -> list[str]:
+    still_: dict[str, Any] = {"turned": np.zeros(4), "load": 0.0, "across": 0.0, "bent": 0.0, "meant": 0.0, "jump": 0.0}
+    return likely_causes(Evidence(**{**still_, "bends": math.radians(1.0), **seen}), PLUS, AWAY)
+
+
+@pytest.mark.parametrize(
+    ("load", "across", "little", "much"),
+    [(-1.0, 0.05, "axis 2 (tendon 4)", "axis 1 (tendon 2)"), (-1.0, -0.05, "axis 3 (tendon 5)", "axis 0 (tendon 1)"),
+     (1.0, 0.05, "axis 0 (tendon 1)", "axis 3 (tendon 5)"), (1.0, -0.05, "axis 1 (tendon 2)", "axis 2 (tendon 4)")],
+)  # fmt: skip
+def test_load_and_bend_across_together_tell_which_tendon(load: float, across: float, little: str, much: str) -> None:
+    """One that pulls too little, or the one at the other corner too much."""
+    at_rest = of(load=load, across=across)
+    assert at_rest[0] == f"the tendon of {little} is off its pulley" and much in at_rest[1]
+    turned = np.zeros(4)
+    turned[int(much[5])] = -100.0
+    moving = of(load=load, across=across, turned=turned)
+    assert moving[0] == f"{much} turns the wrong way, or its direction is stuck"
+    order = ["wrong way", "exchanged", "off its pulley", "slipped", "pushes"]
+    found = [next(k for k, cause in enumerate(moving) if word in cause) for word in order]
+    assert found == sorted(found)
+
+
+def test_causes_of_the_whole_wrist_go_by_how_far_it_moved() -> None:
+    turned = np.array([-200.0, -200.0, 200.0, 200.0])
+    assert of(turned=turned, meant=0.2, bent=0.0)[0] == "the motors have no supply"
+    assert "wrong way" in of(turned=turned, meant=0.2, bent=-0.15)[0]
+    assert "bends by more than its spools say: wrong pulley or microsteps" in of(turned=turned, meant=0.1, bent=0.2)[0]
+    assert "bends by less" in of(turned=turned, meant=0.2, bent=0.1)[0]
+    assert "marker has slipped" in of(jump=0.1)[0]
+    assert of(load=1.0)[-1] == "something holds or pushes the wrist"
