@@ -113,8 +113,8 @@ def perform(
     reason, fix, code = "", "", 0
     try:
         done.run(EmulatedTestbed(bench, settings, View(), None), shown)
-    except UserError as error:
-        reason, fix, code = error.what, str(error.fix), error.exit_code
+    except UserError as raised:
+        reason, fix, code = raised.what, str(raised.fix), raised.exit_code
     finally:
         log.close()
     stopped = bench.transport.now()
@@ -264,8 +264,8 @@ def _shown(case: Case, begin: float, course: Course, sound: Course) -> float:
         np.abs(np.interp(time, run.time, getattr(run, name)) - np.interp(time, sound.time, getattr(sound, name)))
         for name, run in (("angle", course), ("across", course))
     ]
-    differs = np.flatnonzero(np.max(off, axis=0) > _SHOWN) if len(time) else []
-    return float(time[differs[0]]) + _CAMERA if len(differs) else float(course.decided)
+    differs = time[np.max(off, axis=0) > _SHOWN]
+    return float(differs[0]) + _CAMERA if len(differs) else float(course.decided)
 
 
 def table(judged: Sequence[Judged]) -> str:
