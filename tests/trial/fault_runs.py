@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tests.trial.conftest import WRIST
-from tests.trial.fault_cases import AT, Case, End, Phase
+from tests.trial.fault_cases import AT, PHASES, Case, End, Phase
 from wristctl.arrays import Array
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
@@ -269,7 +269,7 @@ def _shown(case: Case, begin: float, course: Course, sound: Course) -> float:
 
 
 def table(judged: Sequence[Judged]) -> str:
-    """In Markdown."""
+    """In Markdown: a row for each that was judged."""
     lines = ["| case | phase | end | ms | true pull [N] | true error [deg] | said |", "|---|---|---|---|---|---|---|"]
     for each in judged:
         ms = "" if np.isnan(each.seconds) else f"{1e3 * each.seconds:.0f}"
@@ -277,6 +277,25 @@ def table(judged: Sequence[Judged]) -> str:
         said = each.said[:110]
         lines.append(f"| {each.name} | {each.phase} | {end} | {ms} | {each.pull:.0f} | {each.error:.1f} | {said} |")
     return "\n".join(lines)
+
+
+def by_phase(judged: Sequence[Judged]) -> str:
+    """In Markdown: a row for each case, a column for each phase."""
+    phases = [phase for phase in PHASES if any(each.phase == phase for each in judged)]
+    lines = [f"| case | {' | '.join(phases)} |", "|---" * (1 + len(phases)) + "|"]
+    for name in dict.fromkeys(each.name for each in judged):
+        cells = []
+        for phase in phases:
+            own = next((each for each in judged if (each.name, each.phase) == (name, phase)), None)
+            cells.append("" if own is None else _cell(own))
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _cell(judged: Judged) -> str:
+    timed = judged.end == "caught" and judged.phase in ("moving", "holding")
+    ms = f" {1e3 * judged.seconds:.0f} ms," if timed else ""
+    return f"{judged.end},{ms} {judged.pull:.0f} N"
 
 
 def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:

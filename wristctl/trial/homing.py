@@ -113,7 +113,8 @@ class _Finder:
         friction = (self._bent(axis).theta - offset) / slope - reeled[0]
         self._let_go(axis, -2 * self._pull)
         self._expected.judge_side(axis, bend)
-        self._expected.judge_slack(axis, -offset / slope * self._spools.step)
+        if reeled[0] <= 0:  # it bends the wrist where it was at the start: the line alone may err by friction
+            self._expected.judge_slack(axis, -offset / slope * self._spools.step)
         self._expected.judge_steps(axis, float(1.0 / abs(slope)))
         return float(-offset / slope), float(1.0 / abs(slope)), float(friction)
 
