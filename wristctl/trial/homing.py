@@ -99,7 +99,7 @@ class _Finder:
     def taut(self, axis: int, about: int) -> tuple[float, float, float]:
         """Taut point [steps], steps per radian and friction [steps] of an axis that bends at `about`. Lets go again."""
         reeled, bends = [], []
-        for at in range(about - 3 * self._move, about + self._pull, self._move):
+        for at in range(min(0, about - 3 * self._move), about + self._pull, self._move):
             self._reel(axis, at)
             bend = self._bent(axis)
             if abs(bend.theta) > self._bend:
