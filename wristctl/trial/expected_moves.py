@@ -26,6 +26,11 @@ class Bend(NamedTuple):
     theta: float
     away: float
 
+    @property
+    def askew(self) -> float:
+        """How far it is bent, whichever way."""
+        return math.hypot(self.theta, self.away if math.isfinite(self.away) else 0.0)
+
 
 class ExpectedMoves:
     """By the believed wrist: the side of each axis in the plane and across it, and steps for one radian.

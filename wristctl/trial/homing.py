@@ -82,7 +82,7 @@ class _Finder:
             for reeled in range(2 * self._move, self._slack + 2 * self._move, 2 * self._move):
                 self._reel(axis, reeled)
                 bend = self._bent(axis)
-                if abs(bend.theta) > self._bend:
+                if bend.askew > self._bend:
                     self._let_go(axis, 0)
                     self._expected.judge_side(axis, bend)
                     return reeled
@@ -105,6 +105,8 @@ class _Finder:
             if abs(bend.theta) > self._bend:
                 reeled.append(at)
                 bends.append(bend.theta)
+            if reeled and at - reeled[0] >= 0.7 * self._pull:  # any further, the tendons opposite may hold it
+                break
         if len(reeled) < 3:
             self._let_go(axis, -2 * self._pull)
             raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
