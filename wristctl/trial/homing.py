@@ -112,6 +112,7 @@ class _Finder:
             raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, bends, 1)
         self._reel(axis, reeled[0])
+        Patience(self._board).wait(4.0 * self._settings.rest)  # a wrist that is let go comes back by its springs alone
         friction = (self._bent(axis).theta - offset) / slope - reeled[0]
         self._let_go(axis, -2 * self._pull)
         self._expected.judge_side(axis, bend)
