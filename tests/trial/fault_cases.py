@@ -1,4 +1,6 @@
-"""Every fault that a rig may have, and how a run with it is to end: written down before anything was mended."""
+"""Every fault that a rig may have, and how a run with it is to end.
+
+Where both ends are right, which one it takes was seen only when it was tried."""
 
 from __future__ import annotations
 
