@@ -123,8 +123,8 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
     for tick in range(out.shape[0]):
         for value in range(3):
             target[value] = course.references[0, tick, value] + zero
-        seen, rate = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
-        wanted, _, _, plus, minus = respond(control, known, seen, rate, (low, high), 0.0, setup.period)
+        seen = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
+        wanted, _, _, plus, minus = respond(control, known, seen, (low, high), 0.0, setup.period)
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
         counted_plus, counted_minus = actuate(drive, motor, known, view.theta_ref, plus, minus, setup.period)

@@ -29,8 +29,9 @@ from wristctl.lanes.cores import cores
 EVIDENT = 3.5
 """Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""
 
-_UNSURE = 0.7
-"""Standard deviation of how far a wrist is on the way from the model's segments to a finer bend: nothing is known."""
+_UNSURE = 4.0 / 3.0
+"""Standard deviation of how far a wrist is on the way from the model's four segments to a bend without any: what is
+left over falls with the square of their number, so that 8 show three quarters of it."""
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 

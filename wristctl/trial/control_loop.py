@@ -61,6 +61,8 @@ class Task(NamedTuple):
 
     motion: Motion
     """Sampled at the loop's period."""
+    course: Array
+    """Its angle, rate and acceleration, (T, 3)."""
     trial: int
     """Its number; -1 between trials."""
     begin: float
@@ -101,7 +103,9 @@ class ControlLoop:
         Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
         """
         self._steering.use(controller, gains)
-        task, first = Task(motion, trial, self.next_tick, faults or HostFaults(())), self._steering.tick
+        course = np.stack([motion.theta_ref, motion.rate_ref, motion.acceleration_ref], axis=1)
+        task = Task(motion, course, trial, self.next_tick, faults or HostFaults(()))
+        first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
         self._come_to_rest(task._replace(trial=-1))
@@ -132,7 +136,7 @@ class ControlLoop:
             self._send(np.zeros(AXES))
         else:
             reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
-            answer = self._answer(reference, clock - task.begin, task.faults)
+            answer = self._answer(task, k, clock - task.begin)
             tension = self._paths.each(answer.plus, answer.minus)
             target = self._turn(tension, position, *reference[:2])
         known = {
@@ -181,9 +185,9 @@ class ControlLoop:
         status = self._status
         self._monitor.see(Seen(estimate, age, self._verdict, position, taut, status.state, delay, status.lapses, clock))
 
-    def _answer(self, reference: tuple[float, float, float], time: float, faults: HostFaults) -> Answer:
+    def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
-            answer = faults.answer(self._steering.respond(*reference), time)
+            answer = task.faults.answer(self._steering.respond(task.course, k), time)
         except Exception as error:
             what = f"the controller failed: {type(error).__name__}: {error}"
             raise SafetyStop(what, fix="run again with --debug for the traceback") from error

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
@@ -116,7 +118,7 @@ class Experiment:
         taut, _ = Paths(self._wrist, self._trials[0].plane).taut(0.0)
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
-            steering.respond(0.0, 0.0, 0.0)
+            steering.respond(np.zeros((1, 3)))
             steering.predict(float(taut[0]), float(taut[0]))
         steering.see(0.0, 0.0)
 
