@@ -6,7 +6,7 @@ STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	worlds clean venv mutants coverage
+	test-statistics worlds clean venv mutants coverage
 
 run: .venv/run
 	@set -e; \
@@ -45,6 +45,10 @@ test-firmware: .venv/dev firmware
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/identification
+
+# Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
+test-statistics: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/comparison tests/tuning
 
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev

@@ -63,7 +63,7 @@ def standing(
         [row for row in order if lost[row] > tolerated],
         [share(each) for each in failed],
         [share(each) for each in swings],
-        resolution_floor(np.exp(known), seed),
+        resolution_floor(np.exp(known[sound]), seed),
     )
 
 
