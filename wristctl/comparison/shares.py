@@ -41,7 +41,7 @@ def performance_profiles(scores: ArrayLike, factors: ArrayLike) -> Array:
     given = np.asarray(scores, float)
     known = np.where(np.isnan(given), np.inf, given)
     best = known.min(axis=0)
-    with np.errstate(invalid="ignore"):
-        ratios = np.where(np.isfinite(known), known / best, np.inf)
+    with np.errstate(invalid="ignore"):  # where all fail
+        ratios = known / best
     within: Array = (ratios[:, :, None] <= np.asarray(factors, float)).mean(axis=1)
     return within

@@ -134,6 +134,7 @@ OPTIMISERS: Choices[Any] = Choices(
     {
         "pso": "wristctl.tuning.optimisers.pso:ParticleSwarm",
         "differential-evolution": "wristctl.tuning.optimisers.differential_evolution:DifferentialEvolution",
+        "cma-es": "wristctl.tuning.optimisers.cma_es:CMAES",
         "random": "wristctl.tuning.optimisers.random_search:RandomSearch",
     },
 )
