@@ -76,7 +76,7 @@ def test_where_everything_swings_nothing_is_best() -> None:
 
 SETTINGS = (
     "families={soft: {loop: {control_period: 5e-3}, draw: {plant.stiffness: x0.6..1.4, reference.angle_deg: 10..40},"
-    " references: [{duration: 0.3}, {duration: 0.5}], horizon: 1.6}}",
+    " references: [{duration: 0.3}, {duration: 0.5}], horizon: 2.6}}",
     "compare.worlds={family: soft, draws: 10}",
     "compare.rows=[{controller: ct-dob}, {controller: computed-torque},"
     " {controller: smc, gains: exchanged}]",

@@ -26,7 +26,7 @@ FAMILY = Family.model_validate({
         "plant.stiffness": "x0.5..2", "actuator.tendon_stiffness": "8e3..4e4 log", "plant_segments": (1, 4),
         "plant.actuator.tendon_stiffness": "x0.7..1.4 log", "reference.angle_deg": "-45..45",
     },
-    "references": ({"duration": 0.5}, {"kind": "sine"}), "horizon": 2.0,
+    "references": ({"duration": 0.5}, {"kind": "sine"}), "horizon": 2.5,
 })  # fmt: skip
 
 

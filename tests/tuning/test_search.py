@@ -182,6 +182,14 @@ def test_feedforward_is_nothing_beside_itself() -> None:
     assert judges(study)[0](controller("feedforward"), np.zeros((2, 0))) == pytest.approx(np.zeros(2), abs=1e-12)
 
 
+def test_where_the_yardstick_fails_others_are_measured_by_what_it_has_elsewhere() -> None:
+    judge, measured = made_up((0, 1, 2), rmse=[0.1, 0.1, 0.1])
+    judge._yardstick.metrics["rmse"][0] = [1.0, np.nan, 3.0]
+    floor = METRICS["rmse"].floor
+    known = np.array([1.0, 2.0, 3.0]) + floor
+    assert judge.value(measured)[0] == pytest.approx(np.log10((0.1 + floor) / known).mean())
+
+
 def test_progress_sees_the_search_after_every_iteration() -> None:
     seen: list[int] = []
     found(name="smc", progress=lambda s: seen.append(len(s.tried.values)))
@@ -229,7 +237,7 @@ def test_each_case_is_a_closed_loop_by_itself(metric: str) -> None:
         done = repeat(law, gains, [followed], which, loop, study.wrist, [name], Draws(study.seed, "tuning"), 3)
         times = len(done[0].failed)
         assert times == (3 if scenario.loop == "drawn" else 1)
-        np.testing.assert_allclose(own[:, at : at + times], [each.metrics[metric] for each in done], rtol=1e-9)
+        np.testing.assert_allclose(own[:, at : at + times], [each.metrics[metric] for each in done], 1e-9, 1e-14)
         at += times
 
 

@@ -145,9 +145,15 @@ def ranking_frame(found: WorldRanking) -> pd.DataFrame:
                 "swings": swings.value,
                 "swings_high": swings.high,
             }
-            | {name: float(np.nanmedian(row.measured.metrics[name])) for name in RANKED[1:]}
+            | {name: _median(row.measured.metrics[name]) for name in RANKED[1:]}
         )
     return pd.DataFrame(lines)
+
+
+def _median(values: Array) -> float:
+    """Of what there is; nan where there is nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else np.nan
 
 
 def worlds_frame(found: WorldRanking) -> pd.DataFrame:

@@ -40,8 +40,11 @@ class Case(NamedTuple):
 
     @property
     def rests(self) -> bool:
-        """Whether the reference rests long enough to see a swing, which on a moving one friction's kinks look like."""
-        return self.motion.rest <= self.motion.horizon - WINDOW
+        """Whether the reference rests long enough to settle and then to show a swing.
+
+        On a moving one friction's kinks look like swings.
+        """
+        return self.motion.rest <= self.motion.horizon - 2.0 * WINDOW
 
 
 @dataclass(frozen=True)

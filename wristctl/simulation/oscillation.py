@@ -97,8 +97,11 @@ def _polynomials(samples: int, degree: int) -> Array:
 
 
 def _without_trend(angle: Array) -> Array:
-    """The angles (L, W) less their mean and slope, told apart from those of a swing that is cut in its middle."""
-    basis = _polynomials(angle.shape[1], 1)
+    """The angles (L, W) less their trend, told apart from that of a swing that is cut in its middle.
+
+    It is a cubic: a wrist that still creeps to its place does so along an exponential, and does not swing.
+    """
+    basis = _polynomials(angle.shape[1], min(3, angle.shape[1] - 1))
     left: Array = angle - angle @ basis @ basis.T
     moving = np.ptp(left, axis=1) >= _STILL
     if moving.any():

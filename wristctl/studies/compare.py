@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from wristctl.config.errors import under
+from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
 from wristctl.studies.compare_outputs import draw, loop_tables, step_table, units
 from wristctl.studies.inputs import EarlierRun, Inputs
@@ -52,6 +52,14 @@ class Compared(StudyResult):
     """median and 99th percentile of a control step on this machine [us], by controller/gains"""
     ranking: WorldRanking | None = None
     """over the worlds of a family, where one is named; there are no `rows` then"""
+
+    @property
+    def fault(self) -> UserError | None:
+        """That nothing in a ranking can be relied on."""
+        if self.ranking is None or self.ranking.standing.groups:
+            return None
+        where = str(self.findings.run.path) if self.findings.run else ""
+        return UserError("every row fails or swings in some world", where, "other gains, or milder worlds", exit_code=3)
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""

@@ -126,14 +126,14 @@ def family_of(families: Mapping[str, Family], worlds: TuningWorlds | Worlds, whe
 
 def tuned_loops(study: Study) -> Mapping[str, Loop]:
     """The loops that gains are tuned on, by name; of a family its loop as it is believed, before anything is drawn."""
-    family = study.tune.worlds.family
-    return {family: study.families[family].loop} if family else study.tune.loops
+    worlds = study.tune.worlds
+    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.tune.loops
 
 
 def compared_loops(study: Study) -> Mapping[str, Loop]:
     """The loops that are judged on, by name; of a family its loop before anything is drawn."""
-    name = study.compare.worlds.family
-    return {name: study.families[name].loop} if name else study.compare.loops
+    worlds = study.compare.worlds
+    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.compare.loops
 
 
 def compared_inverses(study: Study) -> Iterable[str]:

@@ -43,7 +43,7 @@ class Judge:
         """Objective (P,) of what was measured on the cases."""
         value = np.zeros(found.failed.shape)
         for name, weight in self._weights.weights().items():
-            own, known = (self._sizes(name, each.metrics[name]) for each in (found, self._yardstick))
+            own, known = self._sizes(name, found.metrics[name]), self._known(name)
             value = value + weight * np.log10(own / known)
         lost = found.failed | np.isnan(value)
         value = np.where(lost, _FAILED + 2.0 * (1.0 - found.lasted), value)
@@ -52,6 +52,12 @@ class Judge:
         if self._weights.swinging:
             total = total + self._weights.swinging * found.swings.any(axis=1)
         return total
+
+    def _known(self, name: str) -> Array:
+        """The yardstick's, (1, C); where that has failed, which is the same for all laws, its median elsewhere."""
+        sizes = self._sizes(name, self._yardstick.metrics[name])
+        there = np.isfinite(sizes)
+        return np.where(there, sizes, np.median(sizes[there]) if there.any() else METRICS[name].floor)
 
     def _sizes(self, name: str, values: Array) -> Array:
         """A metric (.., C) with its floor; what never happens counts what its metric says of the horizon."""
