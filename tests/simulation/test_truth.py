@@ -46,6 +46,7 @@ LEAVES: dict[str, dict[str, Any]] = {
     **{name: {name: "x1.03"} for name in ("length", "mass", "hand_mass", "hand_offset", "stiffness", "damping")},
     "flexion_ratio": {"flexion_ratio": "x1.15"},
     "tendon_radius": {"tendon_radius": "x1.03"},
+    "taper": {"taper": 1.5},
     "by value": {"stiffness": 0.5, "tendon_radius": 0.0195},
     "tendon_stiffness": {"actuator": {"tendon_stiffness": "x0.5"}},
     "lag": {"actuator": {"lag": "x3"}},
@@ -74,6 +75,7 @@ LEAVES: dict[str, dict[str, Any]] = {
 }
 SKEWED: dict[str, Any] = {"sensor": {"zero_deg": -4.0}}
 BESIDE: dict[str, dict[str, Any]] = {
+    "taper": {"model": "hinges"},
     "end stop": SKEWED,
     **{f"end stop's {leaf}": SKEWED | {"end_stop_deg": 31.0} for leaf in ("stiffness", "dissipation")},
 }
@@ -97,13 +99,13 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     law, followed = controller("smc-tracking"), motion(Reference(duration=0.3), WRIST, horizon, 1e-3)
     world = World(loop.model_copy(update={"plant": plant}), WRIST)
     lanes = Lanes(np.zeros(1, np.int64), np.zeros(1, np.int64), [(4, 2)])
-    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS["pcc"], None, True)
+    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS[plant.model], None, True)
 
 
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     """The same, run to its end."""
     done = prepared(plant, loop, horizon)
-    _advance(done, kernel_of(run_blocks, PLANTS["pcc"]), 1, None)
+    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, None)
     return done
 
 

@@ -140,5 +140,11 @@ OPTIMISERS: Choices[Any] = Choices(
 )
 """Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
 
-PLANTS: Choices[Any] = Choices("plant", {"pcc": "wristctl.wrist.pcc:PCC"})
+PLANTS: Choices[Any] = Choices(
+    "plant",
+    {
+        "pcc": "wristctl.wrist.pcc:PCC",
+        "hinges": "wristctl.wrist.hinges:HINGES",
+    },
+)
 """Of `wristctl.wrist.plant.PlantModel`."""
