@@ -9,7 +9,7 @@ from wristctl.comparison.shares import performance_profiles
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.report.style import BLACK, colour, figure, legend_below, line, logarithmic, title
 
-_FACTORS = np.geomspace(1.0, 30.0, 200)
+_FACTORS, _SHOWN = np.geomspace(1.0, 30.0, 200), 6
 
 
 def ranking_intervals(found: WorldRanking) -> Figure:
@@ -39,16 +39,20 @@ def ranking_intervals(found: WorldRanking) -> Figure:
     axes.invert_yaxis()
     axes.set_xscale("log")
     logarithmic(axes.xaxis)
-    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval over worlds; a bar joins ties")
-    title(axes, f"{found.name}: {found.worlds} worlds")
+    axes.set_xlabel("RMSE [deg]")
+    title(axes, f"{found.name}: geometric mean over {found.worlds} worlds with 95 % interval; a bar joins ties")
     return made
 
 
 def world_profiles(found: WorldRanking) -> Figure:
-    """Performance profiles: the share of worlds in which a row is within a factor of the best row there."""
+    """Performance profiles: the share of worlds in which a row is within a factor of the best row there.
+
+    Of many rows the best, and feedforward.
+    """
     made, ((axes,),) = figure(height=3.8)
     shares = performance_profiles(np.array([row.rmse for row in found.rows]), _FACTORS)
-    for at in found.order:
+    best = found.order[:_SHOWN]
+    for at in [*best, *({found.yardstick} - set(best))]:
         axes.plot(_FACTORS, 100.0 * shares[at], label=found.rows[at].label, **line(found.rows[at].label))
     axes.set_xscale("log")
     logarithmic(axes.xaxis)
