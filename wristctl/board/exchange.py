@@ -32,7 +32,8 @@ class Exchange:
         self.round_trip = 0.0
         """Seconds from the last command to its answer."""
         self.silence = 0.0
-        """Seconds between the last two commands that feed the watchdog."""
+        """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
+        longer."""
         self._decoder = Decoder()
         self._sequence = 0
         self._last_fed = 0.0
@@ -50,8 +51,8 @@ class Exchange:
             self.traffic.bytes_read,
             self.transport.now(),
         )
-        if command in FEEDS_WATCHDOG:
-            self.silence = began - self._last_fed if self._last_fed else 0.0
+        gap = began - self._last_fed if self._last_fed else 0.0
+        self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
         for attempt in range(attempts):
             self.transport.write(frame)
             self.traffic.sent += 1
@@ -61,7 +62,8 @@ class Exchange:
                 if command in FEEDS_WATCHDOG:
                     self._last_fed = began
                 return answer
-        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen)
+        overslept = self.transport.now() - began - attempts * patience
+        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen, overslept)
 
     def _answer(self, command: Command, deadline: float) -> bytes | None:
         found = None

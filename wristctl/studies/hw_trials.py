@@ -134,13 +134,10 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
         findings.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning=meaning)
     if timing.late and (settings.real_time or settings.port is not None):
-        late, median, most = (f"{1e3 * timing.jitter(share):.2f} ms" for share in (0.99, 0.5, 1.0))
-        text = (
-            f"{len(timing.late)} ticks of {1e3 * timing.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
-            f"most; {timing.overruns} overruns"
-        )
-        session.operator.tell(text)
-        findings.summary(text)
+        session.operator.tell(timing.said())
+        findings.summary(timing.said())
+    if timing.late:
+        findings.summary(timing.camera.summary())
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from wristctl.trial.patience import InSight, Patience
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, Estimate, Steering
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 
 Shown = Callable[[dict[str, Any]], None]
@@ -39,21 +39,6 @@ longer [s] that takes for each step/s of all axes together, whose interrupts com
 _COMING_TO_REST = 0.5
 """Seconds within which motors at any speed have ramped down."""
 _NO_ANSWER = Answer(math.nan, math.nan, math.nan, math.nan, False)
-
-
-@dataclass
-class TickTiming:
-    """When ticks began, against when they were due."""
-
-    period: float
-    late: list[float] = field(default_factory=list)
-    """Of each tick [s]."""
-    overruns: int = 0
-    """Ticks that were skipped because one before took too long."""
-
-    def jitter(self, share: float) -> float:
-        """This quantile of lateness [s]."""
-        return float(np.quantile(self.late, share)) if self.late else math.nan
 
 
 class Task(NamedTuple):
@@ -79,13 +64,13 @@ class ControlLoop:
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
-        self._life = settings.rate_life
+        self._life, self._limits = settings.rate_life, settings.safety
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
         self._monitor = Monitor(settings.safety, self._spools)
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
-        self._underway, self._skipped, self._verdict = 0.0, 0, "no frame"
+        self._underway, self._skipped = 0.0, 0
         self._counted = self._epoch
 
     @property
@@ -126,6 +111,7 @@ class ControlLoop:
         """One exchange with the board at the motion's sample `k`; None: behind its last, where no law is asked."""
         if (ahead := self.next_tick - self._clock.now()) > 0.0:
             self._clock.wait(ahead)
+        woken = self._clock.now() - self.next_tick if ahead > 0.0 else 0.0
         clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
         seen = self._look(task)
         estimate, position = steering.estimate, self._reeled()
@@ -156,20 +142,25 @@ class ControlLoop:
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
             "counted": self._counted - task.begin,
             "late": clock - due,
+            "woken": woken,
+            "round_trip": self._board.round_trip,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
         row = known | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
-        self._timing.late.append(clock - due)
+        took = self._clock.now() - clock
         self._go_on()
+        self._timing.tick(clock - due, woken, self._board.round_trip, took, self._skipped)
+        self._timing.judge(self._limits)
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
         found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
         for seen in self._tracking.look():
-            found["verdict"] = self._verdict = str(seen.verdict)
+            found["verdict"] = str(seen.verdict)
+            self._timing.camera.add(seen)
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time
                 found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
@@ -182,8 +173,10 @@ class ControlLoop:
         """Raises SafetyStop where the limits are exceeded."""
         age, delay = clock - self._last_usable, late + self._skipped * self._period
         taut, _ = self._paths.taut(estimate.theta)
-        status = self._status
-        self._monitor.see(Seen(estimate, age, self._verdict, position, taut, status.state, delay, status.lapses, clock))
+        status, stale = self._status, self._monitor.stale
+        why, fix = self._timing.camera.missing(clock, stale) if age > stale else ("", "")
+        seen = Seen(estimate, age, why, position, taut, status.state, delay, status.lapses, clock, fix)
+        self._monitor.see(seen)
 
     def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
@@ -219,7 +212,6 @@ class ControlLoop:
         self._skipped = max(0, int((self._clock.now() - self.next_tick) / self._period))
         for _ in range(self._skipped):
             self._steering.predict(plus, minus)
-        self._timing.overruns += self._skipped
 
     def _reeled(self) -> Array:
         """What the spools hold [steps], by the last status."""

@@ -17,7 +17,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop, Shown, TickTiming
+from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.halt import Halt, halt
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.host_faults import HostFaults
@@ -28,6 +28,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Steering
 from wristctl.trial.testbeds import Testbed
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trial_motions import at_rest, back, motion_of
 from wristctl.trial.trials import Trial
@@ -138,7 +139,9 @@ class Experiment:
         if self.zero is not None:
             slacken(board, spools_of(settings.actuator), settings.homing, self.zero.signs)
             Patience(board).wait(settings.homing.let_go)
-        marker = Patience(board).angle(tracking, 4 * settings.homing.frames)
+        watching = Patience(board)
+        marker = watching.angle(tracking, 4 * settings.homing.frames)
+        watching.pace.fits(settings.safety.stale)
         if self.zero is None:  # the marker is seen, and nothing moves yet
             testbed.confirm(Patience(board).pulse)
             prepare(board, settings)

@@ -50,6 +50,8 @@ LOG: Columns = {
     "state": ("", "of the board"),
     "faults": ("", "of the board"),
     "late": ("s", "from the tick's due time to its beginning"),
+    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
+    "round_trip": ("s", "from the tick's command to the board's answer"),
 }
 FRAMES: Columns = {
     "trial": ("", "number, from 0"),

@@ -32,7 +32,7 @@ class Seen(NamedTuple):
     age: float
     """Since the capture of the last usable marker angle."""
     verdict: str
-    """Of the newest frame."""
+    """Of the newest frame, or why there was none."""
     position: Array
     """Spools, (4,) [steps]."""
     taut: Array
@@ -43,6 +43,8 @@ class Seen(NamedTuple):
     """Step rates that have outlived their life, as the board counts."""
     time: float
     """On the clock [s]."""
+    fix: str = ""
+    """What to do about a camera that gives no usable angle."""
 
 
 _LAPSES, _WITHIN = 3, 1.0
@@ -71,8 +73,7 @@ class Monitor:
             fix = "gentler gains or reference, or widen safety.rate"
             raise SafetyStop(f"rate {seen.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
         if seen.age > limits.stale:
-            what = f"no usable marker angle for {1e3 * seen.age:.0f} ms (newest frame: {seen.verdict})"
-            raise SafetyStop(what, fix="see that nothing covers the markers, and the camera's light and focus")
+            raise SafetyStop(f"no usable marker angle for {1e3 * seen.age:.0f} ms ({seen.verdict})", fix=seen.fix)
         self._pull(seen.position, seen.taut)
         reeled = float(np.abs(seen.position).max()) * self._spools.step
         if reeled > limits.travel:
