@@ -23,9 +23,9 @@ from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
 from wristctl.studies import hw_trials
 from wristctl.studies.unattended import Unattended
-from wristctl.trial.control_loop import TickTiming
 from wristctl.trial.log import LOG, TrialLog
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trial_motions import motion_of
 from wristctl.wrist.directions import ACTIVE
 

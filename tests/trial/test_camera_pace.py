@@ -49,8 +49,8 @@ def test_the_cause_of_a_missing_angle_is_the_cameras_own() -> None:
     assert "device.fourcc" in fix and "safety.stale of 0.3 s" in fix
     assert slow.missing(59 / 15.0 + 0.133 + 0.16, 0.15)[0].startswith("no picture has come; until then camera gives 15")
     assert CameraPace().missing(1.0, 0.15)[0] == "no picture has come"
-    uneven = pace(60.0, 0.0, jitter=0.01)
-    assert "unevenly (+-1" in uneven.missing(1.0, 0.15)[0]
+    uneven = pace(60.0, 0.0, 61, jitter=4e-3)
+    assert "unevenly (+-12 ms)" in uneven.missing(1.0, 0.15)[0]
 
 
 @pytest.mark.parametrize("verdict", [each for each in SightingVerdict if each is not OK])

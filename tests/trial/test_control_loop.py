@@ -15,10 +15,11 @@ from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import Fault, Flag, State
 from wristctl.control.table import controller
-from wristctl.trial.control_loop import ControlLoop, TickTiming
+from wristctl.trial.control_loop import ControlLoop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.steering import Steering
+from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trial_motions import at_rest, back
 from wristctl.vision.marker import SightingVerdict
 

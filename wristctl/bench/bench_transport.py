@@ -10,18 +10,17 @@ from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.virtual import VirtualTransport
 
-_USB_FRAME = FREQUENCY // 1000
-"""Cycles between two times at which a board's USB chip hands over what has come."""
-
 
 class BenchTransport(VirtualTransport):
     """The wire to an emulated chip in the same process, with faults: port-lost, board-reset and host-silent.
 
-    A lost port stays lost; the board runs on, also while the host can only `wait`.
+    A lost port stays lost; the board runs on, also while the host can only `wait`. What the board says is handed over
+    every `latency_timer` seconds, by the board's USB chip.
     """
 
-    def __init__(self, chip: Atmega2560, faults: Faults) -> None:
+    def __init__(self, chip: Atmega2560, faults: Faults, latency_timer: float = 1e-3) -> None:
         super().__init__(chip)
+        self._handed_over = round(latency_timer * FREQUENCY)
         self._faults, self._lost, self._reset = faults, False, -math.inf
 
     def write(self, data: bytes) -> None:
@@ -35,7 +34,7 @@ class BenchTransport(VirtualTransport):
         self._see_port()
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
         while not (data := self.chip.read()) and self.chip.cycles < end:
-            self._run(min(end, (self.chip.cycles // _USB_FRAME + 1) * _USB_FRAME))
+            self._run(min(end, (self.chip.cycles // self._handed_over + 1) * self._handed_over))
             self._see_port()
         return data
 

@@ -43,7 +43,7 @@ class CameraTruth:
         """The same sighting, or one of verdict `stamp` or `frozen`; it says when the frame came."""
         while self._known and seen.came - self._known[0].came > _REMEMBERED:
             self._known.popleft()
-        shown = _Known(seen.came, zlib.crc32(np.ascontiguousarray(frame.image)), seen.corners)
+        shown = _Known(seen.came, zlib.crc32(frame.image.tobytes()), seen.corners)
         repeated = any(_alike(each, shown) for each in self._known)
         self._known.append(shown)
         stamped = self._time < frame.time <= seen.came + _CLOCKS and self._number < frame.number

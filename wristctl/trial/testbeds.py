@@ -17,7 +17,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.trial.patience import Meanwhile
 from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
-from wristctl.vision.camera import DeviceCamera
+from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
 

@@ -88,6 +88,6 @@ class TickTiming:
         median, late, most = (f"{1e3 * self.jitter(share):.2f} ms" for share in (0.5, 0.99, 1.0))
         blamed = "; ".join(f"{who} ({count} ticks)" for who, count in self.culprits.most_common())
         return (
-            f"{len(self.late)} ticks of {1e3 * self.period:g} ms, late by {median} (p50), {late} (p99), {most} at most; "
-            f"{self.overruns} overruns" + (f"; {blamed}" if blamed else "")
+            f"{len(self.late)} ticks of {1e3 * self.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
+            f"most; {self.overruns} overruns" + (f"; {blamed}" if blamed else "")
         )

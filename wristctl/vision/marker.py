@@ -44,9 +44,8 @@ MEANING = {
     SightingVerdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
     SightingVerdict.SWAPPED: "the markers have changed places",
     SightingVerdict.JUMP: "the angle has changed faster than the motors can move the wrist",
-    SightingVerdict.FROZEN: "the picture, or the markers' corners to 1/1000 px, of a moment ago: the camera repeats itself "
-    "(in trials only)",
-    SightingVerdict.STAMP: "the driver's time stamp or count stands still, goes back or lies in the future (in trials only)",
+    SightingVerdict.FROZEN: "picture, or corners to 1/1000 px, of a moment ago: the camera repeats itself (in trials)",
+    SightingVerdict.STAMP: "the driver's time stamp or count stands still, goes back or is of the future (in trials)",
 }
 
 
