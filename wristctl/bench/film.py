@@ -18,6 +18,9 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 
+_DECODED = 1.5e-3
+"""Seconds that a viewer of the stream takes to read and decode a picture: a part of the camera's delay."""
+
 
 def start_film(
     settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path, broadcast: bool = False
@@ -60,9 +63,10 @@ def _develop(
                 continue
             frame = picture(exposure, painter)
             encoded = stream.encoded(frame.image) if stream else b""
-            time.sleep(max(0.0, arrival - time.monotonic()))
             if stream:
+                time.sleep(max(0.0, arrival - _DECODED - time.monotonic()))
                 stream.show(encoded)
+            time.sleep(max(0.0, arrival - time.monotonic()))
             memory.write(frame._replace(time=start + frame.time))
     except (EOFError, OSError):
         return

@@ -91,17 +91,20 @@ class CameraPace:
             return f"newest frame: {newest}", FIX[newest]
         return f"newest frame: {newest}; {self.said()}", self._faster()
 
-    def fits(self, stale: float) -> None:
-        """Raises CameraError for a camera whose pictures are too few, or too old when they come, for this limit [s]."""
-        if self.oldest > stale:
+    def fits(self, stale: float, hidden: float = 0.0) -> None:
+        """Raises CameraError for a camera whose pictures are too few, or too old when they come, for this limit [s].
+
+        `hidden` is an age [s] that their time stamps do not tell of.
+        """
+        if (oldest := self.oldest + hidden) > stale:
             what = (
-                f"{self.said()}: where one is lost the angle is {1e3 * self.oldest:.0f} ms old before the next, beyond "
+                f"{self.said()}: where one is lost the angle is {1e3 * oldest:.0f} ms old before the next, beyond "
                 f"safety.stale ({1e3 * stale:.0f} ms)"
             )
-            raise CameraError(what, "camera", self._faster())
+            raise CameraError(what, "camera", self._faster(hidden))
 
-    def _faster(self) -> str:
-        least = np.ceil(20.0 * self.oldest) / 20.0
+    def _faster(self, hidden: float = 0.0) -> str:
+        least = np.ceil(20.0 * (self.oldest + hidden)) / 20.0
         return (
             "a faster mode of the camera (device.fourcc: MJPG, device.frame_rate, a shorter device.exposure), or "
             f"safety.stale of {least:g} s at least, with a slower reference"
