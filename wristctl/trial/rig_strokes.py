@@ -14,7 +14,7 @@ from wristctl.trial.patience import Patience
 from wristctl.trial.prepare import prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.step_latency import Stroke
+from wristctl.trial.step_latency import MotorStroke
 from wristctl.trial.tracking import Tracking
 
 COUNT = 24
@@ -43,7 +43,7 @@ class RigStrokes:
         board.home()
         self._straight = Patience(board).angle(tracking, 10)
 
-    def strokes(self, count: int = COUNT, told: Callable[[int], None] = lambda done: None) -> list[Stroke]:
+    def strokes(self, count: int = COUNT, told: Callable[[int], None] = lambda done: None) -> list[MotorStroke]:
         """Do so many; the tendon is slack again in the end. Raises SafetyStop, BoardError and CameraError."""
         low = self._taken_up()
         high = low + round(math.copysign(_STROKE / self._step, low))
@@ -75,12 +75,12 @@ class RigStrokes:
             raise SafetyStop(what, fix="slacken all tendons")
         return bend
 
-    def _stroke(self, low: int, high: int, before: float) -> Stroke:
+    def _stroke(self, low: int, high: int, before: float) -> MotorStroke:
         rest, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(_SPEED / self._step), _AFTER)
         (time, position), (stamped, angle) = (np.concatenate([rest[k], moved[k]]).T for k in range(2))
         if len(angle) and np.abs(angle - self._straight).max() > _FURTHEST:
             raise SafetyStop(f"a stroke of axis {self._axis} bends the wrist too far", fix="slacken all tendons")
-        return Stroke(time, position, stamped, angle)
+        return MotorStroke(time, position, stamped, angle)
 
     def _watch(self, goal: int, rate: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Go to `goal`, and watch for so long: positions (n, 2) and angles (m, 2) with their times before them."""

@@ -20,11 +20,11 @@ _STEP = 1e-3
 """Seconds between two samples of the model's course."""
 _LATEST = 0.5
 """Delay [s] beyond which nothing is looked for."""
-_TRIED = [(delay, rate) for delay in np.arange(0.0, 0.4, 0.02) for rate in (15.0, 30.0, 60.0, 120.0)]
+_DELAYS, _RATES, _DAMPING = np.arange(0.0, 0.4, 0.02).tolist(), (15.0, 30.0, 60.0, 120.0), 0.5
 """Delays [s] and natural frequencies [rad/s] of which the best begins the fit."""
 
 
-class Stroke(NamedTuple):
+class MotorStroke(NamedTuple):
     """One stroke of the motor: positions (n,) [steps] at times (n,) [s], and angles (m,) [rad] stamped (m,) [s]."""
 
     time: Array
@@ -47,17 +47,21 @@ class Latency(NamedTuple):
     pictures: int
 
 
-def find_latency(strokes: Sequence[Stroke]) -> Latency:
+def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
     """The delay by which strokes were seen. ValueError for fewer than twenty pictures."""
     count = sum(len(each.angle) for each in strokes)
     if count < 20:
         raise ValueError(f"{count} pictures are too few")
 
     def errors(x: Array) -> Array:
-        return _errors(strokes, float(x[0]), float(np.exp(x[1])), float(np.exp(x[2])))
+        return _errors(strokes, _courses(strokes, float(np.exp(x[1])), float(np.exp(x[2]))), float(x[0]))
 
-    starts = [np.array([delay, np.log(rate), np.log(0.5)]) for delay, rate in _TRIED]
-    best = min(starts, key=lambda x: float(np.sum(errors(x) ** 2)))
+    tried = []
+    for rate in _RATES:
+        courses = _courses(strokes, rate, _DAMPING)
+        tried += [(float(np.sum(_errors(strokes, courses, delay) ** 2)), delay, rate) for delay in _DELAYS]
+    _, begin, rate = min(tried)
+    best = np.array([begin, np.log(rate), np.log(_DAMPING)])
     bounds = [-0.05, np.log(3.0), np.log(0.02)], [_LATEST, np.log(1000.0), np.log(20.0)]
     fitted = least_squares(errors, best, bounds=bounds, x_scale=[1e-3, 0.1, 0.1])
     free = max(1, count - len(strokes) - 4)
@@ -68,11 +72,11 @@ def find_latency(strokes: Sequence[Stroke]) -> Latency:
     return Latency(delay, float(np.sqrt(covariance[0, 0])), rate, float(np.sqrt(variance)), count)
 
 
-def _errors(strokes: Sequence[Stroke], delay: float, rate: float, damping: float) -> Array:
+def _errors(strokes: Sequence[MotorStroke], courses: Sequence[MotorStroke], delay: float) -> Array:
     """Angles less the model's; each stroke has its own angle to begin from, all have one gain."""
     seen, shown = [], []
-    for each in strokes:
-        model = _course(each, rate, damping, each.stamped - delay)
+    for each, course in zip(strokes, courses, strict=True):
+        model = np.interp(each.stamped - delay, course.time, course.position)
         seen.append(each.angle - each.angle.mean())
         shown.append(model - model.mean())
     angle, model = np.concatenate(seen), np.concatenate(shown)
@@ -80,9 +84,12 @@ def _errors(strokes: Sequence[Stroke], delay: float, rate: float, damping: float
     return angle - gain * model
 
 
-def _course(stroke: Stroke, rate: float, damping: float, at: Array) -> Array:
-    """The model's answer to a stroke, from rest."""
-    time = np.arange(stroke.time[0], stroke.time[-1], _STEP)
-    driven = np.interp(time, stroke.time, stroke.position) - stroke.position[0]
+def _courses(strokes: Sequence[MotorStroke], rate: float, damping: float) -> list[MotorStroke]:
+    """The strokes as the model answers them, from rest."""
     up, down = bilinear([rate**2], [1.0, 2.0 * damping * rate, rate**2], 1.0 / _STEP)
-    return np.interp(at, time, lfilter(up, down, driven))
+    made = []
+    for each in strokes:
+        time = np.arange(each.time[0], each.time[-1], _STEP)
+        driven = np.interp(time, each.time, each.position) - each.position[0]
+        made.append(each._replace(time=time, position=lfilter(up, down, driven)))
+    return made
