@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.exchange import Exchange, Traffic
+from wristctl.board.exchange import Exchange, Overheard, Traffic
 from wristctl.board.framing import crc
 from wristctl.board.messages import (
     ANSWER_TO,
@@ -86,6 +86,10 @@ class Board:
     def round_trip(self) -> float:
         """Seconds from the last command to its answer."""
         return self._exchange.round_trip
+
+    def overhear(self, told: Overheard) -> None:
+        """Have all bytes on the wire from here on told."""
+        self._exchange.overheard = told
 
     def connect(self) -> Hello:
         """Wait for the board, which may be starting, and see that it speaks by our message table."""

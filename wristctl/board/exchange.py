@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from wristctl.board.board_errors import NoAnswer
@@ -10,6 +11,9 @@ from wristctl.board.messages import FEEDS_WATCHDOG, Command
 from wristctl.board.transport import Transport
 
 _ANSWER = 0x80
+
+Overheard = Callable[[float, str, bytes], None]
+"""Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises."""
 
 
 @dataclass
@@ -31,6 +35,8 @@ class Exchange:
         self.traffic = Traffic()
         self.round_trip = 0.0
         """Seconds from the last command to its answer."""
+        self.overheard: Overheard = lambda time, way, data: None
+        """Told of all bytes on the wire."""
         self.silence = 0.0
         """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
         longer."""
@@ -54,6 +60,7 @@ class Exchange:
         gap = began - self._last_fed if self._last_fed else 0.0
         self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
         for attempt in range(attempts):
+            self.overheard(self.transport.now(), "sent", frame)
             self.transport.write(frame)
             self.traffic.sent += 1
             self.traffic.resent += attempt > 0
@@ -70,6 +77,8 @@ class Exchange:
         while found is None and (left := deadline - self.transport.now()) > 0:
             data = self.transport.read(left)
             self.traffic.bytes_read += len(data)
+            if data:
+                self.overheard(self.transport.now(), "came", data)
             for frame in self._decoder.feed(data):
                 if (
                     found is None

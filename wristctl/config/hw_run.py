@@ -41,7 +41,7 @@ class Safety(Section):
     late: float = quantity(0.05, "s", "longest delay of one tick; with its period below the watchdog", "assumed", gt=0)
     skipped: float = quantity(0.2, "", "largest share of a second's ticks that are skipped", "assumed", gt=0, lt=0.5)
     round_trip: float = quantity(
-        0.9, "", "largest median of a second's command round trips, over control_period", "assumed", gt=0, le=1
+        1.0, "", "largest median of a second's command round trips, over control_period", "assumed", gt=0, le=1
     )
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")

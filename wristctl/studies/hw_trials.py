@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 
 import cv2
 import numpy as np
@@ -25,6 +26,10 @@ from wristctl.trial.trial_metrics import JUDGED, evaluated
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.tuning.gains_file import Gains
 from wristctl.vision.annotate import AnnotatedVideo
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Sighting
+from wristctl.vision.raw_video import COLUMNS as RAW
+from wristctl.vision.raw_video import RawVideo
 from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.kinematics import Inverse
@@ -62,17 +67,19 @@ def perform_trials(
     calibration = session.inputs.read("calibration", WristCalibration.load)
     plant = PLANTS[settings.bench.plant.model]
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
-    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
+    monotonic = settings.port is not None or settings.real_time
+    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period, monotonic)
     try:
         experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
-        film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
+        films = _films(run, settings)
     except BaseException:
         trial_log.close()
         raise
     stopped: BaseException | None = None
     try:
         with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            view, keep = View.of(session.inputs.runs().get("optics")), film.add if film else None
+            view = View.of(session.inputs.runs().get("optics"))
+            keep = partial(_add, films) if films else None
             testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
         with session.operator.watch(trials, session) as shown:
             experiment.run(testbed, shown)
@@ -82,8 +89,10 @@ def perform_trials(
         trial_log.close()
     except OSError as error:
         stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", fix_of(error))
-    if film is not None:
+    for film in films:
         film.close()
+    if films:
+        run.columns("data/raw.csv", RAW)
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
     table = _evaluate(run, settings, experiment, trials)
@@ -91,6 +100,18 @@ def perform_trials(
     if stopped is not None:
         raise stopped
     return table
+
+
+def _films(run: LiveRun, settings: HwRunSettings) -> list[AnnotatedVideo | RawVideo]:
+    if not settings.video:
+        return []
+    rate = settings.sensor.frame_rate
+    return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
+
+
+def _add(films: list[AnnotatedVideo | RawVideo], frame: Frame, seen: Sighting) -> None:
+    for film in films:
+        film.add(frame, seen)
 
 
 def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
