@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.exchange import Exchange, Overheard, Traffic
+from wristctl.board.exchange import Exchange, Overheard, Traffic, nobody
 from wristctl.board.framing import crc
 from wristctl.board.messages import (
     ANSWER_TO,
@@ -49,13 +49,14 @@ class Board:
     """A motor board behind a transport. As a context manager it connects, and stops the motors in the end.
 
     Commands are sent again when no answer comes, at most ATTEMPTS times within the watchdog time; all of them are
-    absolute, so that the board may see one twice. Errors are those of `errors.py`.
+    absolute, so that the board may see one twice. `overheard` is told of all bytes on the wire. Errors are those of
+    `board_errors.py`.
     """
 
-    def __init__(self, transport: Transport) -> None:
+    def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport = transport
         self.hello: Hello | None = None
-        self._exchange = Exchange(transport)
+        self._exchange = Exchange(transport, overheard)
         self._configured, self._limits, self._watchdog = Configure(), Limits(), Configure().watchdog
         self._connection = 0
 
@@ -86,10 +87,6 @@ class Board:
     def round_trip(self) -> float:
         """Seconds from the last command to its answer."""
         return self._exchange.round_trip
-
-    def overhear(self, told: Overheard) -> None:
-        """Have all bytes on the wire from here on told."""
-        self._exchange.overheard = told
 
     def connect(self) -> Hello:
         """Wait for the board, which may be starting, and see that it speaks by our message table."""

@@ -16,6 +16,10 @@ Overheard = Callable[[float, str, bytes], None]
 """Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises."""
 
 
+def nobody(time: float, way: str, data: bytes) -> None:
+    """Overhears nothing."""
+
+
 @dataclass
 class Traffic:
     """What the driver has seen on the wire since it was made."""
@@ -30,13 +34,11 @@ class Traffic:
 class Exchange:
     """Commands and answers in turn over a transport."""
 
-    def __init__(self, transport: Transport) -> None:
-        self.transport = transport
+    def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
+        self.transport, self._overheard = transport, overheard
         self.traffic = Traffic()
         self.round_trip = 0.0
         """Seconds from the last command to its answer."""
-        self.overheard: Overheard = lambda time, way, data: None
-        """Told of all bytes on the wire."""
         self.silence = 0.0
         """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
         longer."""
@@ -60,7 +62,7 @@ class Exchange:
         gap = began - self._last_fed if self._last_fed else 0.0
         self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
         for attempt in range(attempts):
-            self.overheard(self.transport.now(), "sent", frame)
+            self._overheard(self.transport.now(), "sent", frame)
             self.transport.write(frame)
             self.traffic.sent += 1
             self.traffic.resent += attempt > 0
@@ -78,7 +80,7 @@ class Exchange:
             data = self.transport.read(left)
             self.traffic.bytes_read += len(data)
             if data:
-                self.overheard(self.transport.now(), "came", data)
+                self._overheard(self.transport.now(), "came", data)
             for frame in self._decoder.feed(data):
                 if (
                     found is None

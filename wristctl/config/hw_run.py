@@ -106,7 +106,8 @@ class HwRunSettings(RigSettings):
     from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
-    video: bool = choice(False, "keep the frames that were looked at as a video, with clock and marker angle")
+    video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
+    priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

@@ -20,6 +20,7 @@ from wristctl.studies.session import Session
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
+from wristctl.trial.loop_priority import prioritised
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_metrics import JUDGED, evaluated
@@ -35,6 +36,8 @@ from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
+
+Films = list[AnnotatedVideo | RawVideo]
 
 _OF_TRIALS: dict[str, tuple[str, str]] = {
     "trial": ("", "number, from 0, in the order done"),
@@ -77,12 +80,11 @@ def perform_trials(
         raise
     stopped: BaseException | None = None
     try:
-        with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            view = View.of(session.inputs.runs().get("optics"))
-            keep = partial(_add, films) if films else None
-            testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
-        with session.operator.watch(trials, session) as shown:
-            experiment.run(testbed, shown)
+        with prioritised(settings.priority) as priority:
+            if priority:
+                session.operator.tell(priority)
+                session.findings.summary(priority)
+            _perform(session, bench, experiment, films, trials)
     except BaseException as error:
         stopped = error
     try:
@@ -102,14 +104,26 @@ def perform_trials(
     return table
 
 
-def _films(run: LiveRun, settings: HwRunSettings) -> list[AnnotatedVideo | RawVideo]:
+def _perform(
+    session: Session, bench: WristParameters, experiment: Experiment, films: Films, trials: list[Trial]
+) -> None:
+    study, settings = session.study, session.study.hw_run
+    with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
+        view = View.of(session.inputs.runs().get("optics"))
+        keep = partial(_add, films) if films else None
+        testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
+    with session.operator.watch(trials, session) as shown:
+        experiment.run(testbed, shown)
+
+
+def _films(run: LiveRun, settings: HwRunSettings) -> Films:
     if not settings.video:
         return []
     rate = settings.sensor.frame_rate
     return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
 
 
-def _add(films: list[AnnotatedVideo | RawVideo], frame: Frame, seen: Sighting) -> None:
+def _add(films: Films, frame: Frame, seen: Sighting) -> None:
     for film in films:
         film.add(frame, seen)
 

@@ -93,8 +93,7 @@ class Experiment:
 
         Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
         """
-        board = Board(testbed.transport)
-        board.overhear(self._log.wire)
+        board = Board(testbed.transport, self._log.wire)
         try:
             self._warm_up()
             board.connect()
