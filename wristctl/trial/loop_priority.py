@@ -29,7 +29,7 @@ def prioritised(wanted: bool) -> Iterator[str]:
         yield ""
         return
     switch, collecting = sys.getswitchinterval(), gc.isenabled()
-    had, refused = ["garbage collection off"], []
+    had, refused = ["garbage collection off"], list[str]()
     gc.collect()
     gc.freeze()
     gc.disable()
