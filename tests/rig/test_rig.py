@@ -65,9 +65,8 @@ def in_time() -> Iterator[None]:
         except (AssertionError, subprocess.TimeoutExpired) as error:
             failed = error
     if lateness.p99 > MAY_BE_LATE:
-        pytest.skip(
-            f"this computer wakes 1 in 100 late by {1e3 * lateness.p99:.1f} ms of {1e3 * PERIOD:g} ms: {failed}"
-        )
+        late = f"one time in a hundred this computer wakes {1e3 * lateness.p99:.1f} ms late"
+        pytest.skip(f"{late}, which is too much for ticks of {1e3 * PERIOD:g} ms: {failed or 'it passed all the same'}")
     if failed is not None:
         raise failed
 
@@ -140,9 +139,8 @@ def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_two_millis
         print(f"latency {1e3 * age:.2f} ms of 60, sd {1e3 * found['latency']['sd']:.2f} ms")
         told = "; ".join(each["what"] for each in found["troubles"])
         assert re.search(r"the board's answers take 1[67]\.\d ms", told), told
-        assert re.search(
-            r"the camera gives 1(4\.[5-9]|5|5\.[0-5])\d* pictures/s; the loop's observer counts on 60", told
-        ), told
+        rate = re.search(r"gives ([\d.]+) pictures/s; the loop's observer counts on 60", told)
+        assert rate and float(rate[1]) == pytest.approx(15.0, abs=0.5), told
         assert "older than their time stamps say" in told
         assert age == pytest.approx(0.060, abs=2e-3)
 
@@ -188,7 +186,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
     served = bridge("--set", "bench.camera.frame_rate=30", *TENDONS_OFF)
     check = check.replace(flash.split()[-1], served.port)
     with in_time():
-        for act, state, fault in (("press", "FAULT", "ESTOP"), ("release", "DISABLED", "none")):
+        for act, state, fault in (("press", "FAULT", "ESTOP_INPUT"), ("release", "DISABLED", "none")):
             served.type(act)
             code, out, err = do(check)
             assert code == 0 and re.search(rf"state +{state}", out) and re.search(rf"faults +{fault}", out), out + err
@@ -214,6 +212,8 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
     with in_time():
         code, out, err = do(here(), "yes\n")
         assert code == 0 and out.startswith("This rig can run the loop of 5 ms"), out + err
+        code, out, err = do(here(), "yes\nyes\n")
+        assert code == 0 and re.search(r"^ *2 +4 +\+1 +0\.[4-9]", out, re.MULTILINE), out + err
         code, out, err = do(here(), "yes\nyes\n")
         assert code == 0, err
         slopes = [float(each) for each in re.findall(r"^ *\d +\d +\+1 +([\d.]+)", out, re.MULTILINE)]

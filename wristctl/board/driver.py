@@ -175,13 +175,13 @@ class Board:
     def wait_while(self, flag: Flag, timeout: float) -> Status:
         """Feed the watchdog until the status no longer has this flag. BoardError after `timeout` s."""
         deadline = self.transport.now() + timeout
-        while flag in (status := self.read()).flags:
+        while flag in (status := self.read()).flags and status.state != State.FAULT:
             if self.transport.now() > deadline:
                 raise BoardError("firmware", f"still {flag.name} after {timeout:g} s", self.transport.name)
-            if status.state == State.FAULT:
-                raise self.faulted(status)
             self.ping()
             self.transport.wait(self._watchdog / 4)
+        if status.state == State.FAULT:
+            raise self.faulted(status)
         return status
 
     def send(self, message: Command | tuple[Any, ...]) -> Status:

@@ -82,6 +82,8 @@ class CalibrateWristSettings(RigSettings):
     """Zero, senses of turning and steps per radian of a rig."""
 
     plane: Literal["ulnar", "flexion"] = choice("ulnar", "bending plane that the camera looks at")
+    axis: int | None = choice(None, "try this axis alone, 0 to 3, and calibrate nothing", ge=0, le=3)
+    max_deg: float = quantity(2.0, "deg", "largest bend while one axis is tried", "assumed", gt=0.5, le=10)
 
 
 class HwRunSettings(RigSettings):

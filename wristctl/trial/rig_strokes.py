@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wristctl.board.driver import Board
-from wristctl.board.messages import AXES, JOG_RATE, State, Target
+from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
 from wristctl.config.hw_run import RigSettings
 from wristctl.trial.patience import Patience
 from wristctl.trial.prepare import prepare
@@ -33,9 +33,15 @@ _UNDERWAY = 0.5e-3
 
 
 class RigStrokes:
-    """Strokes of one axis. The board is enabled, and where the motors stand is called zero: no homing outlives this."""
+    """Strokes of one axis, which bends the wrist by `furthest` [rad] at most.
 
-    def __init__(self, board: Board, tracking: Tracking, settings: RigSettings, axis: int) -> None:
+    The board is enabled, and where the motors stand is called zero: no homing outlives this.
+    """
+
+    def __init__(
+        self, board: Board, tracking: Tracking, settings: RigSettings, axis: int, furthest: float = _FURTHEST
+    ) -> None:
+        self._furthest, self._taut = furthest, min(_TAKEN_UP, 0.5 * furthest)
         self._board, self._tracking, self._axis = board, tracking, axis
         self._step, self._slack = spools_of(settings.actuator).step, settings.homing.slack
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
@@ -45,7 +51,7 @@ class RigStrokes:
 
     def strokes(self, count: int = COUNT, told: Callable[[int], None] = lambda done: None) -> list[MotorStroke]:
         """Do so many; the tendon is slack again in the end. Raises SafetyStop, BoardError and CameraError."""
-        low = self._taken_up()
+        low, _ = self.taken_up()
         high = low + round(math.copysign(_STROKE / self._step, low))
         found, rng = [], np.random.default_rng(0)
         for k in range(count):
@@ -53,24 +59,31 @@ class RigStrokes:
             # at random, so that strokes begin anywhere between two pictures
             found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
             told(k + 1)
-        self._board.go_to((0,) * AXES, JOG_RATE)
+        self.let_go()
         return found
 
-    def _taken_up(self) -> int:
-        """The position [steps] at which the tendon bends the wrist a little; its sign is the motor's sense."""
+    def let_go(self) -> None:
+        """Back to where the motor stood at first."""
+        self._board.go_to((0,) * AXES, JOG_RATE)
+
+    def taken_up(self) -> tuple[int, float]:
+        """The position [steps] at which the tendon bends the wrist a little, and the bend [rad].
+
+        The position's sign is the motor's sense. Raises SafetyStop where the tendon bends nothing.
+        """
         move = max(1, round(_MOVE / self._step))
         for sense in (1, -1):
             for reeled in range(move, round(self._slack / self._step) + move, move):
                 self._watch(sense * reeled, JOG_RATE, _REST)
-                if abs(self._bend()) > _TAKEN_UP:
-                    return sense * reeled
+                if abs(bend := self._bend()) > self._taut:
+                    return sense * reeled, bend
             self._watch(0, JOG_RATE, _REST)
         what = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
-        raise SafetyStop(what, "the camera's latency", "see its tendon and power; --axis tries another; homing.slack")
+        raise SafetyStop(what, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
 
     def _bend(self) -> float:
         bend = Patience(self._board).angle(self._tracking, 3) - self._straight
-        if abs(bend) > _FURTHEST:
+        if abs(bend) > self._furthest:
             what = f"axis {self._axis} bent the wrist by {math.degrees(bend):.1f} deg"
             raise SafetyStop(what, fix="slacken all tendons")
         return bend
@@ -78,18 +91,19 @@ class RigStrokes:
     def _stroke(self, low: int, high: int, before: float) -> MotorStroke:
         rest, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(_SPEED / self._step), _AFTER)
         (time, position), (stamped, angle) = (np.concatenate([rest[k], moved[k]]).T for k in range(2))
-        if len(angle) and np.abs(angle - self._straight).max() > _FURTHEST:
+        if len(angle) and np.abs(angle - self._straight).max() > self._furthest:
             raise SafetyStop(f"a stroke of axis {self._axis} bends the wrist too far", fix="slacken all tendons")
         return MotorStroke(time, position, stamped, angle)
 
     def _watch(self, goal: int, rate: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        """Go to `goal`, and watch for so long: positions (n, 2) and angles (m, 2) with their times before them."""
+        """Go to `goal`, and watch for so long, and until it is there: positions (n, 2) and angles (m, 2) with their times before them."""
         board, clock = self._board, self._board.transport
         one, two, three, four = (goal * (k == self._axis) for k in range(AXES))
         board.send(Target((one, two, three, four), (rate,) * 4))
         fed = clock.now()
         end, positions, angles = fed + seconds, [], []
-        while (now := clock.now()) < end:
+        status = board.read()
+        while (now := clock.now()) < end or Flag.MOVING in status.flags:
             status = board.read()
             if status.state is not State.ENABLED:
                 raise board.faulted(status)
