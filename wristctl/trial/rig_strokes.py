@@ -96,7 +96,7 @@ class RigStrokes:
         return MotorStroke(time, position, stamped, angle)
 
     def _watch(self, goal: int, rate: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        """Go to `goal`, and watch for so long, and until it is there: positions (n, 2) and angles (m, 2) with their times before them."""
+        """Go to `goal` and watch, so long and until it is there: positions and angles (n, 2), each after its time."""
         board, clock = self._board, self._board.transport
         one, two, three, four = (goal * (k == self._axis) for k in range(AXES))
         board.send(Target((one, two, three, four), (rate,) * 4))
