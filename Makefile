@@ -6,7 +6,7 @@ STUDY ?= experiments/quick.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	worlds clean venv mutants coverage
+	test-rig test-statistics worlds clean venv mutants coverage
 
 run: .venv/run
 	@set -e; \
@@ -46,6 +46,10 @@ test-firmware: .venv/dev firmware
 test-identify: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/identification
 
+# Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
+test-statistics: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/comparison tests/tuning
+
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest tests/vision tests/cli/test_vision_commands.py
@@ -55,6 +59,11 @@ test-vision: .venv/dev
 test-faults: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/trial/test_fault_table.py
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
+
+# The real path, serial port and camera device, against the emulated rig in real time: first-power-up.md walked, a slow
+# link and camera found out, hostile bytes. Alone: beside other work they end as skipped.
+test-rig: .venv/dev
+	WRISTCTL_RIG=1 $(BIN)/pytest -s -rs tests/rig
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers

@@ -97,14 +97,17 @@ def tuned() -> float:
     """Seconds of a particle swarm: 40 particles, 60 iterations, two scenarios of 5 s, n = 4; all cores."""
     from wristctl.config.study import Study
     from wristctl.control.table import controller
-    from wristctl.tuning.search import search
+    from wristctl.seeds import stream
+    from wristctl.tuning.objective import Judge
+    from wristctl.tuning.search import search, tuning_cases
 
     def seconds(iterations: int) -> float:
         tune = {"candidates": 40, "iterations": iterations, "controllers": ("smc",)}
         study = Study.model_validate({"tune": tune})
         assert len(study.tune.scenarios) == 2 and study.tune.optimiser == "pso"
         start = time.perf_counter()
-        search(study, controller("smc"), np.random.default_rng(0))
+        judge = Judge(tuning_cases(study)[0], study.wrist, study.tune.objective)
+        search(study, controller("smc"), lambda name: stream(0, name), (judge, None))
         return time.perf_counter() - start
 
     seconds(1)

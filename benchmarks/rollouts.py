@@ -12,10 +12,12 @@ import numpy as np
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
+from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.tuning.search import search
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import search, tuning_cases
 
 HORIZON, REPEATS = 5.0, 5
 
@@ -50,7 +52,8 @@ def main() -> None:
     study = Study.model_validate({"tune": {"candidates": 40, "iterations": 60, "controllers": ("smc",)}})
     assert len(study.tune.scenarios) == 2
     start = time.perf_counter()
-    search(study, controller("smc"), np.random.default_rng(0))
+    judge = Judge(tuning_cases(study)[0], study.wrist, study.tune.objective)
+    search(study, controller("smc"), lambda name: stream(0, name), (judge, None))
     print(f"PSO, 40 particles x 60 iterations x 2 scenarios of 5 s, 4 segments: {time.perf_counter() - start:.1f} s")
 
 

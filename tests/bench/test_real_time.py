@@ -168,6 +168,23 @@ def test_on_a_faulty_line_the_host_is_not_heard_for_a_while_and_a_lost_port_is_c
     assert wire.closed
 
 
+def test_an_adapter_with_a_latency_timer_hands_over_what_the_board_says_at_its_ticks() -> None:
+    class Heard(Wire):
+        heard: list[tuple[float, bytes]]
+
+        def send(self, data: bytes) -> None:
+            self.heard.append((clock[0], data))
+
+    clock, wire = [0.0], Heard()
+    wire.heard = []
+    line = FaultyLine(wire, Faults(()), lambda: clock[0], latency_timer=0.016)
+    for clock[0], said in ((0.001, b"a"), (0.010, b"b"), (0.017, b""), (0.0325, b"c"), (0.047, b""), (0.049, b"")):
+        if said:
+            line.send(said)
+        line.pass_on()
+    assert wire.heard == [(0.017, b"ab"), (0.049, b"c")]
+
+
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
     """A client in a process of its own, and the record of its bench."""

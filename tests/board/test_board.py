@@ -187,6 +187,24 @@ def test_a_pressed_emergency_stop_ends_motion_and_is_named(board: Board, wire: B
     assert Fault.ESTOP_INPUT in error.value.faults and "D41" in error.value.fix
 
 
+def test_an_emergency_stop_in_a_jog_is_named_and_no_mystery_of_where_the_axes_stand(
+    board: Board, wire: BadWire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    board.enable()
+    wait, left = wire.wait, [4]
+
+    def pressed(seconds: float) -> None:
+        left[0] -= 1
+        if not left[0]:
+            wire.chip.drive("G", 0, True)
+        wait(seconds)
+
+    monkeypatch.setattr(wire, "wait", pressed)
+    with pytest.raises(Faulted) as error:
+        board.jog((340, 0, 0, 0))
+    assert Fault.ESTOP_INPUT in error.value.faults and error.value.exit_code == 5
+
+
 def test_a_board_that_restarts_is_noticed(board: Board, wire: BadWire) -> None:
     ready(board)
     wire.chip.reset()

@@ -58,5 +58,5 @@ def test_one_axis_creeps_a_twentieth_of_a_turn_forward_and_back() -> None:
     board: Any = Told([])
     last: Any = move_a_little(board, 2)
     assert last == "off"
-    assert board.told == [Configure(), "enable", [10, 20, 30 + 160, 40], [10, 20, 30, 40], "disable"]
+    assert board.told == [Configure(watchdog=0.5), "enable", [10, 20, 30 + 160, 40], [10, 20, 30, 40], "disable"]
     assert WIRING_STEPS == 200 * 16 // 20

@@ -113,3 +113,32 @@ def test_silence_is_between_two_commands_that_feed_the_watchdog() -> None:
     wire.wait(0.25)
     exchange.ask(Command.PING, b"", 0.02, 1)
     assert exchange.silence == pytest.approx(0.752)
+
+
+def test_a_silent_host_is_silent_also_for_a_command_that_does_not_feed() -> None:
+    """The board's fault is then noticed by STATUS, and the computer is to blame, not the cable."""
+    wire = Wire(lambda frame, n: answer(frame))
+    exchange = Exchange(wire)
+    for _ in range(2):
+        exchange.ask(Command.PING, b"", 0.02, 1)
+    wire.wait(0.3)
+    exchange.ask(Command.STATUS, b"", 0.02, 1)
+    assert exchange.silence == pytest.approx(0.301)
+    wire.wait(0.01)
+    exchange.ask(Command.STATUS, b"", 0.02, 1)
+    assert exchange.silence == pytest.approx(0.312)
+    exchange.ask(Command.PING, b"", 0.02, 1)
+    exchange.ask(Command.PING, b"", 0.02, 1)
+    assert exchange.silence == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize(("sleeps", "blamed"), [(0.0, "cable"), (0.3, "host")])
+def test_an_answer_that_the_computer_slept_through_is_not_the_cables_fault(sleeps: float, blamed: str) -> None:
+    class Sleepy(Wire):
+        def read(self, timeout: float) -> bytes:
+            self.time += sleeps
+            return super().read(timeout)
+
+    with pytest.raises(NoAnswer) as lost:
+        Exchange(Sleepy(lambda frame, n: b"")).ask(Command.PING, b"", 0.025, 3)
+    assert lost.value.origin == blamed and ("slept" in lost.value.what) == bool(sleeps)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import threading
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 
+import numpy as np
 import pytest
 
 from tests.board.patience import patient, wait_for
-from wristctl.board.board_errors import PortUnusable
+from wristctl.board.board_errors import BoardError, PortUnusable
 from wristctl.board.emulator import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, PtyLine, TcpLine, serve
@@ -126,3 +129,91 @@ def test_a_port_that_is_not_there_is_named_with_what_to_do(port: str, said: str)
     with pytest.raises(PortUnusable, match=said) as error:
         SerialTransport(port, BAUD)
     assert error.value.where == port and error.value.fix
+
+
+class Flood:
+    """A client that always has bytes to say, and counts those that were taken."""
+
+    address = "flood"
+
+    def __init__(self, chip: Atmega2560, waits: int) -> None:
+        self.chip, self.waits, self.taken, self.most = chip, waits, 0, 0
+        self.now = 1000.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+    def wait(self, timeout: float) -> bool:
+        self.waits -= 1
+        self.now += 1e-5  # it need not wait
+        return True
+
+    def receive(self) -> bytes:
+        self.taken += 4096
+        self.most = max(self.most, self.chip.bytes_coming + 4096)
+        return bytes(range(256)) * 16
+
+    def send(self, data: bytes) -> None:
+        """Nobody reads."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_a_client_that_says_more_than_the_line_carries_has_to_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    chip = Atmega2560()
+    flood = Flood(chip, 4000)
+    monkeypatch.setattr("wristctl.board.emulator.serve.time", flood)
+    serve(chip, flood, lambda: flood.waits > 0)
+    passed = flood.now - 1000.0
+    assert passed > 1.0
+    assert flood.most < 4096 + 1024 + 1
+    assert flood.taken <= BAUD / 10 * passed + 2 * 4096
+
+
+def test_many_clients_together_are_taken_from_by_no_more_than_one() -> None:
+    line = TcpLine(0)
+    clients = [socket.create_connection(("127.0.0.1", int(line.address.rsplit(":", 1)[1]))) for _ in range(20)]
+    try:
+        for each in clients:
+            line.wait(0.5)
+            each.sendall(bytes(4096))
+        wait_for(lambda: 4096 <= len(line.receive()) < 2 * 4096)
+    finally:
+        for each in clients:
+            each.close()
+        line.close()
+
+
+def test_a_foreign_program_on_the_same_port_moves_nothing_and_ends_nothing() -> None:
+    """It takes answers away and mixes bytes in: our session may lose its link, the board stops and serves on."""
+    line, running = WatchedLine(PtyLine()), [True]
+    chip = Atmega2560()
+    serving = threading.Thread(target=serve, args=(chip, line, lambda: running[0]))
+    serving.start()
+    try:
+        board = patient(SerialTransport(line.address, BAUD))
+        board.enable()
+        board.home()
+        stranger = os.open(line.address, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        rng = np.random.default_rng(0)
+        with suppress(BoardError):
+            for _ in range(60):
+                with suppress(BlockingIOError):
+                    os.write(stranger, rng.bytes(200))
+                    os.read(stranger, 64)
+                board.read()
+        os.close(stranger)
+        before = chip.cycles
+        wait_for(lambda: chip.cycles > before + FREQUENCY // 10)
+        board.transport.close()
+        wait_for(lambda: not line.there)
+        with closing(patient(SerialTransport(line.address, BAUD))) as again:
+            assert again.read().position == (0, 0, 0, 0)
+    finally:
+        running[0] = False
+        serving.join()
+        line.close()

@@ -17,10 +17,16 @@ import pytest
 
 from tests.cli.conftest import Call
 from tests.report.browser import CHROMIUM, DRIVER, Browser
+from wristctl.board.framing import Decoder
+from wristctl.board.messages import LAYOUTS, Command, Rate
 from wristctl.config.load import load_study
-from wristctl.records import list_runs, open_run
+from wristctl.config.vision import Gates, Markers
+from wristctl.records import Run, list_runs, open_run
 from wristctl.studies.loop_warnings import outside_conditions
-from wristctl.wrist.directions import DIRECTIONS
+from wristctl.vision.camera import VideoCamera
+from wristctl.vision.marker import Tracker
+from wristctl.vision.view import View
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "build" / "screenshots"
@@ -51,6 +57,8 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     assert zero["slack"] == pytest.approx([3e-4, 2e-4, 4e-4, 2.5e-4], abs=6e-5)
     assert {column["unit"] for column in _columns(run.path, "data/log.csv")} > {"rad", "N", "steps", "s"}
     _watch(run.file("data/video.avi"), len(run.data("frames")))
+    _track_anew(run)
+    _hear(run)
     if CHROMIUM and DRIVER:
         _look(run.path / "report.html")
 
@@ -67,6 +75,41 @@ def _watch(video: Path, in_trial: int) -> None:
     assert len(aside) > in_trial > 25
     trial, home = aside[-in_trial - 20 :], np.median(aside[:20])
     assert max(trial) - home > 15.0 and abs(aside[-1] - home) < 3.0
+
+
+def _track_anew(run: Run) -> None:
+    """The raw video gives the trial's angles again, at the times beside it, but for what JPEG takes away."""
+    taken, frames = run.data("raw"), run.data("frames")
+    assert run.data("log")["utc"].isna().all(), "virtual time has no date"
+    tracker, angles = Tracker(Markers(), View(), Gates()), {}
+    for time, frame in zip(taken["clock"], VideoCamera(run.file("data/raw.avi")), strict=True):
+        angles[frame.number] = tracker.see(frame._replace(time=time)).theta
+    usable = frames[frames["verdict"] == "ok"]
+    start = float((run.data("log")["clock"] - run.data("log")["time"]).iloc[0])
+    rows = [int(np.argmin(np.abs(taken["clock"] - start - time))) for time in usable["captured"]]
+    zero = json.loads(run.file("data/zero.json").read_text())["marker"]
+    assert np.abs([angles[row] for row in rows] - usable["theta"] - zero).max() < np.deg2rad(0.3)
+
+
+def _hear(run: Run) -> None:
+    """All bytes of the run are frames again, and those sent in the trial carry the rates of its log."""
+    wire, log = run.data("wire"), run.data("log")
+    sent, came = Decoder(), Decoder()
+    told = [
+        (clock, frame)
+        for clock, way, digits in wire.itertuples(index=False)
+        for frame in (sent if way == "sent" else came).feed(bytes.fromhex(digits))
+    ]
+    assert not sent.bad_crc + sent.bad_frames + came.bad_crc + came.bad_frames
+    assert (np.diff(wire["clock"]) >= 0.0).all()
+    rates = [(clock, frame) for clock, frame in told if frame.code == Command.RATE]
+    within = [each for each in rates if log["clock"].iloc[0] <= each[0] <= log["clock"].iloc[-1] + 1e-3]
+    assert len(within) == len(log)
+    assert [clock for clock, _ in within] == pytest.approx(log["clock"].tolist(), abs=1e-4)
+    steps = np.array([LAYOUTS[Rate].unpack(Rate, frame.payload[2:]).rate for _, frame in within])
+    signs = json.loads(run.file("data/zero.json").read_text())["signs"]
+    logged = log[[f"sent_{tendon}" for tendon in ACTIVE]].to_numpy() * signs
+    assert np.abs(steps - logged).max() < 1e-3
 
 
 def _look(page: Path) -> None:

@@ -118,3 +118,19 @@ def test_an_input_that_is_gone_is_told_and_nothing_is_run(call: Call, again: Any
     told = json.loads(out)
     assert code == 3 and "mend the input" in err and called == []
     assert told["files"] == [] and told["scratch"] is None and told["causes"][0].startswith("input: data: ")
+
+
+@pytest.mark.parametrize("kind", ["hw-run", "calibrate-wrist"])
+def test_a_repetition_never_moves_real_motors(call: Call, again: Any, kind: str) -> None:
+    """Neither that of a run on hardware, nor that of an emulated one with a port put in."""
+    section = kind.replace("-", "_")
+    settings = getattr(Study(), section).model_copy(update={"port": "/dev/ttyACM0"})
+    with start_run(kind, Study().model_copy(update={section: settings}), "", Path("results")) as live:
+        live.file("data/a.json").write_text("{}")
+    called = again()
+    code, _, err = call("runs", "replay", live.path.name)
+    assert code == 3 and "never moves real motors" in err and "wristctl runs report" in err and not called
+    emulated = _made(kind)
+    for port in ("port=/dev/ttyACM0", f"{kind}.port = /dev/ttyACM0"):
+        code, _, err = call("runs", "replay", emulated.id, "--set", port)
+        assert code == 3 and "never moves real motors" in err and not called

@@ -151,7 +151,7 @@ def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
         return path
 
     cameras: list[Webcam] = []
-    monkeypatch.setattr("wristctl.vision.camera.DeviceCamera", Webcam)
+    monkeypatch.setattr("wristctl.vision.device_camera.DeviceCamera", Webcam)
     monkeypatch.setattr("typer.prompt", lambda said, **_: asked.append(said))
     progress = contextlib.nullcontext(lambda *_, **__: None)
     session: Any = SimpleNamespace(

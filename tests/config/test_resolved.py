@@ -77,7 +77,12 @@ def _changed(section: Section) -> Iterator[tuple[str, Section]]:
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
 def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
-    own = {"seed", "wrist", command.replace("-", "_"), {"train": "gen_data", "analyse": "simulate"}.get(command)}
+    own = {
+        "seed",
+        "wrist",
+        command.replace("-", "_"),
+        {"train": "gen_data", "analyse": "simulate", "tune": "families", "compare": "families"}.get(command),
+    }
     base = config_hash(Study(), command)
     for path, study in _changed(Study()):
         assert isinstance(study, Study)

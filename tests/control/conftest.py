@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.law import NOW, now_of, signals_of, wrist_of
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
@@ -29,6 +29,8 @@ class Course:
     memory: np.ndarray
 
 
+_FIRST_AHEAD = len(NOW)
+
 ClosedLoop = Callable[..., Course]
 Sine = Callable[..., np.ndarray]
 
@@ -40,7 +42,7 @@ def _run(
 ) -> None:  # fmt: skip
     wrist, known, bound = load_segments(rows_of(plant)), load_segments(rows_of(model)), rows_of(limits)
     signals, kept = rows_of(now), rows_of(memory)
-    n = len(segments)
+    n, preview = len(segments), (now.shape[0] - _FIRST_AHEAD) // 3
     theta, omega = part(rows_of(state), 0, segments), part(rows_of(state), n, segments)
     for tick in range(reference.shape[0]):
         row, target = rows_of(out[tick]), rows_of(reference[tick])
@@ -53,6 +55,10 @@ def _run(
             signals[2 + i] = target[i]
         signals[5], signals[6] = reach(angle, known, bound[0], bound[1])
         signals[7] = period + 0.0 * angle
+        for ahead in range(1, preview + 1):
+            to_come = rows_of(reference[min(tick + ahead, reference.shape[0] - 1)])
+            for i in range(3):
+                signals[_FIRST_AHEAD + 3 * (ahead - 1) + i] = to_come[i]
         for i in range(memory.shape[0]):
             row[3 + i] = kept[i]
         torque = law(now_of(now), wrist_of(model), rows_of(gains), kept)
@@ -70,7 +76,7 @@ def _closed_loop(
     wrist, known, values = segments(plant, segments_), segments(model, 1), np.array([*gains, 0.0])
     memory, state = np.zeros(max(1, law.memory)), np.zeros(2 * segments_)
     out = np.zeros((ticks, 3 + len(memory)))
-    now, followed = np.zeros(len(NOW)), np.ascontiguousarray(reference)
+    now, followed = np.zeros(signals_of(law.preview)), np.ascontiguousarray(reference)
     _run(
         law.compiled(), wrist, known, np.array([4.0, limit]), values, followed, now, memory, state, out, period,
         (0,) * segments_,

@@ -11,8 +11,10 @@ from wristctl.comparison.combinations import compare
 from wristctl.config.study import Study
 from wristctl.control.law import Controller, Gain
 from wristctl.control.table import CONTROLLERS
+from wristctl.seeds import stream
 from wristctl.simulation.closed_loop import simulate
-from wristctl.tuning.search import search
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import search, tuning_cases
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
@@ -48,7 +50,8 @@ def test_newcomer_is_simulated_tuned_and_compared_without_another_change() -> No
         }
     )
     assert simulate(study).first.metrics["rmse"] > 0.0
-    found = search(study, NEWCOMER, np.random.default_rng(0))
+    judge = Judge(tuning_cases(study)[0], study.wrist, study.tune.objective)
+    found = search(study, NEWCOMER, lambda name: stream(0, name), (judge, None))
     assert 1e-2 <= found.gains["k"] <= 1e4
     results = compare(study, tuned={"newcomer": found.gains})
     assert {result.label for result in results} == {"newcomer/default", "newcomer/tuned"}

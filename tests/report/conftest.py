@@ -23,7 +23,7 @@ from wristctl.report.tuning_figures import convergence, gain_history
 from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
-from wristctl.tuning.search import Search
+from wristctl.tuning.search import Search, Tried
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.kinematics import chain_tip
 
@@ -77,7 +77,7 @@ def search(name: str = "smc", count: int = 3) -> Search:
     values[0, :3] = np.inf
     best = np.unravel_index(values.argmin(), values.shape)
     gains = dict(zip("abc", 10.0 ** exponent[best], strict=False))
-    return Search(name, gains, float(values.min()), values.size, values, 10.0**exponent)
+    return Search(name, gains, float(values.min()), values.size, Tried(values, 10.0**exponent), 1)
 
 
 def trials() -> list[LoggedTrial]:

@@ -40,6 +40,14 @@ def test_a_swing_about_a_creeping_angle_is_its_amplitude_and_its_frequency(frequ
     assert oscillation_frequency(done) == pytest.approx(frequency, abs=1.0)
 
 
+@pytest.mark.parametrize("time_constant", [0.2, 0.5, 2.0])
+def test_a_wrist_that_creeps_to_its_place_does_not_swing(time_constant: float) -> None:
+    creeping = np.deg2rad(1.0) * np.exp(-(TIME - 4.0) / time_constant)
+    assert oscillation(course(0.5 + creeping, np.full(5000, 0.5))) < 0.7 * LIMIT_CYCLE
+    swing = 4e-3 * np.sin(2.0 * np.pi * 5.0 * TIME)
+    assert oscillation(course(0.5 + creeping + swing, np.full(5000, 0.5))) == pytest.approx(4e-3, rel=0.15)
+
+
 def test_what_was_before_the_last_second_does_not_count() -> None:
     early = np.where(TIME < 4.0, 0.2 * np.sin(30.0 * TIME), 0.0)
     assert oscillation(course(0.5 + early, np.full(5000, 0.5))) < 1e-12

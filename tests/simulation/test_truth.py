@@ -46,6 +46,7 @@ LEAVES: dict[str, dict[str, Any]] = {
     **{name: {name: "x1.03"} for name in ("length", "mass", "hand_mass", "hand_offset", "stiffness", "damping")},
     "flexion_ratio": {"flexion_ratio": "x1.15"},
     "tendon_radius": {"tendon_radius": "x1.03"},
+    "taper": {"taper": 1.5},
     "by value": {"stiffness": 0.5, "tendon_radius": 0.0195},
     "tendon_stiffness": {"actuator": {"tendon_stiffness": "x0.5"}},
     "lag": {"actuator": {"lag": "x3"}},
@@ -74,6 +75,7 @@ LEAVES: dict[str, dict[str, Any]] = {
 }
 SKEWED: dict[str, Any] = {"sensor": {"zero_deg": -4.0}}
 BESIDE: dict[str, dict[str, Any]] = {
+    "taper": {"model": "hinges"},
     "end stop": SKEWED,
     **{f"end stop's {leaf}": SKEWED | {"end_stop_deg": 31.0} for leaf in ("stiffness", "dissipation")},
 }
@@ -97,13 +99,13 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     law, followed = controller("smc-tracking"), motion(Reference(duration=0.3), WRIST, horizon, 1e-3)
     world = World(loop.model_copy(update={"plant": plant}), WRIST)
     lanes = Lanes(np.zeros(1, np.int64), np.zeros(1, np.int64), [(4, 2)])
-    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS["pcc"], None, True)
+    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS[plant.model], None, True)
 
 
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     """The same, run to its end."""
     done = prepared(plant, loop, horizon)
-    _advance(done, kernel_of(run_blocks, PLANTS["pcc"]), 1, None)
+    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, None)
     return done
 
 
@@ -123,8 +125,8 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
     for tick in range(out.shape[0]):
         for value in range(3):
             target[value] = course.references[0, tick, value] + zero
-        seen, rate = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
-        wanted, _, _, plus, minus = respond(control, known, seen, rate, (low, high), 0.0, setup.period)
+        seen = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
+        wanted, _, _, plus, minus = respond(control, known, seen, (low, high), 0.0, setup.period)
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
         counted_plus, counted_minus = actuate(drive, motor, known, view.theta_ref, plus, minus, setup.period)

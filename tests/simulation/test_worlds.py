@@ -14,12 +14,13 @@ from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.cases import measure
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import drawn
-from wristctl.tuning.search import Evaluator
+from wristctl.tuning.search import tuning_cases
 
 WRIST = WristParameters()
 WORLDS = [
@@ -151,16 +152,18 @@ def test_an_objective_over_repetitions_is_the_mean_of_theirs() -> None:
     law, gains = controller("smc-tracking"), np.array([[20.0, 250.0, 100.0, 10.0], [30.0, 250.0, 80.0, 10.0]])
     base = [
         "tune.scenarios=[{loop: camera, reference: {kind: step, angle_deg: 20}}]", "tune.horizon=0.5",
-        "tune.loops={camera: {sensor: {level: camera}}}", "tune.objective={settling: 0, chattering: 0}",
+        "tune.loops={camera: {sensor: {level: camera}}}",
     ]  # fmt: skip
-    mean = Evaluator(load_study([], [*base, "tune.repetitions=4"]), law)(gains)
+    cases, others = tuning_cases(load_study([], [*base, "tune.repetitions=4"]))
+    found = measure(law, gains, cases, WRIST, ["rmse"]).metrics["rmse"]
     draws, followed = Draws(0, "tuning"), motion(Reference(kind="step", angle_deg=20.0), WRIST, 0.5, 1e-3)
     each = [
         rollout(law, gains, [followed], np.zeros(2, np.int64), Loop(sensor=Sensor(level="camera")), WRIST,
                 streams=[draws.camera("step 20 deg, ulnar", k)] * 2).metrics["rmse"]
         for k in range(4)
     ]  # fmt: skip
-    np.testing.assert_allclose(mean, np.mean(each, axis=0), rtol=1e-14)
+    np.testing.assert_array_equal(found, np.transpose(each))
+    assert len(others) == 20 and not {case.stream for case in cases} & {case.stream for case in others}
 
 
 def test_drawn_plants_lie_evenly_within_their_spreads_and_keep_no_spread() -> None:

@@ -18,7 +18,7 @@ from wristctl.studies import camera_views
 from wristctl.studies.camera_views import look
 from wristctl.studies.counting import watched
 from wristctl.studies.unattended import Unattended
-from wristctl.vision import board_shots, camera, charuco
+from wristctl.vision import board_shots, charuco, device_camera
 from wristctl.vision.camera import Frame
 from wristctl.vision.charuco import BoardView
 
@@ -69,7 +69,7 @@ class Helper(Unattended):
 @pytest.fixture(autouse=True)
 def eyes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(charuco, "BoardFinder", Finder)
-    monkeypatch.setattr(camera, "DeviceCamera", Device)
+    monkeypatch.setattr(device_camera, "DeviceCamera", Device)
     clock = iter(range(10_000))
 
     class Clock:

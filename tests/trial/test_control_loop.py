@@ -220,7 +220,7 @@ def test_no_usable_angle_for_too_long_is_a_reason_to_stop_with_the_newest_verdic
     assert len(rig.rows) == 31
     blind: Any = rig_of()
     blind.marker.look = list  # it sees nothing
-    with pytest.raises(SafetyStop, match="newest frame: no frame"):
+    with pytest.raises(SafetyStop, match="no picture has come"):
         blind.follow(at_rest(0.5, PERIOD))
 
 

@@ -93,7 +93,7 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
     for _ in range(2):
         done = experiment()
         files.append({file.name: file.read_bytes() for file in done.folder.iterdir()})
-    assert set(files[0]) == {"log.csv", "between.csv", "frames.csv", "truth.csv"} and files[0] == files[1]
+    assert set(files[0]) == {"log.csv", "between.csv", "frames.csv", "truth.csv", "wire.csv"} and files[0] == files[1]
 
 
 def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: Run, at_zero: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -57,3 +58,26 @@ def test_a_trials_truth_is_written_a_little_with_each_tick_and_whole_at_the_end(
     log.close()
     table = pd.read_csv(tmp_path / "truth.csv")
     assert set(table["trial"]) == {3} and np.array_equal(table.iloc[:, 1:].to_numpy(), truth)
+
+
+def test_on_the_computers_clock_each_tick_has_its_date_and_in_virtual_time_none(tmp_path: Path) -> None:
+    for name, monotonic in (("real", True), ("virtual", False)):
+        (tmp_path / name).mkdir()
+        log = TrialLog(tmp_path / name, None, 5e-3, monotonic)
+        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": 0, "clock": time.monotonic() - 100.0})
+        log.close()
+    assert time.time() - pd.read_csv(tmp_path / "real/log.csv")["utc"][0] == pytest.approx(100.0, abs=5.0)
+    assert pd.read_csv(tmp_path / "virtual/log.csv")["utc"].isna().all()
+
+
+def test_a_full_disk_stops_a_tick_and_never_the_wire(tmp_path: Path) -> None:
+    """The bytes that stop the motors are among those to be written."""
+    log = TrialLog(tmp_path, None, 5e-3)
+    log.disk.pretend_full = True
+    log.wire(1.0, "sent", b"\x01\xff")
+    with pytest.raises(OSError, match="No space left"):
+        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": 0})
+    log.wire(1.5, "came", b"\x02")
+    log.close()
+    wire = pd.read_csv(tmp_path / "wire.csv", dtype=str)
+    assert wire.to_numpy().tolist() == [["1.0", "sent", "01ff"], ["1.5", "came", "02"]]

@@ -41,7 +41,7 @@ def test_frames_taken_before_the_reading_began_do_not_count() -> None:
 def test_a_marker_that_cannot_be_read_for_two_seconds_is_said_with_why() -> None:
     board: Any = RigBoard()
     tracking: Any = Marker(board, lambda: math.nan)
-    with pytest.raises(SafetyStop, match=r"could not be read \(no tip\)"):
+    with pytest.raises(SafetyStop, match=r"could not be read \(newest frame: no tip\)"):
         Patience(board).angle(tracking, 1)
     assert 2.0 < board.transport.now() - 100.0 < 2.1
 

@@ -33,7 +33,7 @@ def test_a_wrist_within_its_limits_goes_on() -> None:
         ({"estimate": Estimate(-math.radians(55.1), 0.0, 0.0)}, "angle -55.1 deg beyond"),
         ({"estimate": Estimate(0.0, -10.1, 0.0)}, "rate -10.1 rad/s"),
         ({"estimate": Estimate(math.nan, 0.0, 0.0)}, "not a number"),
-        ({"age": 0.151, "verdict": "no tip"}, "no usable marker angle for 151 ms (newest frame: no tip)"),
+        ({"age": 0.151, "verdict": "newest frame: no tip"}, "no usable marker angle for 151 ms (newest frame: no tip)"),
         ({"position": np.array([0.0, 0.0, 81.0 / 20e3 / SPOOLS.step, 0.0])}, "tension of about 81 N"),
         ({"position": np.array([0.0, -0.0201 / SPOOLS.step, 0.0, 0.0])}, "a spool 20.1 mm from zero"),
         ({"state": State.DISABLED}, "the board is DISABLED"),

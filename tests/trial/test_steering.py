@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from wristctl.config.plant import Actuator, Sensor
@@ -103,9 +104,13 @@ def test_an_older_frame_than_the_last_one_used_is_refused() -> None:
     assert steered.see(0.01, 30.5 * PERIOD) and not steered.see(0.01, 29.5 * PERIOD)
 
 
+def still(angle: float) -> np.ndarray:
+    return np.array([[angle, 0.0, 0.0]])
+
+
 def test_feedforward_asks_for_the_torque_that_holds_the_reference() -> None:
-    answer = steering().respond(0.1, 0.0, 0.0)
-    mirrored = steering().respond(-0.1, 0.0, 0.0)
+    answer = steering().respond(still(0.1))
+    mirrored = steering().respond(still(-0.1))
     assert answer.torque_wanted == pytest.approx(-mirrored.torque_wanted) and answer.torque_wanted > 0.0
     assert (answer.plus, answer.minus) == pytest.approx((mirrored.minus, mirrored.plus))
     assert answer.torque == pytest.approx(answer.torque_wanted) and not answer.saturated
@@ -114,14 +119,14 @@ def test_feedforward_asks_for_the_torque_that_holds_the_reference() -> None:
 
 
 def test_at_rest_each_tendon_keeps_its_pretension() -> None:
-    answer = steering().respond(0.0, 0.0, 0.0)
+    answer = steering().respond(still(0.0))
     assert (answer.torque_wanted, answer.torque) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert (answer.plus, answer.minus) == pytest.approx((WRIST.pretension, WRIST.pretension))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_torque_out_of_reach_is_cut_at_the_limits_and_said(sign: float) -> None:
-    answer = steering().respond(sign * 10.0, 0.0, 0.0)
+    answer = steering().respond(still(sign * 10.0))
     assert answer.saturated and abs(answer.torque) < abs(answer.torque_wanted)
     pulled, slack = (answer.plus, answer.minus) if sign > 0.0 else (answer.minus, answer.plus)
     assert pulled == pytest.approx(WRIST.tension_limit) and slack == pytest.approx(WRIST.pretension)
@@ -132,8 +137,8 @@ def test_a_law_taken_up_again_has_forgotten_what_it_did() -> None:
     gains = gains_of(law, "printed", None)
     steered = steering()
     steered.use(law, gains)
-    first = steered.respond(1e-6, 0.0, 0.0)
-    later = [steered.respond(1e-6, 0.0, 0.0) for _ in range(20)][-1]
+    first = steered.respond(still(1e-6))
+    later = [steered.respond(still(1e-6)) for _ in range(20)][-1]
     steered.use(law, gains)
     assert later.torque_wanted != pytest.approx(first.torque_wanted, rel=1e-6)
-    assert steered.respond(1e-6, 0.0, 0.0) == first
+    assert steered.respond(still(1e-6)) == first

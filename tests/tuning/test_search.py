@@ -1,7 +1,8 @@
-"""The search: objective, determinism, progress."""
+"""The search: what it is judged by, determinism, progress, going on where it was cut short, and the last choice."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,69 +13,193 @@ from tests.values import changeable
 from wristctl.config.control import Objective
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
+from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller
+from wristctl.seeds import stream
+from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.draws import Draws
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.reference import motion
 from wristctl.tuning.gains_file import read_gains, write_gains
-from wristctl.tuning.search import Evaluator, Search, check_loops, check_tunable, history, objective, search
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import (
+    Search,
+    Tried,
+    check_loops,
+    check_tunable,
+    finalists,
+    history,
+    search,
+    tried_of,
+    tuning_cases,
+)
 from wristctl.tuning.space import GainSpace
 
 SETTINGS = (
-    "loops={one: {plant_segments: 1}}", "horizon=1.0", "candidates=8", "iterations=5",
-    "scenarios=[{loop: one, reference: {duration: 0.5}}, {loop: one, reference: {kind: step}}]",
+    "loops={one: {plant_segments: 1}}", "horizon=1.2", "candidates=8", "iterations=5",
+    "scenarios=[{loop: one, reference: {duration: 0.15}}, {loop: one, reference: {kind: step}}]",
+)  # fmt: skip
+NOISY = (
+    "loops={one: {plant_segments: 1, control_period: 5e-3, sensor: {level: camera}}}", "horizon=1.5", "candidates=8",
+    "iterations=4", "scenarios=[{loop: one, reference: {duration: 0.4}}]", "repetitions=2", "worlds.validation=5",
 )  # fmt: skip
 
 
-def found(*settings: str, seed: int = 0, name: str = "pid") -> Search:
-    study = load_study([], [*SETTINGS, *settings], "tune")
-    return search(study, controller(name), np.random.default_rng(seed))
+def judges(study: Study) -> tuple[Judge, Judge | None]:
+    searched, chosen = tuning_cases(study)
+    made = [Judge(cases, study.wrist, study.tune.objective) if cases else None for cases in (searched, chosen)]
+    assert made[0] is not None
+    return made[0], made[1]
 
 
-def test_search_starts_in_the_middle_of_the_box_and_improves_on_it() -> None:
-    result = found()
-    middle = [np.sqrt(gain.low * gain.high) for gain in controller("pid").gains.values()]
-    np.testing.assert_allclose(result.tried[0, 0], middle)
-    assert result.objective < result.values[0, 0] and result.evaluations == 40
-    assert (np.diff(result.best_so_far) <= 0.0).all() and result.best_so_far[-1] == result.objective
+def found(*settings: str, seed: int = 0, name: str = "pid", base: tuple[str, ...] = SETTINGS, **more: object) -> Search:
+    study = load_study([], [*base, *settings], "tune")
+    return search(study, controller(name), lambda text: stream(seed, text), judges(study), **more)  # type: ignore[arg-type]
+
+
+def test_the_first_search_starts_from_a_preset_and_the_others_from_the_middle_of_the_box() -> None:
+    result = found("restarts=2", name="computed-torque")
+    default = controller("computed-torque").presets["default"]
+    middle = [np.sqrt(gain.low * gain.high) for gain in controller("computed-torque").gains.values()]
+    np.testing.assert_allclose(result.tried.gains[0, 0], list(default.values()))
+    np.testing.assert_allclose(result.tried.gains[5, 0], middle)
+    assert result.tried.values.shape == (10, 8) and result.evaluations == 80
+    assert result.best_so_far.shape == (2, 5) and (np.diff(result.best_so_far, axis=1) <= 0.0).all()
+    assert result.best_so_far.min() < result.tried.values[5, 0]
 
 
 @pytest.mark.parametrize("optimiser", ["pso", "differential-evolution", "random"])
 def test_the_same_seed_finds_the_same_gains_and_another_seed_others(optimiser: str) -> None:
     one, again, other = (found(f"optimiser={optimiser}", seed=seed) for seed in (3, 3, 4))
-    assert one.gains == again.gains != other.gains
-    assert one.values.tobytes() == again.values.tobytes()
+    assert one.gains == again.gains
+    assert one.tried.values.tobytes() == again.tried.values.tobytes() != other.tried.values.tobytes()
 
 
-def test_objective_is_the_weighted_mean_over_scenarios() -> None:
-    gains = np.array([[30.0, 10.0, 0.5], [100.0, 10.0, 1.0]])
-    rmse, settling = (
-        Evaluator(load_study([], [*SETTINGS, f"objective={{{weights}, chattering: 0}}"], "tune"), controller("pid"))
-        for weights in ("rmse: 1, settling: 0", "rmse: 0, settling: 1")
+def test_a_search_that_was_cut_short_goes_on_to_the_same_bytes() -> None:
+    """From its table, as it is written and read again; nothing that it had tried is run again."""
+    whole = found("restarts=2")
+    cut = Search(**(whole.__dict__ | {"tried": Tried(whole.tried.values[:7], whole.tried.gains[:7])}))
+    rows = history(cut).iloc[:-3]  # the last iteration was not whole
+    known = tried_of(rows, list(whole.gains))
+    assert known.values.shape == (6, 8)
+    wrong = Tried(known.values - 100.0, known.gains)
+    assert found("restarts=2", known=known).tried.values.tobytes() == whole.tried.values.tobytes()
+    assert found("restarts=2", known=wrong).tried.values.min() < -90.0
+    other = Tried(known.values, known.gains + (np.arange(6) == 1)[:, None, None])
+    with pytest.raises(UserError, match="tried other gains of pid in iteration 1"):
+        found("restarts=2", known=other)
+
+
+def test_what_is_chosen_is_the_best_on_noise_that_the_search_has_not_seen() -> None:
+    result = found("finalists=4", base=NOISY, name="computed-torque")
+    assert [each.origin for each in result.finalists].count("search") == 4
+    assert {"search", "default"} == {each.origin for each in result.finalists}
+    validated = [each.validated for each in result.finalists]
+    assert validated == sorted(validated) and result.objective == validated[0]
+    assert tuple(result.gains.values()) == result.finalists[0].gains
+    study = load_study([], list(NOISY), "tune")
+    searched, chosen = tuning_cases(study)
+    assert (
+        len(searched) == 2 and len(chosen) == 5 and not {each.stream for each in searched} & {c.stream for c in chosen}
     )
-    both = load_study([], [*SETTINGS, "objective={rmse: 2, settling: 3, chattering: 0}"], "tune")
-    np.testing.assert_allclose(
-        Evaluator(both, controller("pid"))(gains), 2 * rmse(gains) + 3 * settling(gains), rtol=1e-13
-    )
+    table = finalists(result)
+    assert table["validated"].tolist() == validated and list(table["w"]) == [each.gains[0] for each in result.finalists]
 
 
-def test_what_diverges_has_an_infinite_objective() -> None:
+def made_up(loop_cells: tuple[int, ...], **metrics: list[float]) -> tuple[Judge, Measured]:
+    """A judge whose yardstick's RMSE is 1 on each case, and what was measured of one gains on them."""
+    study = load_study([], list(SETTINGS), "tune")
+    case = tuning_cases(study)[0][0]
+    cases = [Case(case.loop, case.motion, case.stream, cell) for cell in loop_cells]
+    weights = {"steady_state": 0.0, "chattering": 0.0, "oscillation": 0.0} | {"worst": 0.0, "swinging": 0.0}
+    judge = Judge(cases, study.wrist, Objective.model_validate(weights | {"rmse": 1.0}))
+    known, rests = {name: np.ones((1, len(cases))) for name in METRICS}, np.array([True] * len(cases))
+    judge._yardstick = Measured(known, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
+    values = {name: np.array([given]) for name, given in metrics.items()}
+    return judge, Measured(values, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
+
+
+def weighed(judge: Judge, **weights: float) -> Judge:
+    judge._weights = judge._weights.model_copy(update=weights)
+    return judge
+
+
+def test_the_objective_is_in_decades_beside_the_yardstick_and_no_better_than_its_floor() -> None:
+    judge, measured = made_up((0, 1), rmse=[0.1, 0.01])
+    floor = METRICS["rmse"].floor
+    expected = np.log10((np.array([0.1, 0.01]) + floor) / (1.0 + floor)).mean()
+    assert judge.value(measured)[0] == pytest.approx(expected)
+    nothing = replace(measured, metrics={"rmse": np.zeros((1, 2))})
+    assert judge.value(nothing)[0] == pytest.approx(np.log10(floor / (1.0 + floor)))
+
+
+def test_the_worst_cell_counts_beside_the_mean_and_a_cell_is_the_mean_of_its_repetitions() -> None:
+    judge, measured = made_up((0, 0, 1, 1), rmse=[1e-2, 1.0, 0.1, 0.1])
+    mean = judge.value(measured)[0]
+    values = np.log10((np.array([1e-2, 1.0, 0.1, 0.1]) + METRICS["rmse"].floor) / (1.0 + METRICS["rmse"].floor))
+    worst = max(values[:2].mean(), values[2:].mean())
+    assert weighed(judge, worst=0.5).value(measured)[0] == pytest.approx(mean + 0.5 * worst)
+
+
+def test_a_case_that_swings_costs_a_constant() -> None:
+    for swing, cost in ((0.99 * LIMIT_CYCLE, 0.0), (1.01 * LIMIT_CYCLE, 1.0), (np.nan, 0.0)):
+        judge, measured = made_up((0, 1), rmse=[0.1, 0.1], oscillation=[0.0, swing])
+        still = weighed(judge, swinging=0.0).value(measured)[0]
+        assert weighed(judge, swinging=1.0).value(measured)[0] == pytest.approx(still + cost)
+        moving = replace(measured, rests=np.array([True, False]))
+        assert judge.value(moving)[0] == pytest.approx(still)
+
+
+def test_a_failure_costs_more_than_anything_and_the_more_the_earlier_it_is() -> None:
+    judge, measured = made_up((0, 1), rmse=[0.1, np.nan])
+    ends = [
+        judge.value(replace(measured, failed=np.array([[False, True]]), lasted=np.array([[1.0, lasted]])))[0]
+        for lasted in (1.0, 0.5, 0.0)
+    ]
+    bad, poor = made_up((0, 1), rmse=[0.1, 500.0])
+    assert bad.value(poor)[0] < ends[0] < ends[1] < ends[2]
+
+
+def test_what_never_settles_counts_the_whole_horizon() -> None:
+    judge, measured = made_up((0, 1), rmse=[1.0, 1.0], settling=[0.4, np.nan])
+    judge = weighed(judge, rmse=0.0)
+    judge._weights = Objective.model_validate(judge._weights.model_dump() | {"settling": 1.0})
+    floor = METRICS["settling"].floor
+    expected = np.log10((np.array([0.4, 1.2]) + floor) / (1.0 + floor)).mean()
+    assert judge.value(measured)[0] == pytest.approx(expected)
+
+
+def test_what_diverges_is_worse_than_what_does_not() -> None:
     study = load_study([], [*SETTINGS, "loops={one: {plant_segments: 1, limits: false}}"], "tune")
-    values = Evaluator(study, controller("computed-torque"))(np.array([[900.0, 9.0], [50.0, 1.0]]))
-    assert np.isinf(values[0]) and np.isfinite(values[1])
+    values = judges(study)[0](controller("computed-torque"), np.array([[900.0, 9.0], [50.0, 1.0]]))
+    assert values[0] > 2.0 > 0.0 > values[1]
+
+
+def test_feedforward_is_nothing_beside_itself() -> None:
+    study = load_study([], [*NOISY, "objective.swinging=0"], "tune")
+    assert judges(study)[0](controller("feedforward"), np.zeros((2, 0))) == pytest.approx(np.zeros(2), abs=1e-12)
+
+
+def test_where_the_yardstick_fails_others_are_measured_by_what_it_has_elsewhere() -> None:
+    judge, measured = made_up((0, 1, 2), rmse=[0.1, 0.1, 0.1])
+    judge._yardstick.metrics["rmse"][0] = [1.0, np.nan, 3.0]
+    floor = METRICS["rmse"].floor
+    known = np.array([1.0, 2.0, 3.0]) + floor
+    assert judge.value(measured)[0] == pytest.approx(np.log10((0.1 + floor) / known).mean())
 
 
 def test_progress_sees_the_search_after_every_iteration() -> None:
     seen: list[int] = []
-    study = load_study([], list(SETTINGS), "tune")
-    search(study, controller("smc"), np.random.default_rng(0), progress=lambda s: seen.append(len(s.values)))
+    found(name="smc", progress=lambda s: seen.append(len(s.tried.values)))
     assert seen == [1, 2, 3, 4, 5]
 
 
 def test_history_lists_every_candidate() -> None:
     result = found()
     table = history(result)
-    assert len(table) == 40 and table["objective"].min() == result.objective
+    assert len(table) == 40 and table["objective"].min() == result.best_so_far.min()
     assert set(result.gains) <= set(table.columns)
 
 
@@ -90,26 +215,6 @@ def test_gains_read_back_exactly(tmp_path: Path) -> None:
     assert read_gains(tmp_path / "gains.json") == gains
 
 
-def test_every_weight_counts_and_what_never_settles_counts_the_whole_horizon() -> None:
-    metrics = {
-        "rmse": np.array([0.1, 0.2, 0.3]),
-        "settling": np.array([1.0, np.nan, 2.0]),
-        "chattering": np.array([50.0, 60.0, 70.0]),
-        "saturation": np.array([0.5, 0.25, 0.0]),
-        "iae": np.array([4.0, np.nan, 6.0]),
-    }
-    failed = np.array([False, False, True])
-    for weights, expected in (
-        ({"rmse": 2.0, "settling": 0.0, "chattering": 0.0}, [0.2, 0.4]),
-        ({"rmse": 0.0, "settling": 3.0, "chattering": 0.0}, [3.0, 15.0]),
-        ({"rmse": 0.0, "settling": 0.0, "chattering": 0.1}, [5.0, 6.0]),
-        ({"rmse": 0.0, "settling": 0.0, "chattering": 0.0, "saturation": 8.0}, [4.0, 2.0]),
-        ({"rmse": 1.0, "settling": 0.0, "chattering": 0.0, "iae": 1.0}, [4.1, np.inf]),
-    ):
-        found = objective(metrics, failed, Objective.model_validate(weights), 5.0)
-        np.testing.assert_allclose(found, [*expected, np.inf], rtol=1e-14)
-
-
 MIXED = (
     "loops={still: {plant_segments: 1}, drawn: {plant_segments: 1, plant: {stiffness_spread: 0.4}}}", "horizon=0.4",
     "scenarios=[{loop: drawn, reference: {duration: 0.2}}, {loop: still, reference: {kind: step}},"
@@ -117,21 +222,23 @@ MIXED = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("metric", ["rmse", "tip_rmse_mm"])
-def test_the_objective_is_the_mean_over_scenarios_of_the_mean_over_their_repetitions(metric: str) -> None:
-    """Each as a closed loop by itself, with the noise and plants that tuning draws."""
-    others = ", ".join(f"{name}: 0" for name in ("rmse", "settling", "chattering") if name != metric)
-    study = load_study([], [*MIXED, f"objective={{{metric}: 2.0, {others}}}"], "tune")
+@pytest.mark.parametrize("metric", ["rmse", "tip_rmse_mm", "oscillation"])
+def test_each_case_is_a_closed_loop_by_itself(metric: str) -> None:
+    """With the noise and plants that tuning draws, of each gains beside any others."""
+    study = load_study([], [*MIXED, "horizon=1.6"], "tune")
     law, gains = controller("pid"), np.array([[30.0, 10.0, 0.5], [100.0, 10.0, 1.0], [3.0, 1.0, 0.1]])
-    wanted = np.zeros(3)
+    cases, _ = tuning_cases(study)
+    assert [case.cell for case in cases] == [0, 0, 0, 1, 2, 2, 2]
+    own = measure(law, gains, cases, study.wrist, [metric]).metrics[metric]
+    at = 0
     for scenario in study.tune.scenarios:
         loop, which = study.tune.loops[scenario.loop], np.zeros(3, np.int64)
-        followed, name = motion(scenario.reference, study.wrist, 0.4, 1e-3), scenario_of(scenario.reference, "ulnar")
+        followed, name = motion(scenario.reference, study.wrist, 1.6, 1e-3), scenario_of(scenario.reference, "ulnar")
         done = repeat(law, gains, [followed], which, loop, study.wrist, [name], Draws(study.seed, "tuning"), 3)
-        counts = {len(each.failed) for each in done}
-        assert counts == ({3} if scenario.loop == "drawn" else {1})
-        wanted += [2.0 * each.metrics[metric].mean() / 3.0 for each in done]
-    np.testing.assert_allclose(Evaluator(study, law)(gains), wanted, rtol=1e-9)
+        times = len(done[0].failed)
+        assert times == (3 if scenario.loop == "drawn" else 1)
+        np.testing.assert_allclose(own[:, at : at + times], [each.metrics[metric] for each in done], 1e-9, 1e-14)
+        at += times
 
 
 def test_a_scenario_on_a_loop_that_is_not_there_is_named_by_its_number() -> None:
@@ -151,21 +258,24 @@ def test_a_controller_without_gains_is_not_tuned() -> None:
 
 def test_what_was_found_is_the_least_value_with_its_own_gains() -> None:
     result = found()
-    assert result.controller == "pid" and result.values.shape == (5, 8) and result.tried.shape == (5, 8, 3)
-    at = np.unravel_index(result.values.argmin(), result.values.shape)
-    assert [result.gains[name] for name in ("Kp", "Ki", "Kd")] == result.tried[at].tolist()
+    at = np.unravel_index(result.tried.values.argmin(), result.tried.values.shape)
+    assert result.controller == "pid" and result.tried.gains.shape == (5, 8, 3)
+    assert [result.gains[name] for name in ("Kp", "Ki", "Kd")] == result.tried.gains[at].tolist()
     assert list(result.gains) == list(controller("pid").gains)
-    course = Search("pid", {}, 2.0, 6, np.array([[5.0, 4.0], [6.0, 3.5], [2.0, 9.0], [8.0, 8.0]]), np.zeros((4, 2, 0)))
-    assert course.best_so_far.tolist() == [4.0, 3.5, 2.0, 2.0]
+    values = np.array([[5.0, 4.0], [6.0, 3.5], [2.0, 9.0], [8.0, 8.0], [7.0, 6.0]])
+    course = Search("pid", {}, 2.0, 6, Tried(values, np.zeros((5, 2, 0))), 2)
+    np.testing.assert_array_equal(course.best_so_far, [[4.0, 3.5, 2.0], [8.0, 6.0, np.nan]])
 
 
 def test_each_line_of_the_history_is_a_candidate_of_its_iteration() -> None:
-    result = found()
+    result = found("restarts=2")
     lines = history(result).to_dict("records")
-    assert [(line["iteration"], line["candidate"]) for line in lines] == list(np.ndindex(5, 8))
-    for line, at in zip(lines, np.ndindex(5, 8), strict=True):
-        assert line["objective"] == result.values[at]
-        assert [line[name] for name in ("Kp", "Ki", "Kd")] == result.tried[at].tolist()
+    places = [(restart, iteration, candidate) for restart, iteration, candidate in np.ndindex(2, 5, 8)]
+    assert [(line["restart"], line["iteration"], line["candidate"]) for line in lines] == places
+    for line, (restart, iteration, candidate) in zip(lines, places, strict=True):
+        at = 5 * restart + iteration, candidate
+        assert line["objective"] == result.tried.values[at]
+        assert [line[name] for name in ("Kp", "Ki", "Kd")] == result.tried.gains[at].tolist()
 
 
 def test_what_a_search_hands_out_cannot_be_changed() -> None:

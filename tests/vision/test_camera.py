@@ -14,12 +14,12 @@ import pytest
 from wristctl.config.vision import Device
 from wristctl.vision.camera import (
     CameraError,
-    DeviceCamera,
     FolderCamera,
     VideoCamera,
     is_device,
     open_recording,
 )
+from wristctl.vision.device_camera import DeviceCamera
 
 
 def flat(grey: int) -> np.ndarray:
@@ -82,7 +82,7 @@ def test_a_missing_device_says_what_to_check(capfd: pytest.CaptureFixture[str]) 
 
 
 def test_devices_are_told_from_files() -> None:
-    assert is_device("0") and is_device("/dev/video2")
+    assert is_device("0") and is_device("/dev/video2") and is_device("http://127.0.0.1:8080/")
     assert not is_device("trial.mp4") and not is_device("pictures")
 
 
@@ -99,8 +99,8 @@ class Webcam:
     def set(self, name: int, value: float) -> None:
         self.asked[name] = value
 
-    def get(self, _name: int) -> float:
-        return 0.0
+    def get(self, name: int) -> float:
+        return self.asked.get(name, 0.0)
 
     def read(self) -> tuple[bool, Any]:
         self.let.acquire()

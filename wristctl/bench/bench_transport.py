@@ -13,19 +13,19 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.virtual import VirtualTransport
 from wristctl.config.injected import FaultKind
 
-_USB_FRAME = FREQUENCY // 1000
-"""Cycles between two times at which a board's USB chip hands over what has come."""
 _BUTTON = "G", 0
 
 
 class BenchTransport(VirtualTransport):
     """The wire to an emulated chip in the same process, with the faults of cable, host and board.
 
-    A lost port stays lost; the board runs on, also while the host can only `wait`.
+    A lost port stays lost; the board runs on, also while the host can only `wait`. What the board says is handed over
+    every `latency_timer` seconds, by the board's USB chip.
     """
 
-    def __init__(self, chip: Atmega2560, faults: Faults) -> None:
+    def __init__(self, chip: Atmega2560, faults: Faults, latency_timer: float = 1e-3) -> None:
         super().__init__(chip)
+        self._handed_over = round(latency_timer * FREQUENCY)
         self._faults, self._lost, self._reset = faults, False, -math.inf
         self._noise = np.random.default_rng(0)
         self._happened: set[tuple[FaultKind, float]] = set()
@@ -43,7 +43,7 @@ class BenchTransport(VirtualTransport):
         self._stand_still("answers-held")
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
         late = self._sizes("answers-late")
-        every = max(_USB_FRAME, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
+        every = max(self._handed_over, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
         while not (data := self.chip.read()) and self.chip.cycles < end:
             self._run(min(end, (self.chip.cycles // every + 1) * every))
             self._see_port()

@@ -13,32 +13,38 @@ import cv2
 
 from wristctl.bench.exposure import Exposure, picture
 from wristctl.bench.frame_memory import FrameMemory
+from wristctl.bench.mjpeg_stream import MjpegStream
 from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 
+_DECODED = 1.5e-3
+"""Seconds that a viewer of the stream takes to read and decode a picture: a part of the camera's delay."""
+
 
 def start_film(
-    settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path
+    settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path, broadcast: bool = False
 ) -> tuple[BaseProcess, Connection]:
-    """A process that puts pictures into the file `pictures`, and the way to it.
+    """A process that puts pictures into the file `pictures`, and the way to it; `broadcast` also serves them by HTTP.
 
-    It says when it is ready (None), takes exposures with the time at which their clock was 0 (`time.monotonic`), and
-    ends when the other side is closed.
+    It says when it is ready, by the address that it serves or None, takes exposures with the time at which
+    their clock was 0 (`time.monotonic`), and ends when the other side is closed.
     """
     scene = settings.camera.scene
     FrameMemory(pictures, (scene.height, scene.width))
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_develop, args=(theirs, settings, wrist, markers, pictures), daemon=True)
+    given = theirs, settings, wrist, markers, pictures, broadcast
+    process = context.Process(target=_develop, args=given, daemon=True)
     process.start()
     theirs.close()
     return process, ours
 
 
 def _develop(
-    exposed: Connection, settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path
-) -> None:
+    exposed: Connection, settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path,
+    broadcast: bool,
+) -> None:  # fmt: skip
     """Draw each exposure and show it when it arrives; late, leave pictures out. Ctrl-C is others' affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from wristctl.vision.scene import Scene
@@ -47,14 +53,19 @@ def _develop(
     camera, memory = settings.camera, FrameMemory(pictures)
     painter = Scene(camera.scene, wrist, markers, settings.plant.model)
     delay = camera.delay_frames / camera.frame_rate
+    stream = MjpegStream() if broadcast else None
     try:
-        exposed.send(None)
+        exposed.send(stream and stream.address)
         while True:
             exposure, start = _next(exposed)
             arrival = start + exposure.time + delay
             if time.monotonic() > arrival and exposed.poll():
                 continue
             frame = picture(exposure, painter)
+            encoded = stream.encoded(frame.image) if stream else b""
+            if stream:
+                time.sleep(max(0.0, arrival - _DECODED - time.monotonic()))
+                stream.show(encoded)
             time.sleep(max(0.0, arrival - time.monotonic()))
             memory.write(frame._replace(time=start + frame.time))
     except (EOFError, OSError):

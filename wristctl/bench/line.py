@@ -8,11 +8,17 @@ from collections.abc import Callable
 from wristctl.bench.fault_injection import Faults
 from wristctl.board.emulator.serve import Line
 
+_AT_ONCE = 1e-3
+"""A latency timer [s] that is no longer than this is that of USB itself: nothing is held back."""
+
 
 class FaultyLine:
-    """Another line with faults: port-lost, for good, and host-silent; `clock` is the board's."""
+    """Another line with faults: port-lost, for good, and host-silent; `clock` is the board's.
 
-    def __init__(self, line: Line, faults: Faults, clock: Callable[[], float]) -> None:
+    What the board says is handed over every `latency_timer` seconds of it, by `pass_on`.
+    """
+
+    def __init__(self, line: Line, faults: Faults, clock: Callable[[], float], latency_timer: float = 0.0) -> None:
         self.address = line.address
         self.there = False
         """Whether a client is there."""
@@ -20,6 +26,7 @@ class FaultyLine:
         """When the board was last sent something [s on its clock]; None: never."""
         self._line, self._faults, self._clock = line, faults, clock
         self._lost = False
+        self._latency_timer, self._held, self._due = latency_timer, b"", 0.0
 
     def wait(self, timeout: float) -> bool:
         """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
@@ -40,9 +47,18 @@ class FaultyLine:
         return received
 
     def send(self, data: bytes) -> None:
-        """Give bytes to every client."""
-        if not self._lost:
-            self._line.send(data)
+        """Give bytes to every client, once their time has come."""
+        if not self._held:
+            timer = self._latency_timer
+            self._due = (self._clock() // timer + 1) * timer if timer > _AT_ONCE else 0.0
+        self._held += data
+        self.pass_on()
+
+    def pass_on(self) -> None:
+        """Hand over what is held, if it is time."""
+        if self._held and not self._lost and self._clock() >= self._due:
+            self._line.send(self._held)
+            self._held = b""
 
     def close(self) -> None:
         """Send the clients away."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wristctl.bench.bench_record import BenchRecord
 from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.bystander import Bystander
 from wristctl.bench.line import FaultyLine
 from wristctl.bench.motors import PERIOD
 from wristctl.bench.rig import Rig
@@ -38,18 +39,21 @@ class BenchServer:
     """
 
     def __init__(
-        self, rig: Rig, line: Line, film: Connection, record: Path | None = None, control: Connection | None = None
-    ) -> None:
-        self._rig, self._film, self._control = rig, film, control
-        self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY)
+        self, rig: Rig, line: Line, film: Connection, record: Path | None = None, control: Connection | None = None,
+        bystander: Bystander | None = None,
+    ) -> None:  # fmt: skip
+        self._rig, self._film, self._control, self._bystander = rig, film, control, bystander
+        self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY, rig.settings.line.latency_timer)
         self._record = None if record is None else BenchRecord(record, rig.wrist, self._line)
         self._start, self._until = time.monotonic(), math.inf
         self._taken, self._reset = -1, -math.inf
         self._energised = False
         rig.chip.run(FREQUENCY // 100)
         rig.catch_up()  # so that what is to be compiled is, before real time begins
+        self.camera: str | None = None
+        """Where its pictures can be had as a stream."""
         try:
-            film.recv()
+            self.camera = film.recv()
         except EOFError as error:
             fix = "give it more memory, or see with --debug"
             raise UserError("the rendered camera's process has died", fix=fix, exit_code=4) from error
@@ -93,11 +97,14 @@ class BenchServer:
     def _round(self, edges: NDArray[np.void], start: float) -> None:
         """What is due about every half millisecond: `edges` are the chip's newest, its clock was 0 at `start`."""
         self._start = start
+        self._line.pass_on()
         self._rig.catch_up(edges)
         self._reset_board()
         self._take_frame()
         if self._control is not None:
             self._answer(self._control)
+        if self._bystander is not None:
+            self._bystander.look()
         if self._record is not None:
             self._record.look(start)
         self._tell()

@@ -23,7 +23,7 @@ class VirtualBench:
         self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None
     ) -> None:
         self._rig = Rig(settings, wrist, seed, markers)
-        self.transport = BenchTransport(self._rig.chip, self._rig.faults)
+        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line.latency_timer)
         self.camera = VirtualCamera(self._rig)
 
     def face(self, direction: str) -> None:

@@ -18,6 +18,9 @@ from wristctl.config.errors import UserError
 HARDWARE, SAFETY_STOP = 4, 5
 """Exit codes."""
 
+_OVERSLEPT = 0.02
+"""Seconds of waiting for an answer beyond what was to be waited: the computer did not let the host run."""
+
 
 class BoardError(UserError):
     """The board could not be made to do something; `origin` is host, cable or firmware."""
@@ -53,12 +56,15 @@ class PortLost(BoardError):
 class NoAnswer(BoardError):
     """Nothing valid came back."""
 
-    def __init__(self, port: str, command: Command, attempts: int, bytes_seen: int) -> None:
+    def __init__(self, port: str, command: Command, attempts: int, bytes_seen: int, overslept: float = 0.0) -> None:
         asked = f"to {command.name} after {attempts} attempts"
         if bytes_seen:
             what = f"only garbled bytes ({bytes_seen}) in answer {asked}"
             fix = "check --baud; if another program runs on the board: wristctl hw flash"
             super().__init__("firmware", what, port, fix)
+        elif overslept > _OVERSLEPT:
+            what = f"no answer {asked}, of which this computer slept through {1e3 * overslept:.0f} ms"
+            super().__init__("host", what, port, "close other programs, or give the loop priority: hw-run --priority")
         else:
             fix = "check USB cable and power, and that this is the board's port: wristctl hw ports"
             super().__init__("cable", f"no answer {asked}", port, fix)

@@ -9,6 +9,8 @@ from wristctl.board.messages import Command, Configure, Status
 
 WIRING_STEPS = 160
 """A twentieth of a turn at 1/16 step."""
+_SILENCE = 0.5
+"""Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer."""
 
 
 class RoundTrips(NamedTuple):
@@ -33,7 +35,7 @@ def round_trips(board: Board, command: Command, count: int) -> RoundTrips:
 
 def move_a_little(board: Board, axis: int) -> Status:
     """Energise the drives, creep axis `axis` forward by WIRING_STEPS and back, and release them."""
-    board.set_up(Configure())
+    board.set_up(Configure(watchdog=_SILENCE))
     start = list(board.enable().position)
     there = [position + WIRING_STEPS * (k == axis) for k, position in enumerate(start)]
     board.jog(there)

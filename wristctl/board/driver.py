@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.exchange import Exchange, Traffic
+from wristctl.board.exchange import Exchange, Overheard, Traffic, nobody
 from wristctl.board.framing import crc
 from wristctl.board.messages import (
     ANSWER_TO,
@@ -49,13 +49,13 @@ class Board:
     """A motor board behind a transport. As a context manager it connects, and stops the motors in the end.
 
     Commands are sent again when no answer comes, at most ATTEMPTS times within the watchdog time; all of them are
-    absolute, so that the board may see one twice. Errors are those of `errors.py`.
+    absolute, so that the board may see one twice. `overheard` hears all bytes. Errors are those of `board_errors.py`.
     """
 
-    def __init__(self, transport: Transport) -> None:
+    def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport = transport
         self.hello: Hello | None = None
-        self._exchange = Exchange(transport)
+        self._exchange = Exchange(transport, overheard)
         self._configured, self._limits, self._watchdog = Configure(), Limits(), Configure().watchdog
         self._connection = 0
 
@@ -174,13 +174,13 @@ class Board:
     def wait_while(self, flag: Flag, timeout: float) -> Status:
         """Feed the watchdog until the status no longer has this flag. BoardError after `timeout` s."""
         deadline = self.transport.now() + timeout
-        while flag in (status := self.read()).flags:
+        while flag in (status := self.read()).flags and status.state != State.FAULT:
             if self.transport.now() > deadline:
                 raise BoardError("firmware", f"still {flag.name} after {timeout:g} s", self.transport.name)
-            if status.state == State.FAULT:
-                raise self.faulted(status)
             self.ping()
             self.transport.wait(self._watchdog / 4)
+        if status.state == State.FAULT:
+            raise self.faulted(status)
         return status
 
     def send(self, message: Command | tuple[Any, ...]) -> Status:

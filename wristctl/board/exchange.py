@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from wristctl.board.board_errors import NoAnswer
@@ -10,6 +11,13 @@ from wristctl.board.messages import FEEDS_WATCHDOG, Command
 from wristctl.board.transport import Transport
 
 _ANSWER = 0x80
+
+Overheard = Callable[[float, str, bytes], None]
+"""Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises."""
+
+
+def nobody(time: float, way: str, data: bytes) -> None:
+    """Overhears nothing."""
 
 
 @dataclass
@@ -26,13 +34,14 @@ class Traffic:
 class Exchange:
     """Commands and answers in turn over a transport."""
 
-    def __init__(self, transport: Transport) -> None:
-        self.transport = transport
+    def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
+        self.transport, self._overheard = transport, overheard
         self.traffic = Traffic()
         self.round_trip = 0.0
         """Seconds from the last command to its answer."""
         self.silence = 0.0
-        """Seconds between the last two commands that feed the watchdog."""
+        """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
+        longer."""
         self._decoder = Decoder()
         self._sequence = 0
         self._last_fed = 0.0
@@ -50,9 +59,10 @@ class Exchange:
             self.traffic.bytes_read,
             self.transport.now(),
         )
-        if command in FEEDS_WATCHDOG:
-            self.silence = began - self._last_fed if self._last_fed else 0.0
+        gap = began - self._last_fed if self._last_fed else 0.0
+        self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
         for attempt in range(attempts):
+            self._overheard(self.transport.now(), "sent", frame)
             self.transport.write(frame)
             self.traffic.sent += 1
             self.traffic.resent += attempt > 0
@@ -61,13 +71,16 @@ class Exchange:
                 if command in FEEDS_WATCHDOG:
                     self._last_fed = began
                 return answer
-        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen)
+        overslept = self.transport.now() - began - attempts * patience
+        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen, overslept)
 
     def _answer(self, command: Command, deadline: float) -> bytes | None:
         found = None
         while found is None and (left := deadline - self.transport.now()) > 0:
             data = self.transport.read(left)
             self.traffic.bytes_read += len(data)
+            if data:
+                self._overheard(self.transport.now(), "came", data)
             for frame in self._decoder.feed(data):
                 if (
                     found is None

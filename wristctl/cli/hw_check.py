@@ -23,11 +23,24 @@ def check(
     wiring: Annotated[
         int | None, typer.Option("--wiring", metavar="AXIS", min=0, max=3, help="Move this axis a little, after a yes.")
     ] = None,
+    rig: Annotated[
+        bool, typer.Option("--rig", help="Camera and computer too: can the loop of hw-run run here?")
+    ] = False,
+    camera: Annotated[str | None, typer.Option("--camera", help="With --rig: number, path or address.")] = None,
+    axis: Annotated[int, typer.Option("--axis", min=0, max=3, help="With --rig: axis that is to be moved.")] = 2,
+    override: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="With --rig: a setting of hw-run.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nobody before a motor moves.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Ask the board who it is and how it is, time its answers, and try one drive's wiring."""
+    """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
+    if rig:
+        from wristctl.cli.hw_check_rig import check_rig
+
+        return check_rig(port, baud, camera, override or [], axis, yes, as_json, quiet)
     from wristctl.board.check import move_a_little, round_trips
     from wristctl.board.driver import Board
     from wristctl.board.messages import Command
@@ -42,7 +55,8 @@ def check(
         with Board(transport) as board:
             assert board.hello is not None
             if wiring is not None:
-                _ask_before_moving(wiring)
+                if not yes:
+                    _ask_before_moving(wiring)
                 move_a_little(board, wiring)
             times = [round_trips(board, command, rounds) for command in (Command.PING, Command.STATUS)]
             status, counters = board.read(), board.counters()

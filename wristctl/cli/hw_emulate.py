@@ -27,10 +27,18 @@ def emulate(
     wrist: Annotated[
         bool, typer.Option("--wrist", help="Hang a simulated wrist on it, before a rendered camera.")
     ] = False,
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="With --wrist: override a setting of hw-run, bench.KEY=VALUE."),
+    ] = None,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Serve the emulated board for any serial client, in real time; its port is the only line on stdout."""
+    """Serve the emulated board for any serial client, in real time; its port is the only line on stdout.
+
+    With --wrist a second line says where the camera's pictures are, which --camera takes; press, release (the
+    emergency stop) and directions that the wrist is turned to can be typed.
+    """
     with listening(quiet, False) as console:
         with progress(console, no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
             from wristctl.board.emulator.atmega2560 import FIRMWARE, Atmega2560
@@ -39,7 +47,7 @@ def emulate(
             chip = Atmega2560(image or FIRMWARE, boot_loader=boot_loader)
         line = PtyLine() if tcp is None else TcpLine(tcp)
         if wrist:
-            _serve_with_wrist(chip, line, console, quiet)
+            _serve_with_wrist(chip, line, override or [], console, quiet)
             return
         log.info("serving; try: wristctl hw check --port %s", line.address)
         print(line.address, flush=True)
@@ -49,24 +57,28 @@ def emulate(
             line.close()
 
 
-def _serve_with_wrist(chip: Any, line: Any, console: Any, quiet: bool) -> None:
+def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, quiet: bool) -> None:
+    import sys
     from tempfile import TemporaryDirectory
 
     with TemporaryDirectory(prefix="wristctl-bench-") as folder:
         pictures = Path(folder) / "frame"
         with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+            from wristctl.bench.bystander import Bystander
             from wristctl.bench.film import start_film
             from wristctl.bench.rig import Rig
             from wristctl.bench.server import BenchServer
-            from wristctl.config.bench import BenchSettings
-            from wristctl.config.wrist import WristParameters
+            from wristctl.config.load import load_study
 
-            settings, its = BenchSettings(), WristParameters()
-            camera, film = start_film(settings, its, None, pictures)
-            server = BenchServer(Rig(settings, its, 0, chip=chip), line, film)
-        log.info("serving, with a wrist of the default settings on axes 0 to 3; its camera's frames: %s", pictures)
-        log.info("try: wristctl hw check --port %s --wiring 3", line.address)
-        print(line.address, flush=True)
+            study = load_study((), override, "hw-run")
+            settings, markers = study.hw_run.bench, study.hw_run.markers
+            camera, film = start_film(settings, study.wrist, markers, pictures, broadcast=True)
+            rig = Rig(settings, study.wrist, study.seed, markers, chip)
+            bystander = Bystander(rig, sys.stdin.fileno()) if sys.stdin and not sys.stdin.closed else None
+            server = BenchServer(rig, line, film, bystander=bystander)
+        log.info("serving, with a wrist on axes 0 to 3; its camera's frames: %s", pictures)
+        log.info("try: wristctl hw check --rig --port %s --camera %s", line.address, server.camera)
+        print(line.address, server.camera, sep="\n", flush=True)
         try:
             server.run()
         finally:

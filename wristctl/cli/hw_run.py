@@ -8,7 +8,7 @@ from wristctl.studies.hw_run import HW_RUN
 
 app = study_command(
     HW_RUN,
-    shortcuts=("port", "camera", "repetitions", "real_time", "video"),
+    shortcuts=("port", "camera", "repetitions", "real_time", "video", "priority"),
     flags=YES,
     examples=(
         "wristctl hw-run",

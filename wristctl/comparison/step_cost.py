@@ -9,7 +9,7 @@ import numpy as np
 
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, Controller, now_of, wrist_of
+from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate
@@ -40,7 +40,7 @@ def _steps(law: Any, count: int, now: Any, wrist: Any, limits: Any, gains: Any, 
 
 def step_time(controller: Controller, gains: tuple[float, ...], wrist: WristParameters) -> StepTime:
     """Time law and allocation over 400 chunks of 500 steps, after one that compiles them."""
-    now, model, rows = np.zeros(len(NOW)), segments(wrist, 1), np.array([*gains, 0.0])
+    now, model, rows = np.zeros(signals_of(controller.preview)), segments(wrist, 1), np.array([*gains, 0.0])
     now[NOW.index("period")] = Loop().control_period
     limits = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
     memory, law, times = np.zeros(controller.memory + 1), controller.compiled(), []

@@ -55,6 +55,14 @@ class RenderedCamera(Section):
         return self
 
 
+class SerialLine(Section):
+    """The wire between the host and the emulated board."""
+
+    latency_timer: float = quantity(
+        1e-3, "s", "the USB adapter hands over what the board says at this interval", "USB's frames", ge=1e-3, le=0.255
+    )
+
+
 class WeakenedPlant(TrueWrist):
     """The wrist as it is; a controller knows it with its stiffness when new."""
 
@@ -84,5 +92,6 @@ class BenchSettings(Section):
     actuator: StepperActuator = StepperActuator()
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
+    line: SerialLine = SerialLine()
     person: Person = Person()
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")

@@ -66,7 +66,16 @@ CONTROLLERS: Choices[Any] = Choices(
         "smc-tracking": "wristctl.control.smc_tracking:SMC_TRACKING",
         "super-twisting": "wristctl.control.super_twisting:SUPER_TWISTING",
         "computed-torque": "wristctl.control.computed_torque:COMPUTED_TORQUE",
+        "ct-dob": "wristctl.control.ct_dob:CT_DOB",
+        "adrc": "wristctl.control.adrc:ADRC",
+        "lqi": "wristctl.control.lqi:LQI",
+        "mpc": "wristctl.control.mpc:MPC",
+        "nn-mrac": "wristctl.control.nn_mrac:NN_MRAC",
         "feedforward": "wristctl.control.feedforward:FEEDFORWARD",
+        "pd-ff": "wristctl.control.pd_ff:PD_FF",
+        "pid-ff": "wristctl.control.pid_ff:PID_FF",
+        "pid-dob": "wristctl.control.pid_dob:PID_DOB",
+        "smc-dob": "wristctl.control.smc_dob:SMC_DOB",
     },
 )
 """Of `wristctl.control.law.Controller`."""
@@ -125,10 +134,17 @@ OPTIMISERS: Choices[Any] = Choices(
     {
         "pso": "wristctl.tuning.optimisers.pso:ParticleSwarm",
         "differential-evolution": "wristctl.tuning.optimisers.differential_evolution:DifferentialEvolution",
+        "cma-es": "wristctl.tuning.optimisers.cma_es:CMAES",
         "random": "wristctl.tuning.optimisers.random_search:RandomSearch",
     },
 )
 """Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
 
-PLANTS: Choices[Any] = Choices("plant", {"pcc": "wristctl.wrist.pcc:PCC"})
+PLANTS: Choices[Any] = Choices(
+    "plant",
+    {
+        "pcc": "wristctl.wrist.pcc:PCC",
+        "hinges": "wristctl.wrist.hinges:HINGES",
+    },
+)
 """Of `wristctl.wrist.plant.PlantModel`."""

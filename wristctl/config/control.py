@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.choices import CONTROLLERS, METRICS, OPTIMISERS
+from wristctl.config.families import TuningWorlds, Worlds
 from wristctl.config.loop import LOOPS, DirectionName, Loop, Loops, Reference, Scenario
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
@@ -35,27 +36,28 @@ class Row(Section):
 
 
 class Objective(OpenSection):
-    """Weights of the tuning objective; each term is averaged over the tuning scenarios and repetitions."""
+    """Weights of the tuning objective, in decades better or worse than `feedforward` on the same case.
 
-    rmse: float = quantity(1.0, "1/rad", "weight of the RMSE", ge=0)
-    settling: float = quantity(0.01, "1/s", "weight of the settling time (the horizon where it never settles)", ge=0)
-    chattering: float = quantity(
-        1e-6, "s/N", "weight of the total variation of tension per second", "paper: output error and chattering", ge=0
-    )
-    saturation: float = quantity(0.0, "", "weight of the share of time in saturation", ge=0)
+    A term is log10((metric + floor) / (feedforward's metric + floor)), the floor being the metric's own below which no
+    difference is of interest (docs/choices.md), averaged over all cases.
+    """
+
+    rmse: float = choice(1.0, "weight of the RMSE", ge=0)
+    steady_state: float = choice(0.25, "weight of the error at the end", ge=0)
+    oscillation: float = choice(0.25, "weight of the oscillation at rest", ge=0)
+    chattering: float = choice(0.05, "weight of the total variation of tension per second", ge=0)
+    worst: float = choice(0.5, "weight of the worst case's terms, beside the mean's 1", ge=0)
+    swinging: float = choice(1.0, "added where any case swings by more than 0.1 deg [decades]", ge=0)
 
     def added(self) -> Mapping[str, Parameter]:
         """A weight for every other metric of the table."""
         others = {name: METRICS[name] for name in METRICS if name not in type(self).model_fields}
-        return {
-            name: Parameter(0.0, f"1/({each.unit})" if each.unit else "", f"weight of {each.formula}")
-            for name, each in others.items()
-        }
+        return {name: Parameter(0.0, "", f"weight of {each.formula}") for name, each in others.items()}
 
     def weights(self) -> dict[str, float]:
         """The weight of each metric that has one, by name."""
         given = {name: getattr(self, name) for name in type(self).model_fields} | (self.model_extra or {})
-        return {name: float(weight) for name, weight in given.items() if weight != 0.0}
+        return {name: float(weight) for name, weight in given.items() if weight != 0.0 and name in METRICS}
 
     @model_validator(mode="after")
     def _none_negative(self) -> Self:
@@ -71,14 +73,17 @@ class TuneSettings(Section):
     controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune", min_length=1)
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser", "paper")
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
-    iterations: int = choice(60, "iterations", "assumed", ge=1, le=100_000)
+    iterations: int = choice(60, "iterations of each search", "assumed", ge=1, le=100_000)
+    restarts: int = choice(1, "searches, the first from a preset, the others from the middle of the box", ge=1, le=100)
+    finalists: int = choice(50, "best candidates that are judged anew, with the presets, to choose from", ge=1, le=1000)
     objective: Objective = Objective()
+    worlds: TuningWorlds = TuningWorlds()
     scenarios: tuple[Scenario, ...] = choice(
         (
             Scenario(reference=Reference(kind="step", angle_deg=20.0)),
             Scenario(reference=Reference(kind="minimum-jerk", angle_deg=20.0, duration=1.5)),
         ),
-        "tuning scenarios; compare refuses to judge on any of them",
+        "tuning scenarios, where no worlds are named; compare refuses to judge on any of them",
         min_length=1,
     )
     loops: Loops = choice(
@@ -90,6 +95,7 @@ class TuneSettings(Section):
     repetitions: int = choice(1, _REPETITIONS + " and candidates", ge=1, le=1000)
     network: str | None = choice(None, "train run behind references with inverse: network")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+    resume: str | None = choice(None, "tune run that was cut short: what it has tried is not run again")
 
 
 class CompareSettings(Section):
@@ -116,6 +122,7 @@ class CompareSettings(Section):
     directions: tuple[DirectionName, ...] = choice(
         ("ulnar",), "directions of bending, each by its own plane", min_length=1
     )
+    worlds: Worlds = Worlds()
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     repetitions: int = choice(1, _REPETITIONS, ge=1, le=1000)
     network: str | None = choice(None, "train run: path, id or latest:train")

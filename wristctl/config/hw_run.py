@@ -58,6 +58,10 @@ class Safety(Section):
     odd_for: float = quantity(0.06, "s", "how long follow_deg, load or across_deg may be exceeded", "assumed", ge=0)
     stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
     late: float = quantity(0.05, "s", "longest delay of one tick; with its period below the watchdog", "assumed", gt=0)
+    skipped: float = quantity(0.2, "", "largest share of a second's ticks that are skipped", "assumed", gt=0, lt=0.5)
+    round_trip: float = quantity(
+        1.0, "", "largest median of a second's command round trips, over control_period", "assumed", gt=0, le=1
+    )
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")
 
@@ -97,6 +101,8 @@ class CalibrateWristSettings(RigSettings):
     """Zero, senses of turning and steps per radian of a rig."""
 
     plane: Literal["ulnar", "flexion"] = choice("ulnar", "bending plane that the camera looks at")
+    axis: int | None = choice(None, "try this axis alone, 0 to 3, and calibrate nothing", ge=0, le=3)
+    max_deg: float = quantity(2.0, "deg", "largest bend while one axis is tried", "assumed", gt=0.5, le=10)
 
 
 class HwRunSettings(RigSettings):
@@ -121,7 +127,8 @@ class HwRunSettings(RigSettings):
     from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
-    video: bool = choice(False, "keep the frames that were looked at as a video, with clock and marker angle")
+    video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
+    priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

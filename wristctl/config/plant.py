@@ -56,7 +56,7 @@ class TrueSensor(Overrides):
 class TrueWrist(Overrides):
     """The wrist as it is: leaves by value or as a multiple (`x1.05`); scales, payload and spreads come on top."""
 
-    model: PlantName = choice("pcc", "what is simulated: pcc is piecewise constant curvature")
+    model: PlantName = choice("pcc", "what is simulated: segments of constant curvature, or hinges between rigid links")
     stiffness_scale: float = quantity(1.0, "", "stiffness over the controller's", "paper: springs lose stiffness", gt=0)
     damping_scale: float = quantity(1.0, "", "damping over the controller's", gt=0)
     payload: float = quantity(0.0, "kg", "mass added to the hand, which the controller does not know", ge=0)
@@ -71,6 +71,7 @@ class TrueWrist(Overrides):
     hand_offset: NotNegative = truth("m", "hand's centre of mass beyond the last disc")
     stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
     flexion_ratio: Positive = truth("", "stiffness toward flexion over that toward ulnar")
+    taper: Positive = truth("", "stiffness at the base over that at the tip (hinges)")
     damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
     tendon_radius: Positive = truth("m", "radius of the circle of tendons")
     tilt_deg: float = fact(0.0, "deg", "by how much its base leans toward theta > 0, gravity being as believed")

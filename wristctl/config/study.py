@@ -7,6 +7,7 @@ from pydantic import Field
 from wristctl.config.analyse import AnalyseSettings
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.families import Family
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.identify import IdentifySettings
@@ -21,6 +22,11 @@ class Study(Section):
 
     seed: int = Field(0, ge=0, description="root of every random stream")
     wrist: WristParameters = WristParameters()
+    families: dict[str, Family] = Field(
+        {},
+        description="families of worlds, by name, that tune and compare draw from",
+        json_schema_extra={"unsaid": True},
+    )
     gen_data: DataSettings = Field(DataSettings(), alias="gen-data")
     train: TrainSettings = TrainSettings()
     tune: TuneSettings = TuneSettings()

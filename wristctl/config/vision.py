@@ -78,12 +78,20 @@ class CharucoBoard(Section):
 
 
 class Device(Section):
-    """What is asked of a camera device; null leaves it as it is."""
+    """What is asked of a camera device, and read back; null leaves it as it is."""
 
+    fourcc: str | None = choice(
+        None, "pixel format: MJPG gives most webcams their full rate", min_length=4, max_length=4
+    )
     width: int | None = quantity(None, "px", "picture width", gt=0)
     height: int | None = quantity(None, "px", "picture height", gt=0)
     frame_rate: float | None = quantity(None, "1/s", "frames per second", gt=0)
-    exposure: float | None = quantity(None, "", "in the device's own unit; switches its automatic exposure off", gt=0)
+    automatic: bool = choice(False, "leave exposure, focus and white balance to the device: pictures then change by it")
+    exposure: float | None = quantity(None, "", "in the device's own unit: on Linux 0.1 ms for most", gt=0)
+    gain: float | None = quantity(None, "", "in the device's own unit", ge=0)
+    focus: float | None = quantity(None, "", "in the device's own unit", ge=0)
+    white_balance: float | None = quantity(None, "K", "colour temperature", gt=0)
+    power_line: Literal["off", "50 Hz", "60 Hz"] | None = choice(None, "lamps whose flicker the device guards against")
     delay: float = quantity(0.0, "s", "from the middle of the exposure to the device's time stamp", "assumed", ge=0)
 
 

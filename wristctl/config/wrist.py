@@ -20,6 +20,9 @@ class WristParameters(Section):
     hand_offset: float = quantity(0.060, "m", "hand's centre of mass beyond the last disc", "assumed", ge=0)
     stiffness: float = quantity(0.615, "N m/rad", "bending stiffness of the whole wrist", "paper, C1", gt=0)
     flexion_ratio: float = quantity(1.0, "", "stiffness toward flexion over that toward ulnar", "assumed: alike", gt=0)
+    taper: float = quantity(
+        1.0, "", "stiffness at the base over that at the tip, the whole's staying (plant hinges)", "assumed: even", gt=0
+    )
     damping: float = quantity(0.105, "N m s/rad", "bending damping of the whole wrist", "paper, C1", ge=0)
     tendon_radius: float = quantity(0.020, "m", "radius of the circle of tendons", "assumed", gt=0)
     pretension: float = quantity(2.0, "N", "least tension of each tendon", "assumed", ge=0)

@@ -1,9 +1,9 @@
 """What a controller is: a law, its gains with units and search boxes, and presets.
 
 A law is a function of lanes, written once: `law(now, wrist, gains, memory) -> torque`. It runs in rollouts, in
-batches for tuning and on hardware. `now` has the fields of NOW, `wrist` the Segments of the controller's one-segment
-model, `gains` the controller's own by name; `memory` is indexed, and the law may write it. What a law may call is in
-docs/lanes.md.
+batches for tuning and on hardware. `now` has the fields of NOW, and `ahead` reads the reference to come where the
+controller asks for a preview; `wrist` is the Segments of the controller's one-segment model, `gains` the controller's
+own by name; `memory` is indexed, and the law may write it. What a law may call is in docs/lanes.md.
 """
 
 from __future__ import annotations
@@ -19,19 +19,34 @@ import numba
 from numba.core import types
 
 from wristctl.lanes.blocks import width
-from wristctl.lanes.compiled import caching
+from wristctl.lanes.compiled import caching, compiled
 from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
 
-NOW = ("theta", "rate", "theta_ref", "rate_ref", "acceleration_ref", "torque_low", "torque_high", "period")
+NOW = ("theta", "rate", "theta_ref", "rate_ref", "acceleration_ref", "torque_low", "torque_high", "period", "load")
 """What a law sees: measured angle and rate, the reference with two derivatives, the torques that the tendons can
-reach now [N m], and the control period [s]."""
+reach now [N m], the control period [s], and the load torque [N m] that the observer behind a camera makes out (nothing
+where sensors are ideal). The reference of the periods to come follows, as many as the controller's `preview`."""
+
+REFERENCE = ("theta_ref", "rate_ref", "acceleration_ref")
 
 now_of = rows_named(NOW)
 wrist_of = rows_named(Segments._fields)
 
 Law = Callable[[Any, Any, Any, Any], Any]
+
+
+def signals_of(preview: int) -> int:
+    """How many values a law sees that looks so many periods ahead."""
+    return len(NOW) + len(REFERENCE) * preview
+
+
+@compiled
+def ahead(now: Any, periods: int) -> Any:
+    """The reference so many periods from now, of those in the preview: angle, rate and acceleration."""
+    first = len(NOW) + len(REFERENCE) * (periods - 1)
+    return now[first], now[first + 1], now[first + 2]
 
 
 @dataclass(frozen=True)
@@ -68,7 +83,8 @@ class Surface(NamedTuple):
 
 @dataclass(frozen=True)
 class Controller:
-    """A named law with its gains; `memory` is the number of values it carries from tick to tick.
+    """A named law with its gains; `memory` is the number of values it carries from tick to tick, and `preview` that of
+    the control periods ahead whose reference it looks at.
 
     The law reads a gain by its name, `gains.Kp`; where that is a Python word, such as lambda, by `gains.lambda_`.
     """
@@ -80,6 +96,7 @@ class Controller:
     presets: Mapping[str, Mapping[str, float]]
     """Every gain by name, of each preset."""
     memory: int = 0
+    preview: int = 0
     notes: Mapping[str, str] = field(default_factory=dict)
     """What a reader should know about a preset."""
     conditions: Mapping[str, Conditions] = field(default_factory=dict)

@@ -48,3 +48,10 @@ def one_segment(wrist: Any, theta: Any, rate: Any) -> Any:
     """Inertia M and load (C + D) rate + G + K theta of the one-segment wrist, so that M theta'' + load = torque."""
     inertia, curving, gravity = one_segment_terms(wrist, theta)
     return inertia, curving * rate * rate + gravity + wrist.damping * rate + wrist.stiffness * theta
+
+
+@compiled
+def inverse_dynamics(wrist: Any, theta: Any, rate: Any, acceleration: Any) -> Any:
+    """Torque [N m] under which the one-segment wrist moves like that."""
+    inertia, load = one_segment(wrist, theta, rate)
+    return inertia * acceleration + load

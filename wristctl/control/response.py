@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from wristctl.control.law import NOW, now_of, wrist_of
+from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach
 
-_THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD = range(len(NOW))
+_THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD = range(len(NOW))
+
+
+class Estimated(NamedTuple):
+    """The wrist's angle [rad], rate [rad/s] and load torque [N m] as measured or as the observer makes them out."""
+
+    theta: Any
+    rate: Any
+    load: Any
 
 
 class Controlled(NamedTuple):
-    """A law with the arrays that it works on: what it sees (NOW), the controller's one-segment wrist (Segments), its
-    gains, its memory, and the reference (angle, rate, acceleration)."""
+    """A law with the arrays that it works on: what it sees (NOW and the preview), the controller's one-segment wrist
+    (Segments), its gains, its memory, and the reference (angle, rate, acceleration)."""
 
     law: Any
     signals: Any
@@ -25,20 +33,35 @@ class Controlled(NamedTuple):
 
 
 @compiled
-def respond(control: Any, known: Any, angle: Any, rate: Any, bounds: Any, since: float, period: float) -> Any:
+def look_ahead(control: Any, periods: int, since: float) -> None:
+    """Put the reference that is `periods` from now into the preview, `since` seconds after what it was then."""
+    _continued(control, len(NOW) + len(REFERENCE) * (periods - 1), since)
+
+
+@compiled
+def _continued(control: Any, first: int, since: float) -> None:
+    """The reference as what a law sees from `first` on, continued by its own derivatives."""
+    signals, target = rows_of(control.signals), rows_of(control.reference)
+    signals[first] = target[0] + since * (target[1] + 0.5 * since * target[2])
+    signals[first + 1] = target[1] + since * target[2]
+    signals[first + 2] = target[2]
+
+
+@compiled
+def respond(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
-    `angle` and `rate` are as measured; the reference is what it was `since` seconds ago, continued by its own
-    derivatives; `bounds` are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
+    `seen` is Estimated; the reference is what it was `since` seconds ago, continued by its own derivatives; `bounds`
+    are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
     """
     low, high = bounds
-    signals, target = rows_of(control.signals), rows_of(control.reference)
+    angle = seen.theta
+    signals = rows_of(control.signals)
     torque_low, torque_high = reach(angle, known, low, high)
     signals[_THETA] = angle
-    signals[_RATE] = rate
-    signals[_THETA_REF] = target[0] + since * (target[1] + 0.5 * since * target[2])
-    signals[_RATE_REF] = target[1] + since * target[2]
-    signals[_ACCELERATION_REF] = target[2]
+    signals[_RATE] = seen.rate
+    signals[_LOAD] = seen.load
+    _continued(control, _THETA_REF, since)
     signals[_LOW] = torque_low
     signals[_HIGH] = torque_high
     signals[_PERIOD] = period + 0.0 * low

@@ -29,8 +29,9 @@ from wristctl.lanes.cores import cores
 EVIDENT = 3.5
 """Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""
 
-_UNSURE = 0.7
-"""Standard deviation of how far a wrist is on the way from the model's segments to a finer bend: nothing is known."""
+_UNSURE = 5.0 / 3.0
+"""Standard deviation of how far a wrist is on the way from the model's four segments to 8: a bend without segments is at
+4/3, and fits of wrists of 8 segments move by more than the first order tells (docs/identify.md)."""
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 

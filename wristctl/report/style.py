@@ -37,6 +37,15 @@ _CONTROLLERS = {
     "super-twisting": WINE,
     "computed-torque": GREEN,
     "feedforward": GREY,
+    "ct-dob": "#1b7837",
+    "mpc": "#8c510a",
+    "adrc": "#c51b7d",
+    "lqi": "#35978f",
+    "nn-mrac": "#bf812d",
+    "pd-ff": "#9970ab",
+    "pid-ff": "#5aae61",
+    "pid-dob": "#4575b4",
+    "smc-dob": "#762a83",
 }
 _OTHERS = (OLIVE, FOREST, ROSE)
 WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}

@@ -10,14 +10,26 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from wristctl.report.style import BLACK, BLUE, GREY, OLIVE, ORANGE, PURPLE, SKY, VERMILLION, WINE, figure, undress
+from wristctl.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    OLIVE,
+    ORANGE,
+    PURPLE,
+    ROSE,
+    SKY,
+    VERMILLION,
+    WINE,
+    figure,
+    undress,
+)
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 _WIDE = 480
 """Pixels across a frame in a figure."""
-_COLOURS = dict(
-    zip(list(SightingVerdict)[1:], (VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK, OLIVE), strict=True)
-)
+_REFUSAL_COLOURS = VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK, OLIVE, ROSE
+_COLOURS = dict(zip(list(SightingVerdict)[1:], _REFUSAL_COLOURS, strict=True))
 
 
 def angle(sightings: Sequence[Sighting]) -> Figure:

@@ -16,21 +16,19 @@ from wristctl.tuning.search import Search
 
 
 def convergence(searches: Sequence[Search]) -> Figure:
-    """Objective over the iterations (log): best so far and the swarm's median, for each controller.
-
-    The median has a gap where at least half of the candidates failed.
-    """
+    """Best objective against the budget of each search; a thin line for each restart, a thick one for their median."""
     made, ((axes,),) = figure(height=3.6)
     for search in searches:
-        label = f"{search.controller}, best so far ({search.objective:.4g})"
-        axes.plot(_iterations(search), search.best_so_far, color=colour(search.controller), label=label)
-    for search in searches:
-        median, label = np.median(search.values, axis=1), f"{search.controller}, median of the swarm"
-        axes.plot(_iterations(search), median, ":", color=colour(search.controller), linewidth=1.0, label=label)
-    logarithmic(axes.yaxis)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set(xlabel="iteration", ylabel="objective [1]")
-    legend_below(made, 2)
+        best, own = search.best_so_far, colour(search.controller)
+        budget = search.tried.values.shape[1] * np.arange(1, best.shape[1] + 1)
+        if len(best) > 1:
+            axes.plot(budget, best.T, color=own, linewidth=0.6, alpha=0.6)
+        whole = best[np.isfinite(best).all(axis=1)] if np.isfinite(best).all(axis=1).any() else best[:1]
+        axes.plot(budget, np.median(whole, axis=0), color=own, linewidth=1.6, label=search.controller)
+    axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle=":", label="feedforward")
+    axes.set_xscale("log")
+    axes.set(xlabel="candidates tried", ylabel="objective [decades beside feedforward]")
+    legend_below(made, 4)
     return made
 
 
@@ -39,7 +37,7 @@ def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
     made, axes = figure(len(gains), 1, height=0.9 + 1.6 * len(gains), sharex=True)
     iterations, best = _iterations(search), _best_so_far(search)
     for at, (panel, (name, gain)) in enumerate(zip(axes[:, 0], gains.items(), strict=True)):
-        low, median, high = np.percentile(search.tried[:, :, at], (10.0, 50.0, 90.0), axis=1)
+        low, median, high = np.percentile(search.tried.gains[:, :, at], (10.0, 50.0, 90.0), axis=1)
         own = colour(search.controller)
         panel.fill_between(iterations, low, high, color=own, alpha=0.2, linewidth=0.0, label="10-90 % of the swarm")
         panel.plot(iterations, median, color=own, linewidth=1.0, linestyle=":", label="median of the swarm")
@@ -55,13 +53,14 @@ def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
 
 def _iterations(search: Search) -> NDArray[np.int_]:
     """Numbers of the iterations, from 1."""
-    return np.arange(1, len(search.values) + 1)
+    return np.arange(1, len(search.tried.values) + 1)
 
 
 def _best_so_far(search: Search) -> Array:
     """Gains of the best candidate up to each iteration, (I, g)."""
-    each = search.tried[_iterations(search) - 1, search.values.argmin(axis=1)]
-    least = search.best_so_far
+    values = search.tried.values
+    each = search.tried.gains[_iterations(search) - 1, values.argmin(axis=1)]
+    least = np.minimum.accumulate(values.min(axis=1))
     better = np.concatenate([[True], least[1:] < least[:-1]])
     found: Array = each[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]
     return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, Controller
+from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
@@ -47,7 +47,9 @@ class Batch(NamedTuple):
 
     def scratch(self) -> Scratch:
         """Rows to work on, for one thread."""
-        now, target, case = (np.zeros((rows, *self.wide)) for rows in (len(NOW), 3, 2))
+        now, target, case = (
+            np.zeros((rows, *self.wide)) for rows in (signals_of(self.setup.preview), len(REFERENCE), 2)
+        )
         return Scratch(now, target, case)
 
 
@@ -140,7 +142,7 @@ def batch(
     )
     references = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
     course = LoopCourse(references, _stacked(cases, samples), frames)
-    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks)
+    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from wristctl.control.law import now_of
-from wristctl.control.response import Controlled, respond
+from wristctl.control.response import Controlled, look_ahead, respond
 from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import Drive, actuate, read_motor, read_winding, wound
 from wristctl.simulation.nonideal import worn
-from wristctl.simulation.observer import estimated_load, go_on, sense
+from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.elastic import Tendons, pulls_at_start, read_nonideal
@@ -38,7 +38,8 @@ _NAN = float("nan")
 
 
 class Setup(NamedTuple):
-    """What is the same for all lanes. `level` is the actuator's, None where it is ideal."""
+    """What is the same for all lanes. `level` is the actuator's, None where it is ideal; the law looks `preview`
+    periods ahead."""
 
     law: Any
     plant: Any
@@ -47,6 +48,7 @@ class Setup(NamedTuple):
     period: float
     substeps: int
     ticks: int
+    preview: int
 
 
 class LoopCourse(NamedTuple):
@@ -149,9 +151,15 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
         for tick in range(ticks):
             now_tick = sample * ticks + tick
             angle, rate = tip_angle(plant, q, rates)
-            seen, seen_rate = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
+            seen = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
+            for ahead in range(1, setup.preview + 1):
+                to_come = min((now_tick + ahead) // ticks, course.references.shape[1] - 1)
+                _gather(course.references, state.which, to_come, targets)
+                look_ahead(control, ahead, (now_tick + ahead - to_come * ticks) * period)
+            if setup.preview > 0:
+                _gather(course.references, state.which, sample, targets)
             wanted, torque_low, torque_high, plus, minus = respond(
-                control, known, seen, seen_rate, (low, high), tick * period, period
+                control, known, seen, (low, high), tick * period, period
             )
             theta_ref = view.theta_ref
             given_plus, given_minus = actuate(drive, motor, known, theta_ref, plus, minus, period)
@@ -167,13 +175,13 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
                 row[1] = rate
                 row[2] = wanted
-                row[3] = torque_of(seen, known, plus, minus)
+                row[3] = torque_of(seen.theta, known, plus, minus)
                 row[4] = plus / _SIDE
                 row[5] = minus / _SIDE
                 row[6] = acting_plus / _SIDE
                 row[7] = acting_minus / _SIDE
-                row[8] = seen
-                row[9] = estimated_load(state.watch, angle)
+                row[8] = seen.theta
+                row[9] = seen.load
                 for i in range(n):
                     row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)

@@ -19,6 +19,7 @@ from wristctl.config.choices import Choices
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
 
+_ANGLE = float(np.deg2rad(0.01))
 _LEAST_MOVE = 1e-9
 """Move [rad] below which there is nothing to settle on."""
 
@@ -46,6 +47,8 @@ class Metric:
     """Whether it is of the error, and so means nothing where the wrist has diverged."""
     never: Callable[[float], float] | None = None
     """What `never` (nan) counts in tuning, by the horizon [s]; None: such gains have failed."""
+    floor: float = 1e-3
+    """In tuning, below which a difference is of no interest; in its unit."""
 
 
 METRICS: Choices[Metric] = _TABLE
@@ -133,38 +136,50 @@ RMSE = Metric(
     "sqrt(mean e^2) over the horizon",
     lambda of: np.sqrt(of.sums["squared"] / of.sums["ticks"]),
     heading="RMSE [rad]",
+    floor=_ANGLE,
 )
-RMSE_MOVE = Metric("rad", "sqrt(mean e^2) until the reference rests; over the horizon for a step", _rmse_move)
-RMSE_SETTLED = Metric("rad", "sqrt(mean e^2) after the settling time (2 %)", _rmse_settled)
+RMSE_MOVE = Metric(
+    "rad", "sqrt(mean e^2) until the reference rests; over the horizon for a step", _rmse_move, floor=_ANGLE
+)
+RMSE_SETTLED = Metric("rad", "sqrt(mean e^2) after the settling time (2 %)", _rmse_settled, floor=_ANGLE)
 SETTLING = Metric(
     "s",
     "last instant outside +-2 % of the move around the final reference; never: nan",
     _settling,
     heading="settling [s]",
     never=lambda horizon: horizon,
+    floor=0.01,
 )
-SETTLING_5 = Metric("s", "the same for +-5 %", _settling_5, never=lambda horizon: horizon)
+SETTLING_5 = Metric("s", "the same for +-5 %", _settling_5, never=lambda horizon: horizon, floor=0.01)
 STEADY_STATE = Metric(
     "rad",
     "mean |e| over the last 10 % of the horizon",
     lambda of: of.sums["late"] / of.sums["late_count"],
     heading="steady [rad]",
+    floor=_ANGLE,
 )
 OVERSHOOT = Metric(
     "%",
     "largest passing of the final reference over the last move, from that move's beginning",
     _overshoot,
     heading="overshoot [%]",
+    floor=0.1,
 )
-IAE = Metric("rad s", "integral of |e|", lambda of: of.sums["absolute"] * of.period)
+IAE = Metric("rad s", "integral of |e|", lambda of: of.sums["absolute"] * of.period, floor=_ANGLE)
 PEAK_TENSION = Metric(
-    "N", "largest tension of a tendon", lambda of: of.sums["peak"], heading="peak [N]", of_error=False
+    "N",
+    "largest tension of a tendon",
+    lambda of: of.sums["peak"],
+    heading="peak [N]",
+    of_error=False,
+    floor=0.1,
 )
 RMS_TENSION = Metric(
     "N",
     "sqrt(mean of both sides' squared tensions)",
     lambda of: np.sqrt(of.sums["squared_tension"] / of.sums["ticks"]),
     of_error=False,
+    floor=0.1,
 )
 CHATTERING = Metric(
     "N/s",
@@ -172,6 +187,7 @@ CHATTERING = Metric(
     lambda of: of.sums["variation"] / of.goals["horizon"],
     heading="chattering [N/s]",
     of_error=False,
+    floor=1.0,
 )
 SATURATION = Metric(
     "",
@@ -179,35 +195,45 @@ SATURATION = Metric(
     lambda of: of.sums["saturated"] / of.sums["ticks"],
     heading="saturated",
     of_error=False,
+    floor=0.001,
 )
 SLACK = Metric(
-    "", "share of time in which a tendon was slack", lambda of: of.sums["slack"] / of.sums["ticks"], of_error=False
+    "",
+    "share of time in which a tendon was slack",
+    lambda of: of.sums["slack"] / of.sums["ticks"],
+    of_error=False,
+    floor=0.001,
 )
 RMSE_DESIRED = Metric(
     "rad",
     "RMSE against the true wanted angle",
     of_trajectory=lambda course: np.sqrt(np.mean((course.theta - course.theta_desired) ** 2)),
+    floor=_ANGLE,
 )
 TIP_RMSE = Metric(
     "mm",
     "RMSE of the tip's distance from the wanted position",
     of_trajectory=lambda course: 1e3 * np.sqrt(np.mean(course.tip_distance**2)),
+    floor=0.02,
 )
 TIP_STEADY = Metric(
     "mm",
     "mean distance of the tip from the wanted position over the last 10 %",
     of_trajectory=lambda course: 1e3 * course.tip_distance[-max(1, len(course.time) // 10) :].mean(),
+    floor=0.02,
 )
 OSCILLATION = Metric(
     "rad",
     "half the peak-to-peak of the angle over the last second at rest, its trend removed",
     of_trajectory=oscillation,
     heading="oscillation [rad]",
+    floor=2.0 * _ANGLE,
 )
 HUNTING = Metric(
     "rad",
     "half the peak-to-peak of the angle over the last half of a hold of at least 20 s, its trend removed",
     of_trajectory=hunting,
+    floor=2.0 * _ANGLE,
 )
 OBSERVER = Metric(
     "",

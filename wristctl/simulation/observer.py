@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment
+from wristctl.control.response import Estimated
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
@@ -81,12 +82,12 @@ def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: 
 
 @compiled
 def sense(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
-    """Angle and rate as the law sees them: as they are, or, behind a camera, as the observer makes them out."""
+    """Estimated, as the law sees it: angle and rate as they are, or, behind a camera, all as the observer has it."""
     if watch is None:
-        return angle, rate
+        return Estimated(angle, rate, 0.0 * angle)
     sample(schedule, watch, drive, known, tick, angle, h)
     now = rows_of(watch.observer.now)
-    return now[0], now[1]
+    return Estimated(now[0], now[1], now[2])
 
 
 @compiled
@@ -118,14 +119,6 @@ def predict(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: 
     sent[0] = plus
     sent[1] = minus
     propagate(drive, known, rows_of(observer.now), plus, minus, h)
-
-
-@compiled
-def estimated_load(watch: Any, angle: Any) -> Any:
-    """Load torque [N m] as the observer behind a camera makes it out; nothing where there is none."""
-    if watch is None:
-        return 0.0 * angle
-    return rows_of(watch.observer.now)[2]
 
 
 @compiled

@@ -24,12 +24,25 @@ _HARMONICS = 4.0
 _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
+_TOGETHER = 256
+"""Loops whose spectra are worked out at once."""
 
 
 def oscillation(course: Trajectory) -> float:
     """Half the peak-to-peak [rad] that is left at rest; nan where the wrist has failed or there is no time to rest."""
-    left = remaining(course)
-    return _UNKNOWN if left is None else float(np.ptp(left) / 2.0)
+    found = float(oscillations(course.theta[None], course.theta_ref, _step(course))[0])
+    return _UNKNOWN if math.isnan(found) else found
+
+
+def oscillations(theta: Array, theta_ref: Array, step: float) -> Array:
+    """The same of many loops (L,) that follow one reference (T,), of their angles (L, T) `step` [s] apart."""
+    found = np.full(len(theta), _UNKNOWN)
+    for first in range(0, len(theta), _TOGETHER):
+        own = slice(first, first + _TOGETHER)
+        left = _remaining(theta[own], theta_ref, step)
+        if left is not None:
+            found[own] = np.ptp(left, axis=1) / 2.0
+    return found
 
 
 def hunting(course: Trajectory) -> float:
@@ -49,28 +62,30 @@ def hunting(course: Trajectory) -> float:
 
 def oscillation_frequency(course: Trajectory) -> float:
     """Of what is left the strongest frequency [1/s]; nan where there is nothing."""
-    left = remaining(course)
-    return _UNKNOWN if left is None or np.ptp(left) < _STILL else _strongest(left, _step(course))
+    left = _remaining(course.theta[None], course.theta_ref, _step(course))
+    if left is None or not np.ptp(left) >= _STILL:
+        return _UNKNOWN
+    return float(_strongest(left, _step(course))[0])
 
 
-def remaining(course: Trajectory) -> Array | None:
-    """What is left at the end of a course, its trend or what follows its reference removed, (W,) [rad]."""
-    step, samples = _step(course), len(course.time)
-    window = round(WINDOW / step)
-    if window > samples or not np.isfinite(course.theta[-window:]).all():
+def _remaining(theta: Array, theta_ref: Array, step: float) -> Array | None:
+    """What is left at the end of each course (L, T), its trend or what follows its reference removed, (L, W) [rad].
+
+    nan where a wrist has failed, None where there is no time to rest.
+    """
+    window, samples = round(WINDOW / step), len(theta_ref)
+    if window > samples:
         return None
-    if np.ptp(course.theta_ref[-window:]) == 0.0:
-        return _without_trend(course.theta[-window:])
-    frequency = _strongest(course.theta_ref - course.theta_ref.mean(), step)
+    if np.ptp(theta_ref[-window:]) == 0.0:
+        return _without_trend(theta[:, -window:])
+    frequency = float(_strongest(theta_ref[None] - theta_ref.mean(), step)[0])
     window = min(samples, max(window, round(2.0 / (frequency * step))))
-    error = (course.theta - course.theta_ref)[-window:]
-    if not np.isfinite(error).all():
-        return None
+    error = (theta - theta_ref)[:, -window:]
     degree = 4 + round(
         math.pi * _HARMONICS * frequency * step * window
     )  # a polynomial follows so many waves, and no more
     basis = _polynomials(window, min(degree, window // 2))
-    left: Array = error - basis @ (basis.T @ error)
+    left: Array = error - error @ basis @ basis.T
     return left
 
 
@@ -82,22 +97,37 @@ def _polynomials(samples: int, degree: int) -> Array:
 
 
 def _without_trend(angle: Array) -> Array:
-    """The angle less its mean and slope, told apart from those of a swing that is cut in its middle."""
-    place = np.linspace(-1.0, 1.0, len(angle))
-    trend = np.stack([np.ones_like(place), place], axis=1)
-    left = angle - trend @ np.linalg.lstsq(trend, angle, rcond=None)[0]
-    if np.ptp(left) < _STILL:
-        return np.asarray(left)
-    phase = math.pi * _strongest(left, 1.0) * len(angle) * place
-    both = np.concatenate([trend, np.stack([np.cos(phase), np.sin(phase)], axis=1)], axis=1)
-    return np.asarray(angle - trend @ np.linalg.lstsq(both, angle, rcond=None)[0][:2])
+    """The angles (L, W) less their trend, told apart from that of a swing that is cut in its middle.
+
+    It is a cubic: a wrist that still creeps to its place does so along an exponential, and does not swing.
+    """
+    basis = _polynomials(angle.shape[1], min(3, angle.shape[1] - 1))
+    left: Array = angle - angle @ basis @ basis.T
+    moving = np.ptp(left, axis=1) >= _STILL
+    if moving.any():
+        left[moving] = _without_swing(angle[moving], left[moving], basis)
+    return left
 
 
-def _strongest(values: Array, step: float) -> float:
-    """The strongest frequency [1/s] of values `step` [s] apart."""
-    count = 8 * len(values)
-    power = np.abs(np.fft.rfft(values * np.hanning(len(values)), count))
-    return float(np.argmax(power[8:]) + 8) / (count * step)
+def _without_swing(angle: Array, left: Array, trend: Array) -> Array:
+    """The angles (L, W) less the trend of a fit of trend and the strongest swing of what is left without it."""
+    place = np.linspace(-1.0, 1.0, angle.shape[1])
+    phase = math.pi * _strongest(left, 1.0)[:, None] * len(place) * place
+    swing = np.stack([np.cos(phase), np.sin(phase)], axis=2)  # (L, W, 2)
+    swing_left = swing - trend @ (trend.T @ swing)
+    # least squares on what of the swing is no trend; the trend is then what of the angle that swing does not explain
+    normal = np.swapaxes(swing_left, 1, 2) @ swing_left
+    size = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (np.swapaxes(swing_left, 1, 2) @ left[:, :, None])
+    rest = angle - (swing @ size)[:, :, 0]
+    found: Array = angle - rest @ trend @ trend.T
+    return found
+
+
+def _strongest(values: Array, step: float) -> Array:
+    """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart, (L,)."""
+    count = 8 * values.shape[1]
+    power = np.abs(np.fft.rfft(values * np.hanning(values.shape[1]), count, axis=1))
+    return np.asarray((np.argmax(power[:, 8:], axis=1) + 8) / (count * step))
 
 
 def _step(course: Trajectory) -> float:

@@ -12,8 +12,9 @@ from wristctl.config.errors import UserError
 from wristctl.studies.session import Session
 
 if TYPE_CHECKING:
-    from wristctl.vision.camera import DeviceCamera, Frame, Image
+    from wristctl.vision.camera import Frame, Image
     from wristctl.vision.charuco import Album
+    from wristctl.vision.device_camera import DeviceCamera
 
 log = logging.getLogger(__name__)
 
@@ -77,8 +78,8 @@ def _rendered(session: Session) -> Iterator[Frame]:
 
 def _live(session: Session, album: Album) -> Iterator[Frame]:
     """Frames of a device until the album is full; then until the board is seen in the bending plane."""
-    from wristctl.vision.camera import DeviceCamera
     from wristctl.vision.charuco import least_seen
+    from wristctl.vision.device_camera import DeviceCamera
 
     settings = session.study.calibrate_camera
     camera = DeviceCamera(str(settings.camera), settings.device)

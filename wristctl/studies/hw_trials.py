@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 
 import cv2
 import numpy as np
@@ -19,17 +20,24 @@ from wristctl.studies.session import Session
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
+from wristctl.trial.loop_priority import prioritised
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_metrics import JUDGED, evaluated
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.tuning.gains_file import Gains
 from wristctl.vision.annotate import AnnotatedVideo
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Sighting
+from wristctl.vision.raw_video import COLUMNS as RAW
+from wristctl.vision.raw_video import RawVideo
 from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
+
+Films = list[AnnotatedVideo | RawVideo]
 
 _OF_TRIALS: dict[str, tuple[str, str]] = {
     "trial": ("", "number, from 0, in the order done"),
@@ -63,28 +71,31 @@ def perform_trials(
     calibration = session.inputs.read("calibration", WristCalibration.load)
     plant = PLANTS[settings.bench.plant.model]
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
-    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period)
+    monotonic = settings.port is not None or settings.real_time
+    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period, monotonic)
     try:
         experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
-        film = AnnotatedVideo(run.file("data/video.avi"), settings.sensor.frame_rate) if settings.video else None
+        films = _films(run, settings)
     except BaseException:
         trial_log.close()
         raise
     stopped: BaseException | None = None
     try:
-        with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-            view, keep = View.of(session.inputs.runs().get("optics")), film.add if film else None
-            testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
-        with session.operator.watch(trials, session) as shown:
-            experiment.run(testbed, shown)
+        with prioritised(settings.priority) as priority:
+            if priority:
+                session.operator.tell(priority)
+                session.findings.summary(priority)
+            _perform(session, bench, experiment, films, trials)
     except BaseException as error:
         stopped = error
     try:
         trial_log.close()
     except OSError as error:
         stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", fix_of(error))
-    if film is not None:
+    for film in films:
         film.close()
+    if films:
+        run.columns("data/raw.csv", RAW)
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
     table = _evaluate(run, settings, experiment, trials)
@@ -92,6 +103,30 @@ def perform_trials(
     if stopped is not None:
         raise stopped
     return table
+
+
+def _perform(
+    session: Session, bench: WristParameters, experiment: Experiment, films: Films, trials: list[Trial]
+) -> None:
+    study, settings = session.study, session.study.hw_run
+    with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
+        view = View.of(session.inputs.runs().get("optics"))
+        keep = partial(_add, films) if films else None
+        testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
+    with session.operator.watch(trials, session) as shown:
+        experiment.run(testbed, shown)
+
+
+def _films(run: LiveRun, settings: HwRunSettings) -> Films:
+    if not settings.video:
+        return []
+    rate = settings.sensor.frame_rate
+    return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
+
+
+def _add(films: Films, frame: Frame, seen: Sighting) -> None:
+    for film in films:
+        film.add(frame, seen)
 
 
 def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
@@ -136,13 +171,10 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
         findings.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning=meaning)
     if timing.late and (settings.real_time or settings.port is not None):
-        late, median, most = (f"{1e3 * timing.jitter(share):.2f} ms" for share in (0.99, 0.5, 1.0))
-        text = (
-            f"{len(timing.late)} ticks of {1e3 * timing.period:g} ms, late by {median} (p50), {late} (p99), {most} at "
-            f"most; {timing.overruns} overruns"
-        )
-        session.operator.tell(text)
-        findings.summary(text)
+        session.operator.tell(timing.said())
+        findings.summary(timing.said())
+    if timing.late:
+        findings.summary(timing.camera.summary())
     _tell_oddities(session, experiment)
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from wristctl.config.control import Row, SimulateSettings, TuneSettings
-from wristctl.config.errors import UserError
+from wristctl.config.errors import UserError, meant
+from wristctl.config.families import Family, TuningWorlds, Worlds
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument
@@ -113,3 +114,29 @@ def _identified_yaml(given: Run | Identified) -> str:
     if isinstance(given, Run):
         return given.file("data/identified.yaml").read_text(encoding="utf-8")
     return given.yaml
+
+
+def family_of(families: Mapping[str, Family], worlds: TuningWorlds | Worlds, where: str) -> Family:
+    """The family that is named; UserError with the nearest name if there is none."""
+    if worlds.family not in families:
+        fix = meant(worlds.family, families) if families else "give one in `families`: experiments/scenarios has some"
+        raise UserError(f"unknown family of worlds '{worlds.family}'", f"{where}.family", fix)
+    return families[worlds.family]
+
+
+def tuned_loops(study: Study) -> Mapping[str, Loop]:
+    """The loops that gains are tuned on, by name; of a family its loop as it is believed, before anything is drawn."""
+    worlds = study.tune.worlds
+    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.tune.loops
+
+
+def compared_loops(study: Study) -> Mapping[str, Loop]:
+    """The loops that are judged on, by name; of a family its loop before anything is drawn."""
+    worlds = study.compare.worlds
+    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.compare.loops
+
+
+def compared_inverses(study: Study) -> Iterable[str]:
+    """How the tip targets of what is judged on become angles."""
+    name = study.compare.worlds.family
+    return inverses_of(study.families[name].references) if name else study.compare.inverses

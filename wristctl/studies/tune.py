@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.config.control import TuneSettings
 from wristctl.config.errors import UserError, under
+from wristctl.config.families import Family
+from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_inverses, identified, inverses_of, network_for
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    family_of,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_loops,
+)
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
@@ -20,7 +30,7 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.tuning.search import Search
+    from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
 
 
@@ -53,31 +63,37 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.report.truth_table import truth_told
 
     with under("tune"):
-        told = truth_told(identified(study, "tune", inputs).wrist, study.tune.loops)
-        return planned_search(study.tune) + told
+        told = truth_told(identified(study, "tune", inputs).wrist, tuned_loops(study))
+        return planned_search(study.tune, study.families) + told
 
 
-def planned_search(settings: TuneSettings) -> str:
+def planned_search(settings: TuneSettings, families: Mapping[str, Family]) -> str:
     """What a search costs. UserError, naming the key, for a controller or a scenario that it cannot have.
 
-    That is an unknown controller, one without gains, or a scenario on an unknown loop.
+    That is an unknown controller, one without gains, a scenario on an unknown loop, or an unknown family.
     """
     from wristctl.control.table import controller
     from wristctl.simulation.draws import is_random
     from wristctl.simulation.size import check_size
     from wristctl.tuning.search import check_loops, check_tunable
 
-    check_loops(settings)
-    check_size(settings.loops.values(), settings.horizon)
     for number, name in enumerate(settings.controllers):
         try:
             check_tunable(controller(name))
         except UserError as error:
             raise error.at(f"controllers.{number}") from error
-    loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
-    each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
-    rollouts = settings.candidates * settings.iterations * each
-    return f"{rollouts} rollouts of {settings.horizon:g} s for each of {', '.join(settings.controllers)}"
+    searched = settings.candidates * settings.iterations * settings.restarts
+    if settings.worlds.family:
+        family = family_of(families, settings.worlds, "worlds")
+        check_size([family.loop], family.horizon)
+        each, horizon = settings.worlds.draws * len(family.references), family.horizon
+    else:
+        check_loops(settings)
+        check_size(settings.loops.values(), settings.horizon)
+        loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
+        each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
+        horizon = settings.horizon
+    return f"{searched * each} rollouts of {horizon:g} s for each of {', '.join(settings.controllers)}"
 
 
 def tune(session: Session) -> Tuned:
@@ -85,49 +101,86 @@ def tune(session: Session) -> Tuned:
     from wristctl.report.truth_table import truth_tables
 
     study = identified(session.study, "tune", session.inputs)
-    loops = study.tune.loops.values()
+    loops = tuned_loops(study).values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
     warn_if_coarse(loops)
     network = network_for(session.inputs, study.wrist, loops)
     found = search_all(session, study, network)
     rows = [
-        (name, result.objective, result.evaluations, "  ".join(f"{k} = {v:.4g}" for k, v in result.gains.items()))
-        for name, result in found.items()
+        (name, result.objective, result.finalists[0].origin, result.evaluations, _told(result.gains))
+        for name, result in sorted(found.items(), key=lambda each: each[1].objective)
     ]
-    tables = [Table("Tuned gains", ("controller", "objective", "evaluations", "gains"), rows)]
-    tables += truth_tables(study.wrist, study.tune.loops)
+    columns = ("controller", "objective", "found by", "evaluations", "gains")
+    tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
+    tables += truth_tables(study.wrist, tuned_loops(study))
     return Tuned(session.study, session.findings, tables, found)
 
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
     """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
-    import numpy as np
-
     from wristctl.control.table import controller
-    from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.draws import Draws
-    from wristctl.tuning.search import search
+    from wristctl.tuning.objective import Judge
+    from wristctl.tuning.search import search, tuning_cases
 
     settings = study.tune
-    check_inverses(inverses_of(scenario.reference for scenario in settings.scenarios), network)
-    draws = Draws(study.seed, "tuning")
-    for scenario in settings.scenarios:
-        name = scenario_of(scenario.reference, "ulnar")
-        session.findings.note_streams(draws.names([settings.loops[scenario.loop]], [name]))
+    check_inverses(inverses_of(_references(study)), network)
+    _note_streams(session, study)
+    searched, chosen = tuning_cases(study, network)
+    judge = Judge(searched, study.wrist, settings.objective)
+    choose = Judge(chosen, study.wrist, settings.objective) if chosen else None
     found: dict[str, Search] = {}
     try:
         for name in settings.controllers:
-            rng = np.random.default_rng(session.findings.stream(f"search {name}"))
-            with session.progress(f"tuning {name}", total=settings.iterations, unit="iterations") as done:
+            total = settings.iterations * settings.restarts
+            with session.progress(f"tuning {name}", total=total, unit="iterations") as done:
 
                 def so_far(result: Search, name: str = name, done: Done = done) -> None:
                     found[name] = result
-                    done(len(result.values), best=result.objective)
+                    done(len(result.tried.values), best=result.objective)
 
-                found[name] = search(study, controller(name), rng, network, so_far)
+                law, known = controller(name), _known(session, name)
+                found[name] = search(study, law, session.findings.stream, (judge, choose), so_far, known)
     finally:
         _keep(session.findings, found)
     return found
+
+
+def _references(study: Study) -> list[Reference]:
+    family = study.tune.worlds.family
+    return list(study.families[family].references) if family else [each.reference for each in study.tune.scenarios]
+
+
+def _note_streams(session: Session, study: Study) -> None:
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.drawn_worlds import streams_of
+    from wristctl.simulation.draws import Draws
+
+    settings = study.tune
+    if settings.worlds.family:
+        name = settings.worlds.family
+        for split in ("tune", "validation"):
+            session.findings.note_streams(streams_of(study.families[name], name, split))
+        return
+    for purpose in ("tuning", "validation"):
+        draws = Draws(study.seed, purpose)
+        for scenario in settings.scenarios:
+            name = scenario_of(scenario.reference, "ulnar")
+            session.findings.note_streams(draws.names([settings.loops[scenario.loop]], [name]))
+
+
+def _known(session: Session, name: str) -> Tried | None:
+    """What the run to resume has tried of a controller."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import tried_of
+
+    stopped = session.inputs.runs().get("resume")
+    if stopped is None or not (stopped.path / f"data/history-{name}.csv").exists():
+        return None
+    return tried_of(stopped.data(f"history-{name}"), list(controller(name).gains))
+
+
+def _told(gains: Mapping[str, float]) -> str:
+    return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
 
 
 def _keep(findings: Findings, found: dict[str, Search]) -> None:
@@ -135,7 +188,7 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
     from wristctl.control.table import controller
     from wristctl.report.tuning_figures import convergence, gain_history
     from wristctl.tuning.gains_file import write_gains
-    from wristctl.tuning.search import history
+    from wristctl.tuning.search import finalists, history
 
     if not found:
         return
@@ -143,8 +196,12 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
         write_gains(file, {name: result.gains for name, result in found.items()})
     for name, result in found.items():
         gains = controller(name).gains
-        units = {"iteration": "1", "candidate": "1", "objective": "1"} | {k: g.unit or "1" for k, g in gains.items()}
-        findings.table(f"data/history-{name}.csv", history(result), units=units)
+        units = {k: g.unit or "1" for k, g in gains.items()}
+        counted = dict.fromkeys(("restart", "iteration", "candidate", "objective"), "1")
+        findings.table(f"data/history-{name}.csv", history(result), units=counted | units)
+        if result.finalists:
+            judged = dict.fromkeys(("origin", "objective", "validated"), "1")
+            findings.table(f"data/finalists-{name}.csv", finalists(result), units=judged | units)
         findings.metric(f"{name}_objective", result.objective, unit="", better="lower", n=result.evaluations)
         for gain, value in result.gains.items():
             findings.metric(f"{name}_{gain}", value, unit=gains[gain].unit, better="", meaning=gains[gain].meaning)
@@ -159,5 +216,6 @@ TUNE = Procedure(
     (
         EarlierRun("network", kind="train", optional=True),
         EarlierRun("from_identified", kind="identify", optional=True),
+        EarlierRun("resume", kind="tune", optional=True, unfinished=True),
     ),
 )

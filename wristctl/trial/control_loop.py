@@ -48,6 +48,8 @@ class Task(NamedTuple):
 
     motion: Motion
     """Sampled at the loop's period."""
+    course: Array
+    """Its angle, rate and acceleration, (T, 3)."""
     trial: int
     """Its number; -1 between trials."""
     begin: float
@@ -64,7 +66,7 @@ class ControlLoop:
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
-        self._life = settings.rate_life
+        self._life, self._limits = settings.rate_life, settings.safety
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
         self._monitor = Monitor(settings.safety, self._spools)
         self._following = Following(settings, wrist, plane, timing.period)
@@ -72,7 +74,7 @@ class ControlLoop:
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
-        self._underway, self._skipped, self._verdict = 0.0, 0, "no frame"
+        self._underway, self._skipped = 0.0, 0
         self._counted = self._epoch
 
     @property
@@ -92,7 +94,9 @@ class ControlLoop:
         self._steering.use(controller, gains)
         self.oddities = Oddities(self._settings)
         resent, skipped = self._board.traffic.resent, self._timing.overruns
-        task, first = Task(motion, trial, self.next_tick, faults or HostFaults(())), self._steering.tick
+        course = np.stack([motion.theta_ref, motion.rate_ref, motion.acceleration_ref], axis=1)
+        task = Task(motion, course, trial, self.next_tick, faults or HostFaults(()))
+        first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
         self.oddities.resent = self._board.traffic.resent - resent
@@ -115,6 +119,7 @@ class ControlLoop:
         """One exchange with the board at the motion's sample `k`; None: behind its last, where no law is asked."""
         if (ahead := self.next_tick - self._clock.now()) > 0.0:
             self._clock.wait(ahead)
+        woken = self._clock.now() - self.next_tick if ahead > 0.0 else 0.0
         clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
         seen = self._look(task)
         estimate, position = steering.estimate, self._reeled()
@@ -126,7 +131,7 @@ class ControlLoop:
             self._send(np.zeros(AXES))
         else:
             reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
-            answer = self._answer(reference, clock - task.begin, task.faults)
+            answer = self._answer(task, k, clock - task.begin)
             tension = self._paths.each(answer.plus, answer.minus)
             target = self._turn(tension, position, *reference[:2])
         known = {
@@ -146,6 +151,8 @@ class ControlLoop:
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
             "counted": self._counted - task.begin,
             "late": clock - due,
+            "woken": woken,
+            "round_trip": self._board.round_trip,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
         row = known | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
@@ -153,15 +160,18 @@ class ControlLoop:
         if self._shown is not None:
             self._shown(row)
         self.oddities.tick(row, clock - self._last_usable, self._following.greatest)
-        self._timing.late.append(clock - due)
+        took = self._clock.now() - clock
         self._go_on()
+        self._timing.tick(clock - due, woken, self._board.round_trip, took, self._skipped)
+        self._timing.judge(self._limits)
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
         found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
         for seen in self._tracking.look():
-            found["verdict"] = self._verdict = str(seen.verdict)
+            found["verdict"] = str(seen.verdict)
             self.oddities.base(seen.corners[0])
+            self._timing.camera.add(seen)
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time
                 self._following.saw(seen, seen.time - self._epoch)
@@ -175,12 +185,14 @@ class ControlLoop:
         """Raises SafetyStop where the limits are exceeded."""
         age, delay = clock - self._last_usable, late + self._skipped * self._period
         taut, _ = self._paths.taut(estimate.theta)
-        status = self._status
-        self._monitor.see(Seen(estimate, age, self._verdict, position, taut, status.state, delay, status.lapses, clock))
+        status, stale = self._status, self._monitor.stale
+        why, fix = self._timing.camera.missing(clock, stale) if age > stale else ("", "")
+        seen = Seen(estimate, age, why, position, taut, status.state, delay, status.lapses, clock, fix)
+        self._monitor.see(seen)
 
-    def _answer(self, reference: tuple[float, float, float], time: float, faults: HostFaults) -> Answer:
+    def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
-            answer = faults.answer(self._steering.respond(*reference), time)
+            answer = task.faults.answer(self._steering.respond(task.course, k), time)
         except Exception as error:
             what = f"the controller failed: {type(error).__name__}: {error}"
             raise SafetyStop(what, fix="run again with --debug for the traceback") from error
@@ -212,9 +224,7 @@ class ControlLoop:
         for _ in range(1 + self._skipped):
             self._steering.predict(plus, minus)
             self._following.predict(plus, minus)
-        self._timing.overruns += self._skipped
         self.oddities.round_trips.append(self._board.round_trip)
-        self._monitor.went_on(self._skipped, self._board.round_trip)
 
     def _reeled(self) -> Array:
         """What the spools hold [steps], by the last status."""

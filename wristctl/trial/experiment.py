@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
@@ -94,7 +96,7 @@ class Experiment:
 
         Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
         """
-        board = Board(testbed.transport)
+        board = Board(testbed.transport, self._log.wire)
         try:
             self._warm_up()
             board.connect()
@@ -120,7 +122,7 @@ class Experiment:
         taut, _ = Paths(self._wrist, self._trials[0].plane).taut(0.0)
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
-            steering.respond(0.0, 0.0, 0.0)
+            steering.respond(np.zeros((1, 3)))
             steering.predict(float(taut[0]), float(taut[0]))
         steering.see(0.0, 0.0)
 
@@ -140,7 +142,9 @@ class Experiment:
         if self.zero is not None:
             slacken(board, spools_of(settings.actuator), settings.homing, self.zero.signs)
             Patience(board).wait(settings.homing.let_go)
-        marker = Patience(board).angle(tracking, 4 * settings.homing.frames)
+        watching = Patience(board)
+        marker = watching.angle(tracking, 4 * settings.homing.frames)
+        watching.pace.fits(settings.safety.stale)
         if self.zero is None:  # the marker is seen, and nothing moves yet
             testbed.confirm(Patience(board).pulse)
             prepare(board, settings)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import time
 from collections import deque
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -29,6 +30,7 @@ LOG: Columns = {
     "trial": ("", "number, from 0"),
     "time": ("s", "since the trial's motion began"),
     "clock": ("s", "the run's one clock"),
+    "utc": ("s", "the same moment since 1970-01-01T00:00Z; empty in virtual time"),
     "theta": ("rad", "bending angle as estimated"),
     "rate": ("rad/s", "its rate as estimated"),
     "load": ("N m", "load torque as estimated: what the model does not explain"),
@@ -50,6 +52,13 @@ LOG: Columns = {
     "state": ("", "of the board"),
     "faults": ("", "of the board"),
     "late": ("s", "from the tick's due time to its beginning"),
+    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
+    "round_trip": ("s", "from the tick's command to the board's answer"),
+}
+WIRE: Columns = {
+    "clock": ("s", "the run's one clock"),
+    "way": ("", "sent to the board, or came from it"),
+    "bytes": ("", "as hexadecimal digits"),
 }
 FRAMES: Columns = {
     "trial": ("", "number, from 0"),
@@ -121,28 +130,34 @@ class Stream:
     def rows(self, many: Iterable[Iterable[Any]]) -> None:
         """Add rows, in one piece. Raises OSError."""
         for values in many:
-            self._pending += ",".join(map(_cell, values)).encode() + b"\n"
-        self._flush()
+            self.wait(values)
+        self.flush()
 
-    def _flush(self) -> None:
-        """Hand over to the system what is pending."""
+    def wait(self, values: Iterable[Any]) -> None:
+        """Add a row that may be written later."""
+        self._pending += ",".join(map(_cell, values)).encode() + b"\n"
+
+    def flush(self) -> None:
+        """Hand over to the system what is pending. Raises OSError."""
         while self._pending:
             del self._pending[: self._disk.write(self._file.fileno(), bytes(self._pending))]
 
     def close(self) -> None:
         """Write the rest. Raises OSError."""
         try:
-            self._flush()
+            self.flush()
         finally:
             self._file.close()
 
 
 class TrialLog:
-    """log.csv and frames.csv of trials; between.csv for the moves between them; truth.csv of an emulated bench."""
+    """log.csv and frames.csv of trials; between.csv for the moves between them; wire.csv with all bytes of the whole
+    run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual.
+    """
 
-    def __init__(self, folder: Path, segments: int | None, period: float) -> None:
-        self.disk = Disk(folder)
-        tables = {"log": LOG, "between": LOG, "frames": FRAMES}
+    def __init__(self, folder: Path, segments: int | None, period: float, monotonic: bool = False) -> None:
+        self.disk, self._monotonic = Disk(folder), monotonic
+        tables = {"log": LOG, "between": LOG, "frames": FRAMES, "wire": WIRE}
         if segments is not None:
             tables["truth"] = truth_columns(segments)
         try:
@@ -157,12 +172,18 @@ class TrialLog:
     def tick(self, row: Mapping[str, Any]) -> None:
         """One control tick; in between.csv where it belongs to no trial. Some of the truth that waits goes with it."""
         self.last.append(dict(row))
-        self.streams["between" if row["trial"] < 0 else "log"].row(row[name] for name in LOG)
+        known = {**row, "utc": row["clock"] + time.time() - time.monotonic() if self._monotonic else math.nan}
+        self.streams["between" if row["trial"] < 0 else "log"].row(known[name] for name in LOG)
+        self.streams["wire"].flush()
         self._write_truth(_AT_ONCE)
 
     def frame(self, *values: Any) -> None:
         """One frame of a trial."""
         self.streams["frames"].row(values)
+
+    def wire(self, clock: float, way: str, data: bytes) -> None:
+        """Bytes on the wire, written at the next tick: whoever stops the motors must not hear of a full disk."""
+        self.streams["wire"].wait((clock, way, data.hex()))
 
     def truth(self, trial: int, rows: NDArray[np.float64]) -> None:
         """What the bench knows of a trial, by the columns after the first; the ticks to come write it, or the end does.

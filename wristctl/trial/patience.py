@@ -10,6 +10,7 @@ import numpy as np
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
+from wristctl.trial.camera_pace import CameraPace
 from wristctl.trial.safety import Monitor, SafetyStop
 from wristctl.trial.spools import Paths
 from wristctl.trial.tracking import Tracking
@@ -44,6 +45,8 @@ class Patience:
     def __init__(self, board: Board, judge: Callable[[Status], None] = lambda status: None) -> None:
         self._board, self._judge = board, judge
         self._stood = board.read()
+        self.pace = CameraPace()
+        """Of the pictures looked at here."""
 
     def pulse(self, longest: float = _PULSE) -> None:
         """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
@@ -67,16 +70,16 @@ class Patience:
         """Medians of the next usable frames. Raises SafetyStop where none come."""
         found: list[tuple[float, float]] = []
         tracking.look()
-        began, verdict = self._board.transport.now(), "no frame"
+        began = self._board.transport.now()
         while len(found) < frames:
             self.pulse()
             for seen in tracking.look():
-                verdict = str(seen.verdict)
+                self.pace.add(seen)
                 if seen.time >= began and math.isfinite(seen.theta):
                     found.append((seen.theta, seen.size))
             if self._board.transport.now() - began > _READING:
-                fix = "see that the camera sees both markers, sharp and well lit"
-                raise SafetyStop(f"the marker's angle could not be read ({verdict})", "homing", fix)
+                why, fix = self.pace.missing(self._board.transport.now(), _READING)
+                raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
         theta, size = np.median(found, axis=0)
         return Reading(float(theta), float(size))
 

@@ -32,7 +32,7 @@ class Seen(NamedTuple):
     age: float
     """Since the capture of the last usable marker angle."""
     verdict: str
-    """Of the newest frame."""
+    """Of the newest frame, or why there was none."""
     position: Array
     """Spools, (4,) [steps]."""
     taut: Array
@@ -43,12 +43,12 @@ class Seen(NamedTuple):
     """Step rates that have outlived their life, as the board counts."""
     time: float
     """On the clock [s]."""
+    fix: str = ""
+    """What to do about a camera that gives no usable angle."""
 
 
 _LAPSES, _WITHIN = 3, 1.0
 """So many rates that have outlived their life within so many seconds are too many."""
-_TICKS, _SKIPPED = 40, 0.3
-"""Of so many ticks, the share that may be skipped."""
 
 
 class Monitor:
@@ -58,7 +58,6 @@ class Monitor:
         self._limits, self._spools = limits, spools
         self._lapses: int | None = None
         self._lapsed: deque[float] = deque(maxlen=_LAPSES)
-        self._skips: deque[bool] = deque(maxlen=_TICKS)
 
     def see(self, seen: Seen) -> None:
         """Judge what was measured. A late tick comes first: what it sees is late as well."""
@@ -74,8 +73,7 @@ class Monitor:
             fix = "gentler gains or reference, or widen safety.rate"
             raise SafetyStop(f"rate {seen.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
         if seen.age > limits.stale:
-            what = f"no usable marker angle for {1e3 * seen.age:.0f} ms (newest frame: {seen.verdict})"
-            raise SafetyStop(what, fix="see that nothing covers the markers, and the camera's light and focus")
+            raise SafetyStop(f"no usable marker angle for {1e3 * seen.age:.0f} ms ({seen.verdict})", fix=seen.fix)
         self._pull(seen.position, seen.taut)
         reeled = float(np.abs(seen.position).max()) * self._spools.step
         if reeled > limits.travel:
@@ -83,15 +81,6 @@ class Monitor:
             raise SafetyStop(f"a spool {1e3 * reeled:.1f} mm from zero, beyond {1e3 * limits.travel:g} mm", fix=fix)
         if seen.state != State.ENABLED:
             raise SafetyStop(f"the board is {seen.state.name}, not ENABLED", fix="home again")
-
-    def went_on(self, skipped: int, round_trip: float) -> None:
-        """Judge how many ticks had to be skipped after one, whose command was answered after `round_trip` [s]."""
-        self._skips.extend([False, *[True] * skipped])
-        if len(self._skips) == _TICKS and (count := sum(self._skips)) > _SKIPPED * _TICKS:
-            took = f"the board's last answer took {1e3 * round_trip:.1f} ms"
-            what = f"{count} of the last {_TICKS} ticks were skipped; {took}"
-            fix = "a longer control_period, fewer other programs, or see docs/hardware/wiring.md for the USB adapter"
-            raise SafetyStop(what, fix=fix)
 
     def standing(self, theta: float, position: Array, taut: Array) -> None:
         """Judge a wrist whose motors stand by one marker angle [rad]; position and taut as of `Seen`."""

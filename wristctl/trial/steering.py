@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, Controller
-from wristctl.control.response import Controlled, respond
+from wristctl.control.law import REFERENCE, Controller, signals_of
+from wristctl.control.response import Controlled, Estimated, look_ahead, respond
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
@@ -51,9 +52,10 @@ class Steering:
         self._model = segments(wrist, 1)
         self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
         self._observer = observer_of(sensor, actuator, wrist, period, REMEMBERED, theta)
-        self._signals, self._target, self._found = (np.zeros(rows) for rows in (len(NOW), 3, 6))
+        self._signals, self._target, self._found = (np.zeros(rows) for rows in (0, len(REFERENCE), 6))
         self._period = period
         self._law: Any = None
+        self._preview = 0
         self._gains = self._memory = np.zeros(1)
         self.tick = 0
 
@@ -66,6 +68,8 @@ class Steering:
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
         """Take up a law, its memory empty."""
         self._law = controller.compiled()
+        self._signals = np.zeros(signals_of(controller.preview))
+        self._preview = controller.preview
         self._gains = np.array([*gains, 0.0])
         self._memory = np.zeros(max(1, controller.memory))
 
@@ -78,11 +82,13 @@ class Steering:
         _fuse(self._observer, self._drive, self._model, (tick, self.tick), since, theta, self._period)
         return True
 
-    def respond(self, theta_ref: float, rate_ref: float, acceleration_ref: float) -> Answer:
-        """The law's answer to this reference at the present estimate."""
-        self._target[:] = theta_ref, rate_ref, acceleration_ref
+    def respond(self, course: Array, tick: int = 0) -> Answer:
+        """The law's answer, at the present estimate, to a reference (T, 3) of angle, rate and acceleration at its tick.
+
+        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
+        """
         control = Controlled(self._law, self._signals, self._model, self._gains, self._memory, self._target)
-        _respond(control, self._bounds, self._observer.now, self._period, self._found)
+        _respond(control, self._bounds, self._observer.now, (course, tick, self._preview), self._period, self._found)
         wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
 
@@ -93,9 +99,15 @@ class Steering:
 
 
 @kernel
-def _respond(control: Any, bounds: Any, now: Any, period: float, found: Any) -> None:
+def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float, found: Any) -> None:
     known, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
-    wanted, low, high, plus, minus = respond(control, known, x[0], x[1], (bound[0], bound[1]), 0.0, period)
+    course, tick, preview = to_follow
+    for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
+        control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
+        if ahead > 0:
+            look_ahead(control, ahead, 0.0)
+    seen = Estimated(x[0], x[1], x[2])
+    wanted, low, high, plus, minus = respond(control, known, seen, (bound[0], bound[1]), 0.0, period)
     row[0] = wanted
     row[1] = torque_of(x[0], known, plus, minus)
     row[2] = plus

@@ -17,7 +17,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.trial.patience import Meanwhile
 from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
-from wristctl.vision.camera import DeviceCamera
+from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
 
@@ -80,7 +80,7 @@ class EmulatedTestbed:
             self._tracking.close()
         kind = ThreadedTracking if isinstance(self._bench, RealTimeBench) else InlineTracking
         tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
-        self._tracking = kind(self._bench.camera, tracker, self._keep)
+        self._tracking = kind(self._bench.camera, tracker, self._keep, self.transport.now)
         return self._tracking
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
-
+from wristctl.trial.camera_truth import CameraTruth
 from wristctl.vision.camera import Camera, Frame
-from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
+from wristctl.vision.marker import Sighting, Tracker
 
 Kept = Callable[[Frame, Sighting], None]
 """Takes a frame and what was seen in it, to keep it."""
@@ -32,13 +30,13 @@ class Tracking(Protocol):
 
 
 class InlineTracking:
-    """Looks when asked: in virtual time, where looking takes none.
+    """Looks when asked: in virtual time, where looking takes none. `now` is the clock of the camera's times."""
 
-    A sensor's noise makes every picture another, so the same bytes again tell of a stuck camera, and no angle.
-    """
-
-    def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
-        self._camera, self._tracker, self._keep = camera, tracker, keep
+    def __init__(
+        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._camera, self._tracker, self._keep, self._now = camera, tracker, keep, now
+        self._truth = CameraTruth()
         self.frame: Frame | None = None
         """The newest."""
         self.zero = 0.0
@@ -48,9 +46,8 @@ class InlineTracking:
         frame = self._camera.newest()
         if frame is None:
             return []
-        seen = self._tracker.see(frame)
-        if self.frame is not None and np.array_equal(frame.image, self.frame.image):
-            seen = seen._replace(theta=math.nan, verdict=SightingVerdict.FROZEN)
+        came = self._now()
+        seen = self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
         self.frame, seen = frame, seen._replace(theta=seen.theta - self.zero)
         if self._keep is not None:
             self._keep(frame, seen)
@@ -66,8 +63,10 @@ class ThreadedTracking:
     A frame is kept once the loop can have its angle: drawing and encoding it takes milliseconds.
     """
 
-    def __init__(self, camera: Camera, tracker: Tracker, keep: Kept | None = None) -> None:
-        self._inner, self._keep = InlineTracking(camera, tracker), keep
+    def __init__(
+        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._inner, self._keep = InlineTracking(camera, tracker, now=now), keep
         self.zero = 0.0
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None

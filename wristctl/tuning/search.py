@@ -1,27 +1,30 @@
-"""Search for gains: every candidate of an iteration on every tuning scenario, as one batch of lanes."""
+"""Search for gains: every candidate of an iteration on every case, as one batch of lanes, and a choice among the best.
+
+The same cases, budget, optimiser and starts for every law. What a search ends with is chosen on cases that it has not
+seen, among its best candidates and the law's presets, so that gains are not the luck of their cases.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.control import Objective, TuneSettings
+from wristctl.config.control import TuneSettings
 from wristctl.config.errors import UserError, meant
-from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
 from wristctl.simulation.batch import sample_period
-from wristctl.simulation.closed_loop import scenario_of, trajectory
+from wristctl.simulation.cases import Case
+from wristctl.simulation.closed_loop import scenario_of
+from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.simulation.draws import Draws, is_random
-from wristctl.simulation.metrics import METRICS, of_trajectory
-from wristctl.simulation.reference import Motion, motion
-from wristctl.simulation.rollout import rollout
-from wristctl.simulation.worlds import loops_of, plant_of
+from wristctl.simulation.reference import motion
+from wristctl.simulation.worlds import loops_of
+from wristctl.tuning.objective import Judge
 from wristctl.tuning.optimisers import OPTIMISERS
 from wristctl.tuning.space import GainSpace
 from wristctl.wrist.kinematics import Inverse
@@ -30,35 +33,48 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+class Tried(NamedTuple):
+    """Every candidate so far, of I iterations with P candidates of g gains, one search after the other."""
+
+    values: Array
+    """Objective of every candidate, (I, P)."""
+    gains: Array
+    """(I, P, g)"""
+
+
+class Finalist(NamedTuple):
+    """Gains that were judged anew."""
+
+    gains: tuple[float, ...]
+    origin: str
+    """`search`, or the preset's name."""
+    objective: float
+    """On the cases of the search."""
+    validated: float
+    """On those that it had not seen."""
+
+
 @dataclass(frozen=True)
 class Search:
-    """What a search found, and its course over I iterations of P candidates with g gains."""
+    """What a search found, and its course."""
 
     controller: str
     gains: dict[str, float]
     objective: float
+    """Of the gains, on the cases that they were chosen by."""
     evaluations: int
-    values: Array
-    """Objective of every candidate, (I, P); inf where a rollout failed."""
-    tried: Array
-    """Gains of every candidate, (I, P, g)."""
+    tried: Tried
+    restarts: int
+    finalists: tuple[Finalist, ...] = ()
+    """Best first; none as long as it goes on."""
 
     @property
     def best_so_far(self) -> Array:
-        """Least objective up to each iteration, (I,)."""
-        return np.minimum.accumulate(self.values.min(axis=1))
-
-
-def objective(metrics: Mapping[str, Array], failed: NDArray[np.bool_], weights: Objective, horizon: float) -> Array:
-    """Weighted sum of metrics (count,) for each rollout, inf where it failed.
-
-    What never happens (nan) counts what its metric says, a settling time the whole horizon; without that it has failed.
-    """
-    value = np.zeros(len(failed))
-    for name, weight in weights.weights().items():
-        never, own = METRICS[name].never, metrics[name]
-        value = value + weight * (own if never is None else np.where(np.isnan(own), never(horizon), own))
-    return np.where(failed | np.isnan(value), np.inf, value)
+        """Least objective up to each iteration of each search, (restarts, iterations of one); nan where not begun."""
+        least = self.tried.values.min(axis=1)
+        each = -(-len(least) // self.restarts)
+        padded = np.append(least, np.full(each * self.restarts - len(least), np.nan)).reshape(self.restarts, each)
+        return np.minimum.accumulate(padded, axis=1)
 
 
 def check_loops(settings: TuneSettings) -> None:
@@ -75,104 +91,160 @@ def check_tunable(controller: Controller) -> None:
         raise UserError(f"{controller.name} has no gains to tune", fix="leave it out")
 
 
-class Evaluator:
-    """Objective of candidate gains of one controller, averaged over the study's tuning scenarios and repetitions.
+def tuning_cases(study: Study, network: Inverse | None = None) -> tuple[list[Case], list[Case]]:
+    """What gains are searched on, and what the best of them are chosen by: other worlds, or other noise.
 
-    All candidates of all iterations meet the same noise and plants.
+    The latter are none where nothing is random.
     """
+    settings = study.tune
+    if settings.worlds.family:
+        name = settings.worlds.family
+        family = study.families[name]
+        draws = settings.worlds.draws, settings.worlds.validation
+        return (
+            drawn_cases(family, name, "tune", study.seed, draws[0], study.wrist, network),
+            drawn_cases(family, name, "validation", study.seed, draws[1], study.wrist, network),
+        )
+    check_loops(settings)
+    cases = _scenarios(study, Draws(study.seed, "tuning"), settings.repetitions, network)
+    drawn = any(is_random(settings.loops[each.loop]) for each in settings.scenarios)
+    return cases, _scenarios(
+        study, Draws(study.seed, "validation"), settings.worlds.validation, network
+    ) if drawn else []
 
-    def __init__(self, study: Study, controller: Controller, network: Inverse | None = None) -> None:
-        check_loops(study.tune)
-        self.study, self.controller = study, controller
-        self.draws = Draws(study.seed, "tuning")
-        self.by_loop = {}
-        for name, loop in study.tune.loops.items():
-            chosen = [scenario.reference for scenario in study.tune.scenarios if scenario.loop == name]
-            period = sample_period(loop.control_period)
-            motions = [motion(reference, study.wrist, study.tune.horizon, period, network) for reference in chosen]
-            if motions:
-                self.by_loop[name] = motions, [scenario_of(reference, "ulnar") for reference in chosen]
 
-    def __call__(self, gains: Array) -> Array:
-        """Objective (P,) of gains (P, g)."""
-        total, count = np.zeros(len(gains)), 0
-        for name, (motions, scenarios) in self.by_loop.items():
-            total += self._on(self.study.tune.loops[name], motions, scenarios, gains)
-            count += len(motions)
-        return total / count
-
-    def _on(self, loop: Loop, motions: list[Motion], scenarios: list[str], gains: Array) -> Array:
-        """Objective of each candidate, the mean over repetitions, summed over a loop's scenarios, (P,)."""
-        settings, wrist = self.study.tune, self.study.wrist
-        times = settings.repetitions if is_random(loop) else 1
-        loops = loops_of(loop, [self.draws.plant(each) for each in range(times)])
-        count, lanes = len(motions), len(gains) * len(motions)
-        which = np.repeat(np.tile(np.arange(count), len(gains)), times)
-        streams = [self.draws.camera(scenario, k) for scenario in scenarios for k in range(times)] * len(gains)
-        chosen: Loop | list[Loop] = loop if all(each is loop for each in loops) else loops * lanes
-        recorded = [name for name in settings.objective.weights() if METRICS[name].of_trajectory is not None]
-        outcome = rollout(
-            self.controller, np.repeat(gains, count * times, axis=0), motions, which, chosen, wrist,
-            streams=streams, record=bool(recorded),
-        )  # fmt: skip
-        metrics = dict(outcome.metrics)
-        if recorded:
-            plants = [plant_of(wrist, each.plant) for each in loops]
-            courses = [
-                trajectory(outcome, lane, motions[which[lane]], plants[lane % times], loop.plant.model)
-                for lane in range(len(which))
-            ]
-            metrics |= {name: np.array([of_trajectory(each)[name] for each in courses]) for name in recorded}
-        value = objective(metrics, outcome.failed, settings.objective, settings.horizon)
-        total: Array = value.reshape(len(gains), count * times).sum(axis=1) / times
-        return total
+def _scenarios(study: Study, draws: Draws, repetitions: int, network: Inverse | None) -> list[Case]:
+    """Each scenario as often as asked for, where that makes a difference."""
+    settings, cases = study.tune, list[Case]()
+    for cell, scenario in enumerate(settings.scenarios):
+        loop = settings.loops[scenario.loop]
+        times = repetitions if is_random(loop) else 1
+        period, name = sample_period(loop.control_period), scenario_of(scenario.reference, "ulnar")
+        followed = motion(scenario.reference, study.wrist, settings.horizon, period, network)
+        for k, own in enumerate(loops_of(loop, [draws.plant(each) for each in range(times)])):
+            cases.append(Case(own, followed, draws.camera(name, k), cell))
+    return cases
 
 
 def search(
     study: Study,
     controller: Controller,
-    rng: np.random.Generator,
-    network: Inverse | None = None,
+    streams: Callable[[str], tuple[int, ...]],
+    judges: tuple[Judge, Judge | None],
     progress: Callable[[Search], None] | None = None,
+    known: Tried | None = None,
 ) -> Search:
-    """Tune one controller with the study's optimiser, budget and objective, from the middle of its box.
+    """Tune one controller with the study's optimiser, budget and objective.
 
-    `progress` gets the search so far after every iteration, so that an interrupted one loses nothing.
+    `judges` are of the cases to search on and of those to choose by, None where there are none. `streams` gives the
+    entropy of each of the searches by its name. `progress` gets the search so far after every iteration, so that an
+    interrupted one loses nothing; `known` is what such a one had tried, which is not run again. Raises UserError where
+    that is of another search.
     """
     check_tunable(controller)
-    settings = study.tune
-    space, evaluate = GainSpace.of(controller.gains), Evaluator(study, controller, network)
-    start = np.full(len(controller.gains), 0.5)
-    optimiser = OPTIMISERS[settings.optimiser](len(start), settings.candidates, start, rng)
-    values, tried = [], []
-    for _ in range(settings.iterations):
-        gains = space.gains(optimiser.ask())
-        value = evaluate(gains)
-        optimiser.tell(value)
+    settings, space, (judge, choose) = study.tune, GainSpace.of(controller.gains), judges
+    values, tried = list[Array](), list[Array]()
+    for gains, tell in _searches(settings, controller, space, streams):
+        at = len(values)
+        if known is not None and at < len(known.values):
+            if not np.array_equal(gains, known.gains[at]):
+                what = f"the run to resume tried other gains of {controller.name} in iteration {at}"
+                raise UserError(what, "tune.resume", "the settings, seed and version that it had")
+            value = known.values[at]
+        else:
+            value = judge(controller, gains)
+        tell(value)
         values.append(value)
         tried.append(gains)
-        found = _found(controller, np.array(values), np.array(tried))
+        found = _found(controller, Tried(np.array(values), np.array(tried)), settings.restarts)
         if progress is not None:
             progress(found)
-    return found
+    return _chosen(controller, found, judge, choose, settings.finalists)
 
 
-def _found(controller: Controller, values: Array, tried: Array) -> Search:
-    iteration, candidate = np.unravel_index(int(np.argmin(values)), values.shape)
-    best = tried[iteration, candidate]
-    gains = dict(zip(controller.gains, map(float, best), strict=True))
-    return Search(controller.name, gains, float(values.min()), values.size, values, tried)
+def _searches(
+    settings: TuneSettings, controller: Controller, space: GainSpace, streams: Callable[[str], tuple[int, ...]]
+) -> Iterator[tuple[Array, Callable[[Array], None]]]:
+    """The candidates (P, g) of each iteration of each search, and what to tell of their values."""
+    for restart in range(settings.restarts):
+        start = _start(controller, space) if restart == 0 else np.full(len(controller.gains), 0.5)
+        name = f"search {controller.name}" + (f" {restart}" if restart else "")
+        rng = np.random.default_rng(streams(name))
+        optimiser = OPTIMISERS[settings.optimiser](len(start), settings.candidates, start, rng)
+        for _ in range(settings.iterations):
+            yield space.gains(optimiser.ask()), optimiser.tell
+
+
+def _presets(controller: Controller, space: GainSpace) -> dict[str, Array]:
+    """The presets within the search box, by name, each (g,)."""
+    given = {name: np.array(controller.values(each)) for name, each in controller.presets.items()}
+    return {name: each for name, each in given.items() if ((each >= space.low) & (each <= space.high)).all()}
+
+
+def _start(controller: Controller, space: GainSpace) -> Array:
+    """A preset in the unit box: the last, which is for the hardest conditions; the middle where there is none."""
+    presets = list(_presets(controller, space).values())
+    return np.clip(space.unit(presets[-1]), 0.0, 1.0) if presets else np.full(len(space.names), 0.5)
+
+
+def _found(controller: Controller, tried: Tried, restarts: int) -> Search:
+    at = np.unravel_index(int(np.argmin(tried.values)), tried.values.shape)
+    gains = dict(zip(controller.gains, map(float, tried.gains[at]), strict=True))
+    return Search(controller.name, gains, float(tried.values.min()), tried.values.size, tried, restarts)
+
+
+def _chosen(controller: Controller, found: Search, judge: Judge, choose: Judge | None, count: int) -> Search:
+    """The best on the cases to choose by, of the search's best candidates and the presets."""
+    order = np.argsort(found.tried.values, axis=None, kind="stable")
+    flat = found.tried.gains.reshape(-1, len(controller.gains))
+    gains = list(dict.fromkeys(tuple(map(float, flat[at])) for at in order))[:count]
+    origins = ["search"] * len(gains)
+    for name, each in _presets(controller, GainSpace.of(controller.gains)).items():
+        gains.append(tuple(map(float, each)))
+        origins.append(name)
+    searched = judge(controller, np.array(gains))
+    validated = searched if choose is None else choose(controller, np.array(gains))
+    every = [Finalist(*each) for each in zip(gains, origins, map(float, searched), map(float, validated), strict=True)]
+    ordered = tuple(sorted(every, key=lambda each: each.validated))
+    best = dict(zip(controller.gains, ordered[0].gains, strict=True))
+    return Search(
+        controller.name, best, ordered[0].validated, found.evaluations, found.tried, found.restarts, ordered
+    )  # fmt: skip
 
 
 def history(found: Search) -> pd.DataFrame:
-    """Every candidate of a search: iteration, candidate, objective and gains."""
+    """Every candidate of every search: restart, iteration, candidate, objective and gains."""
     import pandas as pd
 
-    iterations, candidates = found.values.shape
+    iterations, candidates = found.tried.values.shape
+    each = -(-iterations // found.restarts)
+    at = np.repeat(np.arange(iterations), candidates)
     columns = {
-        "iteration": np.repeat(np.arange(iterations), candidates),
+        "restart": at // each,
+        "iteration": at % each,
         "candidate": np.tile(np.arange(candidates), iterations),
-        "objective": found.values.ravel(),
+        "objective": found.tried.values.ravel(),
     }
-    gains = np.concatenate(found.tried).T
+    gains = np.concatenate(found.tried.gains).T
     return pd.DataFrame(columns | dict(zip(found.gains, gains, strict=True)))
+
+
+def tried_of(table: pd.DataFrame, gains: Sequence[str]) -> Tried:
+    """What a history says was tried, as far as its iterations are whole."""
+    candidates = int(table["candidate"].max()) + 1
+    whole = len(table) // candidates
+    rows = table.iloc[: whole * candidates]
+    values = rows["objective"].to_numpy(float).reshape(whole, candidates)
+    return Tried(values, rows[list(gains)].to_numpy(float).reshape(whole, candidates, len(gains)))
+
+
+def finalists(found: Search) -> pd.DataFrame:
+    """The gains that were judged anew, best first."""
+    import pandas as pd
+
+    rows = [
+        {"origin": each.origin, "objective": each.objective, "validated": each.validated}
+        | dict(zip(found.gains, each.gains, strict=True))
+        for each in found.finalists
+    ]
+    return pd.DataFrame(rows)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.vision.raw_video import Video
 
 _SPREAD, _REFUSED = 6, 3
 _BASE, _TIP, _BAD, _PAPER = (178, 114, 0), (115, 158, 0), (0, 94, 213), (255, 255, 255)
@@ -62,21 +63,15 @@ class Picked:
 
 
 class AnnotatedVideo:
-    """An annotated video as Motion JPEG, which every build of OpenCV can write."""
+    """An annotated video."""
 
     def __init__(self, file: Path, frame_rate: float) -> None:
-        self._file, self._rate = file, frame_rate
-        self._writer: cv2.VideoWriter | None = None
+        self._video = Video(file, frame_rate)
 
     def add(self, frame: Frame, sighting: Sighting) -> None:
         """The next frame, annotated."""
-        if self._writer is None:
-            height, width = frame.image.shape
-            code = cv2.VideoWriter.fourcc(*"MJPG")
-            self._writer = cv2.VideoWriter(str(self._file), code, self._rate, (width, height))
-        self._writer.write(annotate(frame.image, sighting))
+        self._video.write(annotate(frame.image, sighting))
 
     def close(self) -> None:
         """Finish the file."""
-        if self._writer is not None:
-            self._writer.release()
+        self._video.close()

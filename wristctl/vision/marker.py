@@ -16,6 +16,8 @@ from wristctl.vision.view import View
 
 _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
+_LOOK_ROUND = 1.0
+"""Seconds between two searches of the whole picture for a second marker of the same id."""
 
 
 class SightingVerdict(StrEnum):
@@ -30,6 +32,7 @@ class SightingVerdict(StrEnum):
     SWAPPED = "swapped"
     JUMP = "jump"
     FROZEN = "frozen"
+    STAMP = "stamp"
 
 
 MEANING = {
@@ -41,7 +44,8 @@ MEANING = {
     SightingVerdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
     SightingVerdict.SWAPPED: "the markers have changed places",
     SightingVerdict.JUMP: "the angle has changed faster than the motors can move the wrist",
-    SightingVerdict.FROZEN: "the picture is the one before, byte for byte: the camera is stuck (in trials only)",
+    SightingVerdict.FROZEN: "picture, or corners to 1/1000 px, of a moment ago: the camera repeats itself (in trials)",
+    SightingVerdict.STAMP: "the driver's time stamp or count stands still, goes back or is of the future (in trials)",
 }
 
 
@@ -59,6 +63,8 @@ class Sighting(NamedTuple):
     """(2, 4, 2) [px] of the base's and the tip's marker, nan where it is not seen"""
     size: float = math.nan
     """Of the tip's marker over the base's, by the edges that a bend across the plane does not foreshorten"""
+    came: float = math.nan
+    """When the frame was there to be looked at [s]; nan in recordings"""
 
 
 class _Base(NamedTuple):
@@ -73,7 +79,8 @@ class Tracker:
     """Follows the two markers; `zero` [rad] is the angle between them on the straight wrist.
 
     The base is clamped, so its place is averaged over `base_memory` and believed for as long while it is not seen.
-    Markers are looked for around their last place, and in the whole picture where they are not found there.
+    Markers are looked for around their last place, and in the whole picture where they are not found there, and once a
+    second for others of the same id.
     """
 
     def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
@@ -82,6 +89,7 @@ class Tracker:
         self._last_seen: dict[int, Array] = {}
         self._base: _Base | None = None
         self._used: tuple[float, float] | None = None
+        self._look_round = -math.inf
 
     def see(self, frame: Frame) -> Sighting:
         """The angle in a frame; frames come in the order of time. Raises UserError for pictures of another size."""
@@ -103,11 +111,22 @@ class Tracker:
             near = self._detector.around(frame.image, corners)
             if number in near:
                 found[number] = near[number]
-        if len(found) < 2:
-            everywhere = self._detector.everywhere(frame.image)
-            found = {number: each for number, each in everywhere.items() if number in wanted}
+        if len(found) < 2 or frame.time >= self._look_round:
+            self._look_round = frame.time + _LOOK_ROUND
+            everywhere = {
+                number: self._followed(number, each)
+                for number, each in self._detector.everywhere(frame.image).items()
+                if number in wanted
+            }
+            twice = {number: each for number, each in everywhere.items() if len(each) > 1}
+            found = {**found, **twice} if len(found) == 2 else everywhere
         self._last_seen = {number: each[0] for number, each in found.items()}
         return found
+
+    def _followed(self, number: int, seen: list[Array]) -> list[Array]:
+        """Those of this id, the one nearest to its last place first."""
+        last = self._last_seen.get(number)
+        return seen if last is None else sorted(seen, key=lambda each: float(np.abs(each - last).max()))
 
     def _judge(self, time: float, bases: list[Array], tips: list[Array]) -> tuple[SightingVerdict, float]:
         if len(bases) > 1 or len(tips) > 1:

@@ -16,8 +16,8 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, turn
 from wristctl.lanes.rows import lanes_like, planes_like
-from wristctl.wrist.arcs import Chords, chords
-from wristctl.wrist.tendons import tendon_torques
+from wristctl.wrist.arcs import Chords
+from wristctl.wrist.chain import chords, spring, tendon_torques
 
 
 @compiled
@@ -72,7 +72,7 @@ def bias(segment: Any, theta: Any, omega: Any, arc: Any, tangent: Any, pull: Any
     torque = dot(turn(hand), beyond)
     beyond = beyond - planar(segment.force_x, segment.force_y)
     for k in range(len(z) - 1, -1, -1):
-        passive = segment.stiffness * theta[k] + segment.damping * omega[k] - pull[k]
+        passive = spring(segment, k) * theta[k] + segment.damping * omega[k] - pull[k]
         r[k] = torque + dot(dz[k], beyond + 0.5 * force[k]) + passive
         torque = torque + dot(turn(z[k]), beyond + 0.5 * force[k])
         beyond = beyond + force[k]
@@ -83,7 +83,7 @@ def equation_of_motion(segment: Any, theta: Any, omega: Any, plus: Any, minus: A
     """M and the remaining terms of E6, so that M theta'' + r = 0."""
     arc = Chords(planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta))
     pull, slope = lanes_like(theta), lanes_like(theta)
-    tangent = chords(theta, segment.length, arc)
-    tendon_torques(theta, segment, plus, minus, pull, slope)
+    tangent = chords(segment, theta, arc)
+    tendon_torques(segment, theta, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)
     bias(segment, theta, omega, arc, tangent, pull, r)

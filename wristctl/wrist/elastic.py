@@ -15,8 +15,8 @@ from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import rounded, where
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like
+from wristctl.wrist.chain import lengths, moment_arms
 from wristctl.wrist.tendon_friction import bristle, bristle_slope, capstan
-from wristctl.wrist.tendons import lengths, moment_arms
 
 
 class Nonideal(NamedTuple):
@@ -87,7 +87,7 @@ def travel(segment: Any, theta: Any) -> Any:
     zero = 0.0 * segment.length
     plus, minus, bend = zero, zero, zero
     for k in range(len(theta)):
-        path_plus, path_minus = lengths(theta[k], segment)
+        path_plus, path_minus = lengths(segment, theta[k])
         plus = plus + segment.length - path_plus
         minus = minus + segment.length - path_minus
         bend = bend + abs(theta[k])
@@ -172,7 +172,7 @@ def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, path
         zero = 0.0 * segment.length
         speed_plus, speed_minus = zero, zero
         for k in range(n):
-            arm_plus, arm_minus = moment_arms(theta[k], segment)
+            arm_plus, arm_minus = moment_arms(segment, theta[k])
             ahead[k] = arm_plus
             behind[k] = arm_minus
             speed_plus = speed_plus + arm_plus * omega[k]

@@ -14,13 +14,13 @@ from typing import Any
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
-from wristctl.wrist.arcs import Chords, chords
+from wristctl.wrist.arcs import Chords
+from wristctl.wrist.chain import chords, tendon_torques
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.elastic import pulls_along, pulls_at_start, stiffen
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.linear import factorise, solve
 from wristctl.wrist.plant import path_along, path_before
-from wristctl.wrist.tendons import tendon_torques
 from wristctl.wrist.yielding import yield_, yield_jacobians
 
 
@@ -63,10 +63,10 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
     k3, l3, k4, l4 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
 
-    tangent = chords(theta, segment.length, arc)
+    tangent = chords(segment, theta, arc)
     path = path_before(tendons, segment, theta)
     plus, minus = pulls_at_start(tendons, given, path)
-    tendon_torques(theta, segment, plus, minus, pull, slope)
+    tendon_torques(segment, theta, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)
     bias(segment, theta, omega, arc, tangent, pull, a0)
     yield_(tendons, segment, theta, omega, given, a0)

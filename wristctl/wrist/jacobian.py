@@ -12,6 +12,7 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import dot, planar, turn
 from wristctl.lanes.rows import planes_like
+from wristctl.wrist.chain import spring
 
 
 @compiled
@@ -83,7 +84,7 @@ def residual_jacobians(
             by_rate[i, j] = 2.0 * (turned + dot(moment, sweep[j]) + dot(reach, own_sweep[j]))
         curved = dot(d2z[j], beyond + 0.5 * force[j]) - dot(turn(dz[j]), beyond)
         inertial = dot(moment_j, field[j]) + 0.5 * dot(own, own_field[j])
-        by_theta[j, j] = curved + inertial + tip_turned + segment.stiffness - slope[j]
+        by_theta[j, j] = curved + inertial + tip_turned + spring(segment, j) - slope[j]
         turned = stretch - dot(pivot[j], momentum) + dot(moment_j, sweep[j]) + 0.5 * dot(own, own_sweep[j])
         by_rate[j, j] = 2.0 * turned + segment.damping
         m0 = m0 + segment.mass

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.arrays import Array
+from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import turn
 from wristctl.lanes.parts import replacing
-from wristctl.lanes.rows import planes_like
-from wristctl.wrist.arcs import ARC_LIMIT, Chords, chords, tip
+from wristctl.wrist.arcs import ARC_LIMIT, tip
+from wristctl.wrist.chain import angle_along, tip_derivatives
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
@@ -21,16 +21,6 @@ from wristctl.wrist.shape import arcs_backbone
 from wristctl.wrist.statics import equilibrium
 
 _load = replacing("stiffness", "force_y")
-
-
-@compiled
-def _tip_angle(plant: Any, q: Any, rate: Any) -> Any:
-    zero = 0.0 * plant.length
-    angle, turning = zero, zero
-    for k in range(len(q)):
-        angle = angle + q[k]
-        turning = turning + rate[k]
-    return angle, turning
 
 
 @compiled
@@ -51,16 +41,10 @@ def _tip_pose(plant: Any, q: Any) -> Any:
     return tip(q, plant.length)
 
 
-@compiled
-def _tip_jacobian(plant: Any, q: Any, place: Any, angle: Any) -> None:
-    """Segment k turns all that lies beyond it: d(tip)/d(theta_k) = dz_k + i (tip - end of segment k)."""
-    arc = Chords(planes_like(q), planes_like(q), planes_like(q), planes_like(q))
-    chords(q, plant.length, arc)
-    beyond = 0.0 * plant.length * arc.z[0]
-    for k in range(len(q) - 1, -1, -1):
-        place[k] = arc.dz[k] + turn(beyond)
-        angle[k] = 1.0 + 0.0 * plant.length
-        beyond = beyond + arc.z[k]
+def _values(wrist: WristParameters, n: int) -> Array:
+    if n > 1 and wrist.taper != 1.0:
+        raise UserError("segments of plant pcc are equally stiff", "taper", "plant.model: hinges, or no taper")
+    return segments(wrist, n)
 
 
 def _taut(wrist: WristParameters, theta: Array) -> Array:
@@ -73,14 +57,14 @@ PCC = PlantModel(
     name="pcc",
     parameters=Segments,
     coordinates=lambda n: n,
-    values=segments,
+    values=_values,
     advance=step,
-    tip_angle=_tip_angle,
+    tip_angle=angle_along,
     travel=travel,
     within=_within,
     disturbed=_disturbed,
     tip_pose=_tip_pose,
-    tip_jacobian=_tip_jacobian,
+    tip_jacobian=tip_derivatives,
     angle=lambda theta: theta.sum(axis=-1),
     tips=lambda wrist, theta: chain_tip(theta, wrist.length),
     taut=_taut,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -44,14 +45,19 @@ def least_stiffness(wrist: WristParameters, n: int) -> float:
 
 
 def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
-    """Segment angles (n,) [rad] at rest under tensions [N per tendon, + and - side], by Newton's method.
+    """Segment angles (n,) [rad] at rest under tensions [N per tendon, + and - side].
 
     UserError where the wrist buckles, so that no stable equilibrium is found.
     """
-    still, theta = np.zeros(n), np.zeros(n)
-    pulls = TENDONS_PER_SIDE * np.asarray(tensions)
+    still, pulls = np.zeros(n), TENDONS_PER_SIDE * np.asarray(tensions)
+    return settled(lambda theta: linearised(segments(wrist, n), theta, still, still, pulls)[:2], n, tensions)
+
+
+def settled(balance: Callable[[Array], tuple[Array, Array]], n: int, tensions: tuple[float, float]) -> Array:
+    """Where a balance of n torques, which gives itself and its derivative, is none and stable, by Newton's method."""
+    theta = np.zeros(n)
     for _ in range(100):
-        r, tangent, _ = linearised(segments(wrist, n), theta, still, still, pulls)
+        r, tangent = balance(theta)
         change = np.linalg.solve(tangent, -r)
         theta = theta + change * min(1.0, 0.3 / max(1e-300, float(np.abs(change).max())))
         if np.abs(change).max() < 1e-13:

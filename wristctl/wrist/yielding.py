@@ -11,6 +11,7 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where
+from wristctl.wrist.chain import spring
 from wristctl.wrist.elastic import PATH, row_of
 
 
@@ -38,7 +39,7 @@ def _yield(nonideal: Any, state: Any, segment: Any, theta: Any, omega: Any, spri
     if nonideal is not None:
         for k in range(len(theta)):
             torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
-            r[k] = r[k] + torque - nonideal.spring_creep * segment.stiffness * state[springs + k]
+            r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]
 
 
 @compiled

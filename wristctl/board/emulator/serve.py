@@ -24,6 +24,8 @@ from wristctl.config.errors import UserError
 log = logging.getLogger(__name__)
 
 _QUANTUM, _IDLE_QUANTUM = 0.0005, 0.02
+_AT_ONCE, _ON_THE_WAY = 4096, 1024
+"""Bytes taken from clients in one go; bytes that wait for the chip before clients have to."""
 _FURTHEST_BEHIND = 0.1
 """Seconds that the chip may lag behind real time before that time is given up."""
 
@@ -74,7 +76,7 @@ class PtyLine:
     def receive(self) -> bytes:
         """What the client has sent."""
         with contextlib.suppress(OSError):
-            return os.read(self._master, 4096)
+            return os.read(self._master, _AT_ONCE)
         return b""
 
     def send(self, data: bytes) -> None:
@@ -113,8 +115,10 @@ class TcpLine:
         """What the clients have sent."""
         received = b""
         for client in list(self._clients):
+            if len(received) >= _AT_ONCE:
+                break
             try:
-                data = client.recv(4096)
+                data = client.recv(_AT_ONCE)
             except BlockingIOError:
                 continue
             except OSError:
@@ -145,6 +149,8 @@ def serve(
 ) -> None:
     """Run the chip in real time on this line for as long as `running` says; a program that crashes is reset.
 
+    Clients that say more than the line carries have to wait, as at a real port.
+
     `watch` is told what the chip's latches did, and when its clock was 0 (`time.monotonic`): later where it lagged.
     """
     start = time.monotonic() - chip.cycles / FREQUENCY
@@ -153,8 +159,10 @@ def serve(
         before, there = there, line.wait(_QUANTUM if there else _IDLE_QUANTUM)
         if there and not before:
             chip.reset()
-        if there:
+        if there and chip.bytes_coming < _ON_THE_WAY:
             chip.write(line.receive())
+        elif there:
+            time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
         try:

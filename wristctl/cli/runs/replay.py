@@ -40,13 +40,16 @@ def replay(
 ) -> None:
     """Run a run again in a scratch folder, and say of each file whether it came out the same (exit code 3 if not).
 
-    The scratch folder is kept where something differs.
+    The scratch folder is kept where something differs. A run on real hardware is refused: nothing here moves a motor.
     """
     run = open_run(ref, out)
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
     if run.kind not in KINDS:  # it becomes a part of a command
         raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
+    if _moved_motors(run) or any(_key(text) == "port" for text in override or []):
+        fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
+        raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
     changed = changed_inputs(run)
     if changed:
         return _conclude(run, None, [], changed, as_json)
@@ -67,6 +70,15 @@ def replay(
     found = verdicts(run, ended[0])
     alike = all(each.verdict in _SAME for each in found)
     _conclude(run, scratch, found, [] if alike else causes(run, ended[0]), as_json)
+
+
+def _moved_motors(run: Run) -> bool:
+    """Whether its command would open a real board's port."""
+    return getattr(getattr(run.config, run.kind.replace("-", "_"), None), "port", None) is not None
+
+
+def _key(override: str) -> str:
+    return override.partition("=")[0].strip().rpartition(".")[2]
 
 
 def _again(run: Run, scratch: Path, overrides: list[str]) -> int:

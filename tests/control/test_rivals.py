@@ -1,0 +1,178 @@
+"""What the laws promise that an expert would set against ours, and the rungs of the ladder above feedforward."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are
+from scipy.signal import lsim
+
+from tests.control.test_laws import torque
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Plant, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller, ahead
+from wristctl.control.lqi import spectral_factor
+from wristctl.control.table import controller, gains_of
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.rows import rows_of
+from wristctl.simulation.kernel import RECORDED
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import Outcome, rollout
+
+WRIST = WristParameters(gravity=(-8.0, 3.0))
+MOVE = Reference(angle_deg=30.0, duration=0.5)
+SOFTER = Loop(plant_segments=1, plant=Plant.model_validate({"stiffness": "x0.7", "payload": 0.05}))
+LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
+
+
+def followed(
+    law: Controller, gains: dict[str, float] | str, loop: Loop, reference: Reference = MOVE, horizon: float = 2.0
+) -> Outcome:
+    course = motion(reference, WRIST, horizon, max(loop.control_period, 1e-3))
+    given = np.array([gains_of(law, gains)])
+    return rollout(law, given, [course], np.zeros(1, np.int64), loop, WRIST, record=True)
+
+
+@pytest.mark.parametrize("name", ["ct-dob", "mpc", "adrc", "pid-ff", "pid-dob", "smc-dob", "lqi"])
+def test_a_wrong_model_leaves_no_error_at_rest(name: str) -> None:
+    law = controller(name)
+    gains = {**law.presets["default"], **({"Ki": 20.0} if "Ki" in law.gains else {})}
+    done = followed(law, gains, SOFTER, horizon=6.0)
+    assert not done.failed[0] and done.metrics["steady_state"][0] < 1e-5
+
+
+@pytest.mark.parametrize("name", ["computed-torque", "pd-ff"])
+def test_without_integral_or_observer_it_leaves_one(name: str) -> None:
+    assert followed(controller(name), "default", SOFTER, horizon=6.0).metrics["steady_state"][0] > 1e-3
+
+
+@pytest.mark.parametrize("name", ["ct-dob", "pd-ff", "pid-ff", "pid-dob", "lqi", "mpc"])
+def test_on_the_model_itself_the_reference_is_followed(name: str) -> None:
+    done = followed(controller(name), "default", Loop(plant_segments=1, control_period=1e-4))
+    assert done.metrics["rmse"][0] < 1e-4
+
+
+def test_the_disturbance_observer_finds_the_load() -> None:
+    """A force across the tip [N] at rest: its torque is what the reference's torque is short of."""
+    law = controller("ct-dob")
+    loop = Loop(plant_segments=1, plant=Plant.model_validate({"stiffness": "x0.8"}))
+    for bandwidth in (20.0, 1e5):
+        done = followed(law, {"w": 50.0, "zeta": 1.0, "wo": bandwidth}, loop)
+        rest = done.column("theta", 0)[-1]
+        missing = 0.2 * WRIST.stiffness * rest
+        own = followed(law, {"w": 50.0, "zeta": 1.0, "wo": bandwidth}, Loop(plant_segments=1))
+        assert own.column("torque", 0)[-1] - done.column("torque", 0)[-1] == pytest.approx(missing, rel=1e-3)
+
+
+def test_saturation_is_no_load() -> None:
+    """A step beyond what tendons reach: the observer does not take their limit for a load, and winds up none."""
+    law, step = controller("ct-dob"), Reference(kind="step", angle_deg=45.0)
+    weak = WristParameters(tension_limit=30.0)
+    course = motion(step, weak, 2.0, 1e-3)
+    loop = Loop(plant_segments=1)
+    done = [
+        rollout(each, np.array([gains_of(each, "default")]), [course], np.zeros(1, np.int64), loop, weak, record=True)
+        for each in (law, controller("computed-torque"))
+    ]
+    assert done[0].metrics["saturation"][0] > 0.01
+    assert np.ptp([each.metrics["overshoot"][0] for each in done]) < 0.5
+
+
+@pytest.mark.parametrize(("rung", "off"), [
+    ("pd-ff", {"Kp": 0.0, "Kd": 0.0}), ("pid-ff", {"Ki": 0.0}), ("pid-dob", {"wo": 0.0}), ("smc-dob", {"Ks": 0.0}),
+])  # fmt: skip
+def test_a_rung_is_the_one_below_where_its_term_is_nothing(rung: str, off: dict[str, float]) -> None:
+    """So that what a term buys is what the ladder shows."""
+    below = controller(LADDER[LADDER.index(rung) - 1])
+    shared = {"Kp": 3.0, "Ki": 2.0, "Kd": 0.2, "wo": 15.0, "Ks": 0.1, "phi": 0.5}
+    upper, lower = (
+        followed(each, {name: (shared | own)[name] for name in each.gains}, SOFTER)
+        for each, own in ((controller(rung), off), (below, {}))
+    )
+    torques = [each.column("torque_wanted", 0) for each in (upper, lower)]
+    moving = slice(-500, None) if rung == "pd-ff" else slice(None)  # feedforward alone knows no motion
+    assert np.allclose(torques[0][moving], torques[1][moving], atol=1e-12) and np.ptp(torques[0]) > 0.1
+
+
+@kernel
+def _factor(values: Any, out: Any) -> None:
+    given, found = rows_of(values), rows_of(out)
+    found[0], found[1] = spectral_factor(given[0], given[1], given[2], given[3], given[4])
+
+
+@pytest.mark.parametrize("weights", [(40.0, 40.0, 15.0), (0.1, 5.0, 30.0), (1.0, 300.0, 2.0), (500.0, 1.0, 1.0)])
+def test_the_linear_quadratic_gains_are_those_of_the_riccati_equation(weights: tuple[float, float, float]) -> None:
+    wd, wp, wi = weights
+    damping, stiffness = 35.0, 205.0
+    plant = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, -stiffness, -damping]])
+    push = np.array([[0.0], [0.0], [1.0]])
+    gains = push.T @ solve_continuous_are(plant, push, np.diag([wi**6, wp**4, wd**2]), np.eye(1))
+    found = np.zeros(2)
+    _factor(np.array([damping, stiffness, wd, wp, wi]), found)
+    assert np.array([wi**3, found[0] - stiffness, found[1] - damping]) == pytest.approx(gains.ravel(), rel=1e-6)
+
+
+def test_the_extended_observer_has_its_poles_where_it_says() -> None:
+    """The error of its angle after one period, of a wrist that it has placed wrongly, by powers of exp(-wo h)."""
+    law, memory = controller("adrc"), np.array([1.0, 0.1, 0.0, 0.0])
+    torque(law, (30.0, 200.0, 1.0), memory, theta=0.0, torque_low=0.0, torque_high=0.0)
+    pole = np.exp(-0.2)
+    assert memory[1] - 1e-3 * memory[2] + 0.5e-6 * memory[3] == pytest.approx(0.1 * pole**3, rel=1e-12)
+    assert memory[3] == pytest.approx(-0.1 * (1.0 - pole) ** 3 / 1e-6, rel=1e-12)
+
+
+def test_the_network_learns_to_follow_its_reference_model() -> None:
+    law = controller("nn-mrac")
+    sine = Reference(kind="sine", angle_deg=15.0, frequency=0.5)
+    wanted, w = motion(sine, WRIST, 8.0, 1e-3), 50.0
+    _, modelled, _ = lsim(([w * w], [1.0, 2.0 * w, w * w]), wanted.theta_ref, wanted.time)
+    error = []
+    for learning in (100.0, 1e-9):
+        gains = dict(law.presets["default"]) | {"eta": learning}
+        done = followed(law, gains, Loop(plant_segments=1), sine, horizon=8.0)
+        error.append(np.abs(done.column("theta", 0) - modelled)[4000:].mean())
+    assert error[0] < 0.02 * error[1]
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3, 2.5e-4])
+def test_a_preview_is_the_reference_to_come(period: float) -> None:
+    """Of each derivative, at samples and between them; beyond the end it stays."""
+    for value, exact in ((0, "theta_ref"), (1, "rate_ref"), (2, "acceleration_ref")):
+        looking = Controller("looking", _of(value), "test", {}, {"default": {}}, preview=8)
+        loop = Loop(plant_segments=1, control_period=period)
+        done = followed(looking, "default", loop, horizon=0.6)
+        course = motion(MOVE, WRIST, 0.6, max(period, 1e-3))
+        wanted, there = done.column("torque_wanted", 0), getattr(course, exact)
+        shift = 8 * period / max(period, 1e-3)
+        whole = int(shift)
+        assert shift == whole
+        assert np.array_equal(wanted[:-whole], there[whole:]) and (wanted[-whole:] == there[-1]).all()
+
+
+def _of(value: int) -> Any:
+    def angle(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+        return ahead(now, 8)[0]
+
+    def rate(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+        return ahead(now, 8)[1]
+
+    def acceleration(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+        return ahead(now, 8)[2]
+
+    return (angle, rate, acceleration)[value]
+
+
+def _load(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    return now.load
+
+
+@pytest.mark.parametrize("level", ["ideal", "camera"])
+def test_a_law_sees_the_load_that_the_observer_makes_out(level: str) -> None:
+    looking = Controller("loaded", _load, "test", {}, {"default": {}})
+    loop = SOFTER.model_copy(update={"control_period": 5e-3, "sensor": Sensor(level=level)})  # type: ignore[arg-type]
+    done = followed(looking, "default", loop)
+    seen, kept = done.column("torque_wanted", 0), done.column("load", 0)
+    assert "load" in RECORDED and np.array_equal(seen, kept) and (np.ptp(seen) > 0.0) == (level == "camera")

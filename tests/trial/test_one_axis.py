@@ -1,0 +1,47 @@
+"""One motor by itself: its sense and slack are found, and the wrist is bent no further than it may."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.config.hw_run import CalibrateWristSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.trial.one_axis import axis_tried
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.vision.view import View
+
+
+def bench_of(**motors: object) -> tuple[VirtualBench, EmulatedTestbed, CalibrateWristSettings]:
+    camera = {"frame_rate": 30.0}
+    given = {"bench": {"motors": motors, "person": {"takes": 0.0}, "camera": camera}, "homing": {"frames": 2}}
+    settings = CalibrateWristSettings.model_validate(given)
+    bench = VirtualBench(settings.bench, WristParameters(), 0)
+    return bench, EmulatedTestbed(bench, settings, View(), None), settings
+
+
+@pytest.mark.parametrize(("axis", "reversed_axis"), [(2, None), (0, 0)])
+def test_sense_and_slack_of_a_motor_are_found_within_two_degrees(axis: int, reversed_axis: int | None) -> None:
+    slack = (3e-4, 2e-4, 4e-4, 2.5e-4)
+    bench, testbed, settings = bench_of(slack=slack, reversed=tuple(k == reversed_axis for k in range(4)))
+    found = axis_tried(testbed, settings, axis)
+    assert found.sense == (-1 if axis == reversed_axis else 1)
+    bent = 2.0 * abs(found.bend) * WristParameters().tendon_offset  # a tendon alone bends across the plane as much
+    assert slack[axis] + bent - 5e-5 < found.taken_up < slack[axis] + 1.5 * bent + 1.2e-4
+    assert (found.bend > 0.0) == (axis in (2, 3)), "tendons 4 and 5 are on the ulnar side"
+    truth, motion = bench.truth(0.0), bench.motion()
+    assert math.radians(0.9) < abs(truth.angle).max() < math.radians(settings.max_deg)
+    assert motion.steps == (0, 0, 0, 0) and not any(motion.energised)
+    others = [step for k, step in enumerate(motion.last_step) if k != axis]
+    assert others == [None, None, None]
+
+
+def test_a_tendon_that_is_off_bends_nothing_and_that_is_said() -> None:
+    bench, testbed, settings = bench_of(slack=(0.02,) * 4)
+    short = settings.model_copy(update={"homing": settings.homing.model_copy(update={"slack": 5e-4})})
+    with pytest.raises(SafetyStop, match=r"axis 1 does not bend the wrist within 0\.5 mm"):
+        axis_tried(testbed, short, 1)
+    assert not any(bench.motion().energised)

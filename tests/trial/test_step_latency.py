@@ -1,0 +1,61 @@
+"""A camera's latency is told from what the wrist itself lags behind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from wristctl.trial.step_latency import MotorStroke, find_latency
+
+GAIN, STEP_RATE, HIGH = 1.0e-3, 1000.0, 70.0
+
+
+def strokes(
+    delay: float, rate: float, damping: float, frame_rate: float, noise: float = 5e-4, count: int = 24, seed: int = 0
+) -> list[MotorStroke]:
+    """Seen of a wrist that an independent solver moves, each from another place; frames begin anywhere."""
+    rng, made = np.random.default_rng(seed), []
+    for _ in range(count):
+        begin = rng.uniform(0.09, 0.21)
+
+        def position(time: float, begin: float = begin) -> float:
+            return float(np.clip(STEP_RATE * (time - begin), 0.0, HIGH))
+
+        def moved(time: float, state: np.ndarray) -> list[float]:
+            angle, speed = state
+            return [speed, rate**2 * (GAIN * position(time) - angle) - 2.0 * damping * rate * speed]
+
+        at = np.arange(rng.uniform(0.0, 1.0 / frame_rate), begin + 0.35, 1.0 / frame_rate)
+        seen = solve_ivp(moved, (0.0, 0.6), [0.0, 0.0], t_eval=at, rtol=1e-6, atol=1e-8, max_step=0.01)
+        polled = np.arange(0.0, begin + 0.35, 4e-3)
+        start = rng.uniform(-0.02, 0.02)
+        angle = start + seen.y[0] + noise * rng.standard_normal(len(at))
+        known = at + delay < polled[-1]
+        made.append(
+            MotorStroke(polled, np.array([40.0 + position(t) for t in polled]), (at + delay)[known], angle[known])
+        )
+    return made
+
+
+@pytest.mark.parametrize(
+    ("delay", "rate", "damping", "frame_rate"),
+    [(0.0, 35.0, 0.4, 15.0), (0.06, 35.0, 0.4, 15.0), (0.13, 70.0, 0.2, 60.0), (0.06, 25.0, 1.5, 60.0)],
+)
+def test_the_delay_is_found_to_two_milliseconds_whatever_the_wrist_does(
+    delay: float, rate: float, damping: float, frame_rate: float
+) -> None:
+    found = find_latency(strokes(delay, rate, damping, frame_rate))
+    assert found.delay == pytest.approx(delay, abs=2e-3)
+    assert abs(found.delay - delay) < 4.0 * found.sd + 2e-4 and found.sd < 1.5e-3
+    assert found.scatter == pytest.approx(5e-4, rel=0.3)
+
+
+def test_a_motor_that_reels_in_the_other_way_is_seen_as_late() -> None:
+    turned = [each._replace(position=-each.position) for each in strokes(0.06, 35.0, 0.4, 30.0)]
+    assert find_latency(turned).delay == pytest.approx(0.06, abs=2e-3)
+
+
+def test_too_few_pictures_are_no_measurement() -> None:
+    with pytest.raises(ValueError, match="too few"):
+        find_latency(strokes(0.0, 35.0, 0.4, 15.0, count=2))

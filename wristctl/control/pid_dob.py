@@ -1,0 +1,37 @@
+"""Feedforward, PID and a disturbance observer: what such an observer adds to `pid-ff`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wristctl.control import pid_ff
+from wristctl.control.disturbance_observer import VALUES, disturbance, remember
+from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.pd_ff import fed_forward_pd
+
+GAINS = pid_ff.GAINS | {"wo": Gain("rad/s", "bandwidth of the disturbance observer", 1e-1, 1e5)}
+
+
+def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """M theta_ref'' + load(theta_ref, rate_ref) - Kp e - Ki int(e) - Kd de/dt - d."""
+    found = disturbance(now, wrist, gains.wo, memory, 1)
+    integral = pid_ff.integrated(now, memory[0])
+    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found
+    memory[0] = pid_ff.held(now, torque, memory[0], integral)
+    remember(now, wrist, found, torque, memory, 1)
+    return torque
+
+
+PID_DOB = Controller(
+    name="pid-dob",
+    law=law,
+    source="baseline: what a disturbance observer adds to pid-ff",
+    gains=GAINS,
+    presets={
+        "default": {"Kp": 5.0, "Ki": 1.0, "Kd": 0.2, "wo": 20.0},
+        "stepper": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0},
+    },
+    memory=1 + VALUES,
+    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+)

@@ -1,0 +1,161 @@
+"""Many gains on many cases: what a search and a ranking are judged by.
+
+A case is a world with a motion and its noise. Whatever is tried meets the same cases (common random numbers).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.seeds import Entropy
+from wristctl.simulation.batch import sample_period
+from wristctl.simulation.closed_loop import trajectory
+from wristctl.simulation.kernel import RECORDED
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
+from wristctl.simulation.reference import Motion
+from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.worlds import plant_of
+
+_RECORDED_AT_ONCE = 12_000_000
+"""Numbers that are kept of rollouts whose samples are wanted."""
+
+
+class Case(NamedTuple):
+    """A rollout without its gains: the world, the motion, the noise; and the cell whose mean it is part of."""
+
+    loop: Loop
+    motion: Motion
+    stream: Entropy
+    cell: int
+
+    @property
+    def rests(self) -> bool:
+        """Whether the reference rests long enough to settle and then to show a swing.
+
+        On a moving one friction's kinks look like swings.
+        """
+        return self.motion.rest <= self.motion.horizon - 2.0 * WINDOW
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Metrics of every gains on every case, (P, C) each."""
+
+    metrics: dict[str, Array]
+    failed: NDArray[np.bool_]
+    lasted: Array
+    """Share of the horizon that each stayed in its range."""
+    rests: NDArray[np.bool_]
+    """Of each case, (C,)."""
+
+    @property
+    def swings(self) -> NDArray[np.bool_]:
+        """Where the reference rests and the wrist does not, (P, C)."""
+        found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
+        return found
+
+
+def measure(
+    law: Controller,
+    gains: Array,
+    cases: Sequence[Case],
+    wrist: WristParameters,
+    metrics: Sequence[str],
+    progress: Callable[[float], None] | None = None,
+) -> Measured:
+    """Run gains (P, g) of a law on all the cases."""
+    shape = len(gains), len(cases)
+    found = {name: np.empty(shape) for name in metrics}
+    failed, lasted = np.empty(shape, bool), np.empty(shape)
+    done = 0
+    for own in _alike(cases):
+        chosen = [cases[each] for each in own]
+        for first, last in _pieces(len(gains), chosen, _recorded(metrics)):
+            outcome, values = _measured(law, gains[first:last], chosen, wrist, metrics)
+            at = np.ix_(range(first, last), own)
+            for name in metrics:
+                found[name][at] = values[name].reshape(last - first, -1)
+            failed[at] = outcome.failed.reshape(last - first, -1)
+            horizon = np.array([each.motion.horizon for each in chosen])
+            lasted[at] = outcome.until.reshape(last - first, -1) / horizon
+            done += (last - first) * len(own)
+            if progress is not None:
+                progress(done / failed.size)
+    return Measured(found, failed, np.clip(lasted, 0.0, 1.0), np.array([case.rests for case in cases]))
+
+
+def _recorded(metrics: Sequence[str]) -> bool:
+    """Whether a metric needs more than sums."""
+    return any(METRICS[name].of_trajectory is not None for name in metrics)
+
+
+def _alike(cases: Sequence[Case]) -> list[list[int]]:
+    """Cases that can run in one batch: of one structure, timing and length."""
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for number, case in enumerate(cases):
+        loop = case.loop
+        levels = loop.actuator.level, loop.sensor.level, loop.sensor.frame_rate
+        key = loop.plant.model, loop.plant_segments, loop.control_period, loop.steps, *levels, len(case.motion.time)
+        groups.setdefault(key, []).append(number)
+    return list(groups.values())
+
+
+def _pieces(rows: int, cases: Sequence[Case], recorded: bool) -> list[tuple[int, int]]:
+    """Rows that are run at once: all, or as many as can be kept in memory."""
+    if not recorded:
+        return [(0, rows)]
+    columns = len(RECORDED) + cases[0].loop.plant_segments
+    each = max(1, _RECORDED_AT_ONCE // (columns * len(cases[0].motion.time) * len(cases)))
+    return [(first, min(first + each, rows)) for first in range(0, rows, each)]
+
+
+def _measured(
+    law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters, metrics: Sequence[str]
+) -> tuple[Outcome, dict[str, Array]]:
+    """The metrics (rows * cases,) of a batch."""
+    motions = list({id(case.motion): case.motion for case in cases}.values())
+    numbers = {id(each): number for number, each in enumerate(motions)}
+    rows, count = len(gains), len(cases)
+    which = np.tile([numbers[id(case.motion)] for case in cases], rows)
+    loops = [case.loop for case in cases] * rows
+    one = all(each is loops[0] for each in loops)
+    outcome = rollout(
+        law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
+        streams=[case.stream for case in cases] * rows, record=_recorded(metrics),
+    )  # fmt: skip
+    found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
+    slow = [name for name in metrics if name not in found and name != "oscillation"]
+    if "oscillation" in metrics:
+        found["oscillation"] = _oscillation(outcome, motions, which, sample_period(cases[0].loop.control_period))
+    if slow:
+        plants = [plant_of(wrist, case.loop.plant) for case in cases]
+        courses = [
+            trajectory(outcome, lane, motions[which[lane]], plants[lane % count], cases[0].loop.plant.model)
+            for lane in range(rows * count)
+        ]
+        for name in slow:
+            value = METRICS[name].of_trajectory
+            assert value is not None
+            found[name] = np.array([float(value(each)) for each in courses])
+    return outcome, found
+
+
+def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.int64], step: float) -> Array:
+    """The metric of that name, without a trajectory for each."""
+    assert outcome.samples is not None
+    theta = outcome.samples[:, :, RECORDED.index("theta")]
+    found = np.empty(len(theta))
+    for number, followed in enumerate(motions):
+        own = np.flatnonzero(which == number)
+        found[own] = oscillations(theta[own], followed.theta_ref, step)
+    return found

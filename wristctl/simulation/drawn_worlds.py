@@ -1,0 +1,66 @@
+"""The worlds of a family, drawn: each leaf, each world and each camera from a stream of its own.
+
+Another leaf, reference or world changes nothing for those that were there. What is tuned on, chosen by and judged on
+are draws of different names.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wristctl.config.families import Family
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.seeds import Entropy, stream
+from wristctl.simulation.batch import sample_period
+from wristctl.simulation.cases import Case
+from wristctl.simulation.reference import Motion, motion
+from wristctl.wrist.kinematics import Inverse
+
+
+def world_of(family: Family, name: str, split: str, seed: int, number: int) -> Loop:
+    """The world of this number in a split."""
+    return family.world({key: _share(stream(seed, _leaf(split, name, key)), number) for key in family.draw})
+
+
+def streams_of(family: Family, name: str, split: str) -> list[str]:
+    """The names of the streams that its worlds are drawn from."""
+    numbers = range(len(family.references))
+    leaves = [_leaf(split, name, key) for key in family.draw if not key.startswith("reference.")]
+    motions = [_leaf(split, name, key, at) for key in family.draw if key.startswith("reference.") for at in numbers]
+    return [*leaves, *motions, *(_camera(split, name, at) for at in numbers if family.loop.sensor.level == "camera")]
+
+
+def drawn_cases(
+    family: Family, name: str, split: str, seed: int, draws: int, wrist: WristParameters, network: Inverse | None = None
+) -> list[Case]:
+    """Every reference in each of so many worlds; the cases of a world follow one another, each a cell of its own."""
+    cases, motions = list[Case](), dict[tuple[str, float], Motion]()
+    for world in range(draws):
+        loop = world_of(family, name, split, seed, world)
+        period = sample_period(loop.control_period)
+        for number in range(len(family.references)):
+            shares = {
+                key: _share(stream(seed, _leaf(split, name, key, number)), world)
+                for key in family.draw
+                if key.startswith("reference.")
+            }
+            reference = family.motion(number, {**dict.fromkeys(family.draw, 0.0), **shares})
+            key = reference.model_dump_json(), period
+            if key not in motions:
+                motions[key] = motion(reference, wrist, family.horizon, period, network)
+            noise = *stream(seed, _camera(split, name, number)), world
+            cases.append(Case(loop, motions[key], noise, len(cases)))
+    return cases
+
+
+def _leaf(split: str, name: str, key: str, number: int | None = None) -> str:
+    return f"{split} {name}: {key}" + ("" if number is None else f" of {number}")
+
+
+def _camera(split: str, name: str, number: int) -> str:
+    return f"{split} {name}: camera of {number}"
+
+
+def _share(entropy: Entropy, number: int) -> float:
+    return float(np.random.default_rng((*entropy, number)).random())

@@ -1,0 +1,111 @@
+"""What a camera gives: how many pictures, how old they are when they come, and what is wrong with them, in words."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+
+import numpy as np
+
+from wristctl.vision.camera import CameraError
+from wristctl.vision.marker import Sighting, SightingVerdict
+
+_REMEMBERED = 90
+_UNEVEN = 0.3
+"""Of the time between two pictures: scatter that is worth a word."""
+
+FIX = {
+    SightingVerdict.NO_TIP: "see that nothing covers the tip's marker, and the camera's light and focus",
+    SightingVerdict.NO_BASE: "see that nothing covers the clamp's marker, and the camera's light and focus",
+    SightingVerdict.TWICE: "take away or cover whatever else shows a marker of the same id",
+    SightingVerdict.SHAPE: "uncover the tip's marker whole and make it flat; a shorter exposure where it is smeared",
+    SightingVerdict.BASE_MOVED: "fasten camera and clamp, and home again; wristctl hw calibrate camera",
+    SightingVerdict.SWAPPED: "markers.base belongs on the clamp, markers.tip on the last disc",
+    SightingVerdict.JUMP: "see that the tip's marker sits fast on its disc, and that no other one is taken for it",
+    SightingVerdict.FROZEN: "the camera or its driver repeats old pictures: plug it in again, another USB port",
+    SightingVerdict.STAMP: "the camera's driver gives times that cannot be: plug it in again, another USB port",
+}
+"""What to do about pictures that cannot be used."""
+
+
+class CameraPace:
+    """The pictures of the last seconds; times are of the loop's clock [s]."""
+
+    def __init__(self) -> None:
+        self._seen: deque[Sighting] = deque(maxlen=_REMEMBERED)
+        self.verdicts: Counter[SightingVerdict] = Counter()
+        """Of all pictures."""
+
+    def add(self, seen: Sighting) -> None:
+        """The next picture."""
+        self._seen.append(seen)
+        self.verdicts[seen.verdict] += 1
+
+    @property
+    def rate(self) -> float:
+        """Pictures that came, per second; nan where fewer than two did."""
+        came = [each.came for each in self._seen]
+        return (len(came) - 1) / (came[-1] - came[0]) if len(came) > 1 and came[-1] > came[0] else float("nan")
+
+    @property
+    def latency(self) -> float:
+        """Median age of a picture when it comes, by its stamp [s]: no more is known of it here."""
+        return float(np.median([each.came - each.time for each in self._seen])) if self._seen else float("nan")
+
+    @property
+    def jitter(self) -> float:
+        """Scatter of the time between two pictures that follow each other [s], a standard deviation if it is normal."""
+        gaps = [
+            after.came - before.came
+            for before, after in zip(self._seen, list(self._seen)[1:], strict=False)
+            if after.number - before.number == 1
+        ]
+        return 1.4826 * float(np.median(np.abs(np.subtract(gaps, np.median(gaps))))) if gaps else float("nan")
+
+    @property
+    def oldest(self) -> float:
+        """Age [s] of the newest angle just before the next one comes, where one picture between them is lost."""
+        return self.latency + 2.0 / self.rate
+
+    def said(self) -> str:
+        """In words."""
+        if len(self._seen) < 2:
+            return "the camera gives no pictures"
+        old = f", {1e3 * self.latency:.0f} ms old when they come" if self.latency > 1e-3 else ""
+        uneven = f", unevenly (+-{1e3 * self.jitter:.0f} ms)" if self.jitter * self.rate > _UNEVEN else ""
+        return f"the camera gives {self.rate:.3g} pictures/s{old}{uneven}"
+
+    def summary(self) -> str:
+        """In words, with what could not be used of all pictures."""
+        of = sum(self.verdicts.values())
+        odd = [f"{count} {verdict}" for verdict, count in self.verdicts.most_common() if verdict != SightingVerdict.OK]
+        unusable = f"; of {of} pictures {', '.join(odd)}" if odd else ""
+        return f"{self.said()}{unusable}".replace("the camera", "The camera", 1) + "."
+
+    def missing(self, now: float, stale: float) -> tuple[str, str]:
+        """Why there has been no angle for `stale` seconds, and what to do about it."""
+        if not self._seen or now - self._seen[-1].came > stale:
+            known = f"; until then {self.said()[len('the ') :]}" if len(self._seen) > 1 else ""
+            return f"no picture has come{known}", "see the camera's cable, and that no other program uses it"
+        newest = self._seen[-1].verdict
+        if newest is not SightingVerdict.OK:
+            return f"newest frame: {newest}", FIX[newest]
+        return f"newest frame: {newest}; {self.said()}", self._faster()
+
+    def fits(self, stale: float, hidden: float = 0.0) -> None:
+        """Raises CameraError for a camera whose pictures are too few, or too old when they come, for this limit [s].
+
+        `hidden` is an age [s] that their time stamps do not tell of.
+        """
+        if (oldest := self.oldest + hidden) > stale:
+            what = (
+                f"{self.said()}: where one is lost the angle is {1e3 * oldest:.0f} ms old before the next, beyond "
+                f"safety.stale ({1e3 * stale:.0f} ms)"
+            )
+            raise CameraError(what, "camera", self._faster(hidden))
+
+    def _faster(self, hidden: float = 0.0) -> str:
+        least = np.ceil(20.0 * (self.oldest + hidden)) / 20.0
+        return (
+            "a faster mode of the camera (device.fourcc: MJPG, device.frame_rate, a shorter device.exposure), or "
+            f"safety.stale of {least:g} s at least, with a slower reference"
+        )

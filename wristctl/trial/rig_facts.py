@@ -1,0 +1,181 @@
+"""Can this rig run the configured loop? What its link, camera and computer do, measured, and what is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.board.check import RoundTrips, round_trips
+from wristctl.board.driver import Board
+from wristctl.board.messages import LAYOUTS, Command, Rate
+from wristctl.board.usb_adapter import latency_timer, shorter
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.trial.camera_pace import FIX, CameraPace
+from wristctl.trial.rig_strokes import COUNT, RigStrokes
+from wristctl.trial.step_latency import Latency, find_latency
+from wristctl.trial.testbeds import Testbed
+from wristctl.trial.tick_timing import FIX as TIMING_FIX
+from wristctl.trial.tick_timing import SCHEDULING
+from wristctl.trial.tracking import Tracking
+from wristctl.vision.camera import CameraError, Frame
+from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.vision.picture_quality import PictureQuality, quality_of
+
+_TRIPS, _WATCHED, _SLEPT = 100, 2.0, 1.0
+"""Commands timed; seconds for which the camera is watched, and for which the computer is woken every period."""
+_SLOW_CAMERA, _UNEVEN, _UNSTAMPED, _WOKEN = 0.9, 0.3, 5e-3, 0.2
+"""What is worth a word: share of the expected pictures, scatter over their interval, seconds of age that stamps do not
+tell, share of a period by which one tick in a hundred begins late."""
+_SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
+"""Of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's."""
+
+
+class RigFacts(NamedTuple):
+    """Times [s]."""
+
+    trips: RoundTrips
+    timer: float | None
+    """Latency timer of the USB adapter."""
+    pace: CameraPace
+    quality: PictureQuality | None
+    """Medians over the pictures; None where the tip's marker is not seen."""
+    noise: float
+    """Scatter of a resting wrist's angle [rad]."""
+    woken: Array
+    """By how much the computer slept on, each time."""
+    latency: Latency | None
+    """None where nothing was to move."""
+
+
+class Trouble(NamedTuple):
+    """Something wrong with a rig."""
+
+    grave: bool
+    """Whether the loop cannot run like this."""
+    what: str
+    fix: str
+
+
+class Pictures:
+    """Keeps what was seen in the newest pictures with a usable angle."""
+
+    def __init__(self) -> None:
+        self.qualities: list[PictureQuality] = []
+
+    def __call__(self, frame: Frame, seen: Sighting) -> None:
+        """Take one."""
+        if np.isfinite(seen.corners[1]).all() and len(self.qualities) < _TRIPS:
+            self.qualities.append(quality_of(frame.image, seen.corners[1]))
+
+
+def measure(
+    testbed: Testbed, board: Board, pictures: Pictures, settings: HwRunSettings, axis: int | None,
+    told: Callable[[int], None] = lambda done: None,
+) -> RigFacts:  # fmt: skip
+    """Of a connected board, and of what the testbed keeps of its pictures. With an `axis` its motor makes strokes.
+
+    Raises SafetyStop, BoardError and CameraError.
+    """
+    trips, timer = round_trips(board, Command.STATUS, _TRIPS), latency_timer(testbed.transport.name)
+    tracking = testbed.tracking()
+    pace, angles = _watched(tracking, testbed)
+    woken = _woken(testbed, settings.control_period)
+    usable = pace.verdicts[SightingVerdict.OK] > 0
+    latency = None
+    if axis is not None and usable:
+        latency = find_latency(RigStrokes(board, tracking, settings, axis).strokes(COUNT, told))
+    quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
+    noise = float(np.std(angles)) if len(angles) > 2 else math.nan
+    return RigFacts(trips, timer, pace, quality, noise, woken, latency)
+
+
+def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[float]]:
+    clock, pace, angles = testbed.transport, CameraPace(), []
+    tracking.look()
+    end = clock.now() + _WATCHED
+    while clock.now() < end:
+        for seen in tracking.look():
+            pace.add(seen)
+            angles += [seen.theta] if math.isfinite(seen.theta) else []
+        clock.wait(2e-3)
+    return pace, angles
+
+
+def _woken(testbed: Testbed, period: float) -> Array:
+    clock, late = testbed.transport, []
+    due = clock.now()
+    for _ in range(round(_SLEPT / period)):
+        due = max(due + period, clock.now())
+        clock.wait(max(0.0, due - clock.now()))
+        late.append(clock.now() - due)
+    return np.array(late)
+
+
+def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
+    """What is wrong with a rig for these settings, the grave first."""
+    found = [*_of_the_link(facts, settings, port), *_of_the_camera(facts, settings), *_of_the_pictures(facts)]
+    late = float(np.quantile(facts.woken, 0.99))
+    if late > _WOKEN * settings.control_period:
+        what = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"
+        found.append(Trouble(late > settings.safety.late, what, TIMING_FIX[SCHEDULING]))
+    return sorted(found, key=lambda each: not each.grave)
+
+
+def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
+    command = len(LAYOUTS[Rate].pack(Rate((0.0,) * 4)))  # a tick's is longer than the one that was timed
+    longer = command * 10.0 / settings.baud
+    trip, period = facts.trips.median + longer, settings.control_period
+    if trip <= settings.safety.round_trip * period:
+        return []
+    what = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * period:g} ms"
+    if facts.timer is not None and facts.timer > 1e-3:
+        return [Trouble(True, f"{what}: the USB adapter's latency timer is {1e3 * facts.timer:g} ms", shorter(port))]
+    fix = (
+        "a USB adapter that holds answers back (an FTDI's latency timer is 16 ms unless told), a hub, or a longer "
+        f"control_period (--set control_period={math.ceil(1e3 * trip / settings.safety.round_trip) / 1e3:g})"
+    )
+    return [Trouble(True, what, fix)]
+
+
+def _of_the_camera(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
+    pace, found = facts.pace, []
+    odd = [each for each in pace.verdicts if each is not SightingVerdict.OK]
+    for verdict in odd:
+        count, of = pace.verdicts[verdict], sum(pace.verdicts.values())
+        found.append(Trouble(count == of, f"{count} of {of} pictures: {verdict}", FIX[verdict]))
+    if not pace.verdicts:
+        return [Trouble(True, "the camera gives no pictures", "see its cable, and that no other program uses it")]
+    expected, hidden = settings.sensor.frame_rate, 0.0 if facts.latency is None else facts.latency.delay
+    if pace.rate < _SLOW_CAMERA * expected:
+        what = f"the camera gives {pace.rate:.3g} pictures/s; the loop's observer counts on {expected:g}"
+        fix = f"device.fourcc: MJPG, device.frame_rate, a shorter device.exposure; or sensor.frame_rate={pace.rate:.0f}"
+        found.append(Trouble(False, what, fix))
+    try:
+        pace.fits(settings.safety.stale, hidden)
+    except CameraError as error:
+        found.append(Trouble(True, error.what, error.fix))
+    if abs(hidden) > _UNSTAMPED:
+        known = max(0.0, settings.device.delay + hidden)
+        what = f"pictures are {1e3 * hidden:.0f} ms older than their time stamps say"
+        found.append(Trouble(False, what, f"--set device.delay={known:.4f}"))
+    if pace.jitter * pace.rate > _UNEVEN:
+        what = f"pictures come unevenly, +-{1e3 * pace.jitter:.0f} ms"
+        found.append(Trouble(False, what, "another USB port or hub, or a computer that does less besides"))
+    return found
+
+
+def _of_the_pictures(facts: RigFacts) -> list[Trouble]:
+    quality = facts.quality
+    if quality is None:
+        return []
+    said = [
+        (quality.side < _SMALL, f"the tip's marker is {quality.side:.0f} px wide", "nearer, or larger pictures: 40 px"),
+        (quality.blur > _BLURRED, f"its outline is blurred by {quality.blur:.1f} px", "focus (device.focus)"),
+        (quality.white > _BRIGHT, f"its rim is white ({quality.white:.0f} of 255)", "a shorter device.exposure"),
+        (quality.white - quality.black < _FAINT, "its print is faint", "more light, or a longer device.exposure"),
+    ]
+    return [Trouble(False, what, fix) for so, what, fix in said if so]

@@ -1,0 +1,70 @@
+"""What gains are worth: their metrics on many cases beside those of `feedforward` there, in decades."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.control import Objective
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.control.table import controller
+from wristctl.simulation.cases import Case, Measured, measure
+from wristctl.simulation.metrics import METRICS
+
+YARDSTICK = "feedforward"
+"""A law without feedback, which cannot be unstable: what every gains are measured by."""
+_FAILED = 4.0
+"""Decades that a case counts where the wrist left its range at its very end; twice more by how early it did."""
+
+
+class Judge:
+    """The objective of gains of any law on the same cases; the yardstick runs on them once.
+
+    A case's value is the weighted sum of log10((metric + floor) / (the yardstick's + floor)); where it fails it is
+    4 to 6 decades. The objective is the mean over all cases, plus a share of the worst cell (a case with its
+    repetitions), plus a constant where any case swings at rest.
+    """
+
+    def __init__(self, cases: Sequence[Case], wrist: WristParameters, weights: Objective) -> None:
+        self._cases, self._wrist, self._weights = cases, wrist, weights
+        self._cells = np.array([case.cell for case in cases])
+        self._horizons = np.array([case.motion.horizon for case in cases])
+        self._metrics = list(dict.fromkeys([*weights.weights(), *(["oscillation"] if weights.swinging else [])]))
+        self._yardstick = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, self._metrics)
+
+    def __call__(self, law: Controller, gains: Array) -> Array:
+        """Objective (P,) of gains (P, g)."""
+        return self.value(measure(law, gains, self._cases, self._wrist, self._metrics))
+
+    def value(self, found: Measured) -> Array:
+        """Objective (P,) of what was measured on the cases."""
+        value = np.zeros(found.failed.shape)
+        for name, weight in self._weights.weights().items():
+            own, known = self._sizes(name, found.metrics[name]), self._known(name)
+            value = value + weight * np.log10(own / known)
+        lost = found.failed | np.isnan(value)
+        value = np.where(lost, _FAILED + 2.0 * (1.0 - found.lasted), value)
+        cells = np.stack([value[:, self._cells == each].mean(axis=1) for each in np.unique(self._cells)], axis=1)
+        total: Array = value.mean(axis=1) + self._weights.worst * cells.max(axis=1)
+        if self._weights.swinging:
+            total = total + self._weights.swinging * found.swings.any(axis=1)
+        return total
+
+    def _known(self, name: str) -> Array:
+        """The yardstick's, (1, C); where that has failed, which is the same for all laws, its median elsewhere."""
+        sizes = self._sizes(name, self._yardstick.metrics[name])
+        there = np.isfinite(sizes)
+        return np.where(there, sizes, np.median(sizes[there]) if there.any() else METRICS[name].floor)
+
+    def _sizes(self, name: str, values: Array) -> Array:
+        """A metric (.., C) with its floor; what never happens counts what its metric says of the horizon."""
+        metric = METRICS[name]
+        if name == "oscillation":
+            values = np.where(np.isnan(values), 0.0, values)  # no time to rest; a failure counts by itself
+        elif metric.never is not None:
+            values = np.where(np.isnan(values), np.array([metric.never(each) for each in self._horizons]), values)
+        found: Array = values + metric.floor
+        return found
