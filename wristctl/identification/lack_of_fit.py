@@ -30,8 +30,9 @@ EVIDENT = 3.5
 """Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""
 
 _UNSURE = 5.0 / 3.0
-"""Standard deviation of how far a wrist is on the way from the model's four segments to 8: a bend without segments is at
-4/3, and fits of wrists of 8 segments move by more than the first order tells (docs/identify.md)."""
+"""Standard deviation of how far a wrist is on the way from the model's four segments to 8.
+
+A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells."""
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 
