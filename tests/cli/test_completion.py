@@ -64,7 +64,7 @@ def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:
     assert _completed(folder, "train ") == ["experiments/paper.yaml", "experiments/quick.yaml"]
     assert _completed(folder, "compare experiments/q") == ["experiments/quick.yaml"]
-    assert _completed(folder, "simulate --controller sm") == ["smc", "smc-tracking"]
+    assert _completed(folder, "simulate --controller sm") == ["smc", "smc-dob", "smc-tracking"]
     assert _completed(folder, "runs rep") == ["replay", "report"]
 
 

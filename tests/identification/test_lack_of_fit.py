@@ -81,7 +81,9 @@ def test_an_evident_cause_widens_intervals_by_what_it_would_move(sound: Found) -
     np.testing.assert_allclose(wider[:count], np.hypot(known.deviation[:count], list(shifts.values())))
     np.testing.assert_array_equal(wider[count:], known.deviation[count:])
     finer = widened(known, [], shifts).deviation
-    np.testing.assert_allclose(finer[:count], np.hypot(known.deviation[:count], 0.7 * np.array(list(shifts.values()))))
+    np.testing.assert_allclose(
+        finer[:count], np.hypot(known.deviation[:count], 5.0 / 3.0 * np.array(list(shifts.values())))
+    )
     against = Suspicion("springs that creep", -9.0, 1.0, shifts)
     assert not against.evident and Suspicion("more damping toward flexion", -9.0, 1.0, shifts).evident
 

@@ -50,7 +50,7 @@ def test_best_gains_change_only_where_the_objective_improves(search: Search) -> 
 def test_convergence_names_each_controller_and_what_it_is_measured_by(search: Search) -> None:
     (axes,) = convergence([search, dataclasses.replace(search, controller="pid")]).axes
     assert [line.get_label() for line in axes.lines] == ["smc", "pid", "feedforward"]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("candidates tried", "objective [decades beside feedforward]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("candidates tried [1]", "objective [decades beside feedforward]")
     assert len({line.get_color() for line in axes.lines}) == 3
 
 

@@ -20,12 +20,13 @@ WEIGHTS: dict[str, tuple[str, str | None, str | None]] = {
     "smc": ("P1", "P2", None),
     "smc-tracking": ("lambda", None, "kappa"),
     "super-twisting": ("lambda", None, None),
+    "smc-dob": ("Kp", "Kd", None),
 }
 """Gains by which each law's sigma weighs error, rate (None: by 1) and integral (None: not)."""
 
 
 def test_the_sliding_laws_say_what_their_surface_is() -> None:
-    assert SLIDING == ["smc", "smc-tracking", "super-twisting"]
+    assert SLIDING == ["smc", "smc-tracking", "super-twisting", "smc-dob"]
 
 
 @pytest.mark.parametrize("name", SLIDING)

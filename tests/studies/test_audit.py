@@ -25,7 +25,7 @@ CLAIMS = (
     "{id: S, says: a period, evidence: settings, value: 0.005, unit: s, reason: set}, "
     "{id: H, says: a push, evidence: hardware, value: 2.5, reason: needs a rig}, "
     "{id: C, says: an error, evidence: comparison, controller: smc, gains: printed, metric: rmse, value: 0.5}, "
-    "{id: U, says: another, evidence: comparison, controller: mpc, gains: printed, metric: rmse, value: 0.5}, "
+    "{id: U, says: another, evidence: comparison, controller: lqg, gains: printed, metric: rmse, value: 0.5}, "
     "{id: R, says: a fit, evidence: table1, metric: r2, value: 0.5, unit: '1'}]}"
 )  # fmt: skip
 PLAIN = "audit.claims=[{id: T, says: a sign, evidence: text, verdict: contradictory, reason: by hand}]"
@@ -86,7 +86,7 @@ def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: 
     assert [row[:2] for row in why.rows] == [("T", "contradictory"), ("C", "reproduced"), ("R", "reproduced")]
     assert why.rows[0][2] == "by hand"
     assert (still.title, still.columns) == ("Still open", ("claim", "what would decide it"))
-    assert still.rows == [("H", "needs a rig"), ("U", "no controller 'mpc' to run")]
+    assert still.rows == [("H", "needs a rig"), ("U", "no controller 'lqg' to run")]
     assert (verdicts.title, verdicts.columns) == ("Verdicts", ("verdict", "claims"))
     assert verdicts.rows == [("contradictory", 1), ("open", 2), ("reproduced", 2), ("taken over", 1)]
     assert (evidence.title, evidence.columns) == ("Runs that show it", ("shown by", "run"))

@@ -19,7 +19,7 @@ thorough = pytest.mark.skipif(not THOROUGH, reason="with WRISTCTL_THOROUGH: take
 WORKERS, PAIRS, RIGS = 2, 300, 100
 INJECTED = [case for case in CASES if case.kind]
 BUILT = [case for case in CASES if not case.kind]
-SAMPLE = ("dirflip2", "detach2", "supply off", "marker slips 5 deg", "ring of 4", "covered 100 ms")
+SAMPLE = ("dirflip2", "detach2", "supply off", "marker slips 5 deg")
 
 
 def wrong(judged: list[Judged]) -> list[Judged]:

@@ -42,5 +42,5 @@ SMC_DOB = Controller(
     memory=1 + VALUES,
     notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
     conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
-    surface=Surface(lambda gains: (gains["Kp"] / gains["Kd"], 1.0, 0.0), lambda gains: gains["phi"]),
+    surface=Surface(lambda gains: (gains["Kp"], gains["Kd"], 0.0), lambda gains: gains["Kd"] * gains["phi"]),
 )

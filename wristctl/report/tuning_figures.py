@@ -27,7 +27,7 @@ def convergence(searches: Sequence[Search]) -> Figure:
         axes.plot(budget, np.median(whole, axis=0), color=own, linewidth=1.6, label=search.controller)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle=":", label="feedforward")
     axes.set_xscale("log")
-    axes.set(xlabel="candidates tried", ylabel="objective [decades beside feedforward]")
+    axes.set(xlabel="candidates tried [1]", ylabel="objective [decades beside feedforward]")
     legend_below(made, 4)
     return made
 
