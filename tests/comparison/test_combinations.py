@@ -9,8 +9,9 @@ import pytest
 
 import wristctl.comparison
 from tests.values import changeable
-from wristctl.comparison.combinations import ComparedRow, compare, count_rollouts, planned
+from wristctl.comparison.combinations import ComparedRow, compare, count_rollouts, planned, refuse_tuned_scenarios
 from wristctl.config.errors import UserError
+from wristctl.config.families import TuningWorlds, Worlds
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.simulation.closed_loop import simulate
@@ -111,6 +112,19 @@ def test_progress_goes_from_nothing_to_all_in_shares_of_the_whole() -> None:
             progress=seen.append)  # fmt: skip
     assert seen == sorted(seen) and seen[-1] == pytest.approx(1.0) and 0.0 <= seen[0] <= 0.25
     assert {0.25, 0.5, 0.75, 1.0} <= {round(each, 9) for each in seen}, "two loops by two controllers"
+
+
+def test_worlds_of_a_family_are_no_scenarios_that_could_be_judged_on() -> None:
+    """Its scenarios are then not what was searched on, nor need their loops be there."""
+    judged = study("loops={one: {}}", "references=[{kind: step, angle_deg: 20}]").compare
+    searched = load_study(
+        [], ["scenarios=[{loop: one, reference: {kind: step, angle_deg: 20}}]", "loops={one: {}}"], "tune"
+    )
+    with pytest.raises(UserError, match="tuned on a scenario"):
+        refuse_tuned_scenarios(judged, searched.tune)
+    on_worlds = searched.tune.model_copy(update={"worlds": TuningWorlds(family="soft"), "loops": {}})
+    refuse_tuned_scenarios(judged, on_worlds)
+    refuse_tuned_scenarios(judged.model_copy(update={"worlds": Worlds(family="soft")}), searched.tune)
 
 
 def test_a_network_and_tuned_gains_are_asked_for_before_anything_runs() -> None:

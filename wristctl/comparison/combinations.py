@@ -45,7 +45,12 @@ class ComparedRow:
 
 
 def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> None:
-    """UserError if a controller was tuned on a scenario on which it would be judged."""
+    """UserError if a controller was tuned on a scenario on which it would be judged.
+
+    Worlds of a family are another matter: those that are searched on and judged on are draws of different names.
+    """
+    if compared.worlds.family or tuned.worlds.family:
+        return
     for scenario in tuned.scenarios:
         for name, loop in compared.loops.items():
             same_loop = loop == tuned.loops[scenario.loop]
