@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import paired_ratio
-from wristctl.comparison.world_ranking import rank
+from wristctl.comparison.geometric_means import paired_ratio, penalised
+from wristctl.comparison.world_ranking import FAILURE, rank, world_scores
 from wristctl.config.control import Row
 from wristctl.config.families import Drawn, Family, Worlds
 from wristctl.config.load import load_study
@@ -66,8 +66,7 @@ def _scores(label: str, family: Family, study: Study) -> tuple[Array, int]:
     law = controller(name)
     cases = drawn_cases(family, "nominal", "test", 0, WORLDS, study.wrist)
     found = measure(law, np.array([gains_of(law, gains)]), cases, study.wrist, ["rmse", "oscillation"])
-    rmse = np.where(found.failed, np.pi / 2.0, found.metrics["rmse"]).reshape(WORLDS, -1)
-    return np.exp(np.log(rmse).mean(axis=1)), int(found.swings.sum() + found.failed.sum())
+    return penalised(world_scores(found, WORLDS)[0], FAILURE), int(found.swings.sum() + found.failed.sum())
 
 
 def _by_sheath(study: Study) -> list[str]:

@@ -13,6 +13,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from wristctl.arrays import Array
+from wristctl.comparison.geometric_means import penalised
+from wristctl.comparison.world_ranking import FAILURE
 from wristctl.config.control import Objective
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
@@ -26,7 +28,6 @@ HERE = Path(__file__).parent
 LAWS = {"smc-tracking": "camera", "pid-ff": "stepper", "ct-dob": "stepper"}
 FAMILIES = ("ideal", "camera")
 GAINS, TUNED_ON, JUDGED_ON = 500, 4, 8
-_FAILURE = float(np.deg2rad(90.0))
 OBJECTIVES = {
     "as it is": Objective(),
     "RMSE alone": Objective(steady_state=0.0, oscillation=0.0, chattering=0.0, worst=0.0, swinging=0.0),
@@ -60,7 +61,7 @@ def judged(study: Study, family: str, name: str) -> Judged:
     )
     objectives = {title: Judge(seen, study.wrist, each)(law, gains) for title, each in OBJECTIVES.items()}
     done = measure(law, gains, unseen, study.wrist, ["rmse"])
-    rmse = np.where(done.failed, _FAILURE, np.minimum(done.metrics["rmse"], _FAILURE))
+    rmse = penalised(np.where(done.failed, np.inf, done.metrics["rmse"]), FAILURE)
     return Judged(objectives, np.exp(np.log(rmse).mean(axis=1)))
 
 

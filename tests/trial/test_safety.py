@@ -12,9 +12,10 @@ import pytest
 from wristctl.board.messages import State
 from wristctl.config.hw_run import Safety
 from wristctl.config.plant import Actuator
+from wristctl.control.response import Estimate
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import Answer, Estimate
+from wristctl.trial.steering import Answer
 
 SPOOLS = spools_of(Actuator(level="tendon"))
 WELL = Seen(Estimate(0.5, 1.0, 0.1), 0.04, "ok", np.full(4, 7.0), np.zeros(4), State.ENABLED, 0.001, 0, 0.0)

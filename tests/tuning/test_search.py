@@ -29,12 +29,10 @@ from wristctl.tuning.search import (
     Tried,
     check_loops,
     check_tunable,
-    finalists,
-    history,
     search,
-    tried_of,
     tuning_cases,
 )
+from wristctl.tuning.search_tables import finalists, history, tried_of
 from wristctl.tuning.space import GainSpace
 
 SETTINGS = (

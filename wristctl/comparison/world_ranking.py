@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 RANKED = ("rmse", "steady_state", "oscillation", "chattering", "peak_tension", "rms_tension", "saturation")
 """Metrics that are kept of every row in every case."""
-_FAILURE = float(np.deg2rad(90.0))
-"""RMSE [rad] that a failure counts as in the means of rows that fail, which stand in no group."""
+FAILURE = float(np.deg2rad(90.0))
+"""RMSE [rad] that a failure counts as in means; a row that fails stands in no group."""
 _STREAM = 20_031
 """Of the resampling: the same worlds give the same intervals."""
 
@@ -107,15 +107,22 @@ def rank(
 
 
 def _row(label: str, found: Measured, worlds: int) -> RankedRow:
-    rmse = np.where(found.failed, np.inf, found.metrics["rmse"]).reshape(worlds, -1)
-    return RankedRow(label, np.exp(np.log(rmse).mean(axis=1)), np.any(found.swings.reshape(worlds, -1), axis=1), found)
+    swings = np.any(found.swings.reshape(worlds, -1), axis=1)
+    return RankedRow(label, world_scores(found, worlds)[0], swings, found)
+
+
+def world_scores(found: Measured, worlds: int) -> Array:
+    """Geometric mean of the RMSE [rad] over the motions of each world, (P, worlds); inf where one failed."""
+    rmse = np.where(found.failed, np.inf, found.metrics["rmse"])
+    scores: Array = np.exp(np.log(rmse).reshape(len(rmse), worlds, -1).mean(axis=2))
+    return scores
 
 
 def ranking(name: str, family: Family, rows: Sequence[RankedRow], yardstick: int) -> WorldRanking:
     """The ranking of rows that were measured on the same worlds."""
     scores = np.array([row.rmse for row in rows])
-    known = penalised(scores, _FAILURE)
-    stands = standing(scores, np.array([row.swings for row in rows]), _FAILURE, _STREAM)
+    known = penalised(scores, FAILURE)
+    stands = standing(scores, np.array([row.swings for row in rows]), FAILURE, _STREAM)
     means = [geometric_mean(each, _STREAM) for each in known]
     gains = [paired_ratio(known[yardstick], each, _STREAM) for each in known]
     return WorldRanking(name, family, scores.shape[1], list(rows), yardstick, stands, means, gains)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.functions import clip, expm1_of_negative
 from wristctl.lanes.lane import where
@@ -57,6 +57,6 @@ ADRC = Controller(
         "stepper": {"wc": 30.0, "wo": 120.0, "beta": 2.0},
     },
     memory=4,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import one_segment
 
 
@@ -39,6 +39,6 @@ CT_DOB = Controller(
         "stepper": {"w": 35.0, "zeta": 0.6, "wo": 300.0},
     },
     memory=VALUES,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -36,6 +36,9 @@ wrist_of = rows_named(Segments._fields)
 
 Law = Callable[[Any, Any, Any, Any], Any]
 
+BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
+"""Of presets for the rig, where they are from."""
+
 
 def signals_of(preview: int) -> int:
     """How many values a law sees that looks so many periods ahead."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import inverse_dynamics, one_segment_terms
 from wristctl.control.pid_ff import held, integrated
 from wristctl.lanes.compiled import compiled
@@ -64,6 +64,6 @@ LQI = Controller(
         "stepper": {"wp": 40.0, "wd": 40.0, "wi": 30.0},
     },
     memory=1,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

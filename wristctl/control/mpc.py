@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
-from wristctl.control.law import Conditions, Controller, Gain, ahead
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain, ahead
 from wristctl.control.model import one_segment
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, maximum
@@ -118,6 +118,6 @@ MPC = Controller(
     },
     memory=VALUES + 2 * HORIZON,
     preview=HORIZON,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

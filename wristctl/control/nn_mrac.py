@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.functions import clip, tanh
 from wristctl.lanes.lane import where
 
@@ -99,7 +99,7 @@ NN_MRAC = Controller(
     memory=_MODEL + 3,
     notes={
         "published": "its reference model; the rest is not specified",
-        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py",
+        "stepper": BY_TRIAL,
     },
     conditions={"stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import inverse_dynamics
 from wristctl.lanes.compiled import compiled
 
@@ -35,6 +35,6 @@ PD_FF = Controller(
         "default": {"Kp": 1.0, "Kd": 0.1},
         "stepper": {"Kp": 6.0, "Kd": 0.4},
     },
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

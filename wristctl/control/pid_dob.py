@@ -6,20 +6,27 @@ from typing import Any
 
 from wristctl.control import pid_ff
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.pd_ff import fed_forward_pd
+from wristctl.lanes.compiled import compiled
 
 GAINS = pid_ff.GAINS | {"wo": Gain("rad/s", "bandwidth of the disturbance observer", 1e-1, 1e5)}
 
 
-def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
-    """M theta_ref'' + load(theta_ref, rate_ref) - Kp e - Ki int(e) - Kd de/dt - d."""
+@compiled
+def rung(now: Any, wrist: Any, gains: Any, memory: Any, more: Any) -> Any:
+    """The law's torque less `more` [N m], what the rung above adds."""
     found = disturbance(now, wrist, gains.wo, memory, 1)
     integral = pid_ff.integrated(now, memory[0])
-    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found
+    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found - more
     memory[0] = pid_ff.held(now, torque, memory[0], integral)
     remember(now, wrist, found, torque, memory, 1)
     return torque
+
+
+def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """M theta_ref'' + load(theta_ref, rate_ref) - Kp e - Ki int(e) - Kd de/dt - d."""
+    return rung(now, wrist, gains, memory, 0.0 * now.theta)
 
 
 PID_DOB = Controller(
@@ -32,6 +39,6 @@ PID_DOB = Controller(
         "stepper": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0},
     },
     memory=1 + VALUES,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

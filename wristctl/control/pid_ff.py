@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control import pd_ff
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import where
 
@@ -44,6 +44,6 @@ PID_FF = Controller(
         "stepper": {"Kp": 5.0, "Ki": 100.0, "Kd": 0.4},
     },
     memory=1,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

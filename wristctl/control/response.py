@@ -12,7 +12,7 @@ from wristctl.wrist.allocation import allocate, reach
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD = range(len(NOW))
 
 
-class Estimated(NamedTuple):
+class Estimate(NamedTuple):
     """The wrist's angle [rad], rate [rad/s] and load torque [N m] as measured or as the observer makes them out."""
 
     theta: Any
@@ -51,7 +51,7 @@ def _continued(control: Any, first: int, since: float) -> None:
 def respond(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
-    `seen` is Estimated; the reference is what it was `since` seconds ago, continued by its own derivatives; `bounds`
+    `seen` is an Estimate; the reference is what it was `since` seconds ago, continued by its own derivatives; `bounds`
     are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
     """
     low, high = bounds

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from wristctl.control import pid_ff
-from wristctl.control.disturbance_observer import VALUES, disturbance, remember
-from wristctl.control.law import Conditions, Controller, Gain, Surface
-from wristctl.control.pd_ff import fed_forward_pd
-from wristctl.control.pid_dob import GAINS
+from wristctl.control.disturbance_observer import VALUES
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain, Surface
+from wristctl.control.pid_dob import GAINS, rung
 from wristctl.lanes.functions import tanh
 
 
@@ -17,13 +15,8 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
 
     On the surface the PD term is nothing, so that the sliding term adds to it and has no slope of its own.
     """
-    found = disturbance(now, wrist, gains.wo, memory, 1)
-    integral = pid_ff.integrated(now, memory[0])
     s = now.rate - now.rate_ref + gains.Kp / gains.Kd * (now.theta - now.theta_ref)
-    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found - gains.Ks * tanh(s / gains.phi)
-    memory[0] = pid_ff.held(now, torque, memory[0], integral)
-    remember(now, wrist, found, torque, memory, 1)
-    return torque
+    return rung(now, wrist, gains, memory, gains.Ks * tanh(s / gains.phi))
 
 
 SMC_DOB = Controller(
@@ -40,7 +33,7 @@ SMC_DOB = Controller(
         "stepper": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0, "Ks": 0.02, "phi": 1.0},
     },
     memory=1 + VALUES,
-    notes={"stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by a sweep over docs/margins.py"},
+    notes={"stepper": BY_TRIAL},
     conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
     surface=Surface(lambda gains: (gains["Kp"], gains["Kd"], 0.0), lambda gains: gains["Kd"] * gains["phi"]),
 )

@@ -23,7 +23,7 @@ from wristctl.simulation.kernel import RECORDED
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
 from wristctl.simulation.reference import Motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import Outcome, rollout, structure
 from wristctl.simulation.worlds import plant_of
 
 _RECORDED_AT_ONCE = 12_000_000
@@ -103,10 +103,7 @@ def _alike(cases: Sequence[Case]) -> list[list[int]]:
     """Cases that can run in one batch: of one structure, timing and length."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, case in enumerate(cases):
-        loop = case.loop
-        levels = loop.actuator.level, loop.sensor.level, loop.sensor.frame_rate
-        key = loop.plant.model, loop.plant_segments, loop.control_period, loop.steps, *levels, len(case.motion.time)
-        groups.setdefault(key, []).append(number)
+        groups.setdefault((*structure(case.loop), len(case.motion.time)), []).append(number)
     return list(groups.values())
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment
-from wristctl.control.response import Estimated
+from wristctl.control.response import Estimate
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
@@ -82,12 +82,12 @@ def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: 
 
 @compiled
 def sense(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
-    """Estimated, as the law sees it: angle and rate as they are, or, behind a camera, all as the observer has it."""
+    """Estimate, as the law sees it: angle and rate as they are, or, behind a camera, all as the observer has it."""
     if watch is None:
-        return Estimated(angle, rate, 0.0 * angle)
+        return Estimate(angle, rate, 0.0 * angle)
     sample(schedule, watch, drive, known, tick, angle, h)
     now = rows_of(watch.observer.now)
-    return Estimated(now[0], now[1], now[2])
+    return Estimate(now[0], now[1], now[2])
 
 
 @compiled

@@ -110,12 +110,13 @@ def _worlds(
         if number == len(worlds):
             worlds.append(World(*pair))
         which[lane] = number
-    if len({_structure(each.loop) for each in worlds}) != 1:
+    if len({structure(each.loop) for each in worlds}) != 1:
         raise ValueError("loops of one batch differ in segments, plant, timing, or levels of actuator and sensor")
     return worlds, which
 
 
-def _structure(loop: Loop) -> tuple[object, ...]:
+def structure(loop: Loop) -> tuple[object, ...]:
+    """What loops of one batch have in common."""
     timing = loop.control_period, loop.steps
     return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
 

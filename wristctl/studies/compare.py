@@ -14,8 +14,8 @@ from wristctl.studies.loop_inputs import (
     check_inverses,
     check_row,
     compared_inverses,
-    compared_loops,
     family_of,
+    judged_loops,
     network_for,
     tuned_gains,
     tuned_on,
@@ -99,8 +99,8 @@ def plan(study: Study, inputs: Inputs) -> str:
             count, horizon = len(settings.rows) * settings.worlds.draws * len(family.references), family.horizon
         else:
             count, horizon = count_rollouts(settings), settings.horizon
-        check_size(compared_loops(study).values(), horizon)
-    told = truth_told(study.wrist, compared_loops(study))
+        check_size(judged_loops(study, study.compare).values(), horizon)
+    told = truth_told(study.wrist, judged_loops(study, study.compare))
     return f"{searched}{count} rollouts of {horizon:g} s{told}"
 
 
@@ -115,7 +115,7 @@ def compare(session: Session) -> Compared:
 
     study, findings, searches = session.study, session.findings, dict[str, "Search"]()
     settings = study.compare
-    loops = compared_loops(study).values()
+    loops = judged_loops(study, study.compare).values()
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
     warn_outside_conditions(settings.rows, loops)

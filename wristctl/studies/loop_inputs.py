@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from wristctl.config.control import Row, SimulateSettings, TuneSettings
+from wristctl.config.control import CompareSettings, Row, SimulateSettings, TuneSettings
 from wristctl.config.errors import UserError, meant
 from wristctl.config.families import Family, TuningWorlds, Worlds
 from wristctl.config.loop import Loop, Reference
@@ -124,16 +124,10 @@ def family_of(families: Mapping[str, Family], worlds: TuningWorlds | Worlds, whe
     return families[worlds.family]
 
 
-def tuned_loops(study: Study) -> Mapping[str, Loop]:
-    """The loops that gains are tuned on, by name; of a family its loop as it is believed, before anything is drawn."""
-    worlds = study.tune.worlds
-    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.tune.loops
-
-
-def compared_loops(study: Study) -> Mapping[str, Loop]:
-    """The loops that are judged on, by name; of a family its loop before anything is drawn."""
-    worlds = study.compare.worlds
-    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else study.compare.loops
+def judged_loops(study: Study, settings: TuneSettings | CompareSettings) -> Mapping[str, Loop]:
+    """The loops that gains are tuned or rows judged on, by name; of a family its loop before anything is drawn."""
+    worlds = settings.worlds
+    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else settings.loops
 
 
 def compared_inverses(study: Study) -> Iterable[str]:

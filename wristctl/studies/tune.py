@@ -19,8 +19,8 @@ from wristctl.studies.loop_inputs import (
     family_of,
     identified,
     inverses_of,
+    judged_loops,
     network_for,
-    tuned_loops,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.studies.procedure import Procedure
@@ -52,7 +52,7 @@ class Tuned(StudyResult):
         """Every candidate of every search: controller, iteration, candidate, objective, and the gains it has."""
         import pandas as pd
 
-        from wristctl.tuning.search import history
+        from wristctl.tuning.search_tables import history
 
         tables = {name: history(search) for name, search in self.searches.items()}
         return pd.concat(tables, names=["controller"]).reset_index("controller").reset_index(drop=True)
@@ -63,7 +63,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.report.truth_table import truth_told
 
     with under("tune"):
-        told = truth_told(identified(study, "tune", inputs).wrist, tuned_loops(study))
+        told = truth_told(identified(study, "tune", inputs).wrist, judged_loops(study, study.tune))
         return planned_search(study.tune, study.families) + told
 
 
@@ -101,7 +101,7 @@ def tune(session: Session) -> Tuned:
     from wristctl.report.truth_table import truth_tables
 
     study = identified(session.study, "tune", session.inputs)
-    loops = tuned_loops(study).values()
+    loops = judged_loops(study, study.tune).values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
     warn_if_coarse(loops)
     network = network_for(session.inputs, study.wrist, loops)
@@ -112,7 +112,7 @@ def tune(session: Session) -> Tuned:
     ]
     columns = ("controller", "objective", "found by", "evaluations", "gains")
     tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
-    tables += truth_tables(study.wrist, tuned_loops(study))
+    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
     return Tuned(session.study, session.findings, tables, found)
 
 
@@ -171,7 +171,7 @@ def _note_streams(session: Session, study: Study) -> None:
 def _known(session: Session, name: str) -> Tried | None:
     """What the run to resume has tried of a controller."""
     from wristctl.control.table import controller
-    from wristctl.tuning.search import tried_of
+    from wristctl.tuning.search_tables import tried_of
 
     stopped = session.inputs.runs().get("resume")
     if stopped is None or not (stopped.path / f"data/history-{name}.csv").exists():
@@ -188,7 +188,7 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
     from wristctl.control.table import controller
     from wristctl.report.tuning_figures import convergence, gain_history
     from wristctl.tuning.gains_file import write_gains
-    from wristctl.tuning.search import finalists, history
+    from wristctl.tuning.search_tables import finalists, history
 
     if not found:
         return

@@ -11,11 +11,9 @@ from wristctl.board.driver import Board
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.interrupt import undisturbed
 from wristctl.records import Run
-from wristctl.trial.halt import halt
 from wristctl.trial.homing import Zero, find_zero, slacken
-from wristctl.trial.patience import Patience
+from wristctl.trial.in_sight import in_sight
 from wristctl.trial.prepare import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import Testbed
@@ -72,23 +70,8 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristP
 
     Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
     """
-    board, spools = Board(testbed.transport), spools_of(settings.actuator)
-    try:
-        hello = board.connect()
-        try:
-            patience = Patience(board)
-            testbed.face(settings.plane, patience.pulse)
-            tracking = testbed.tracking()
-            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
-            testbed.confirm(patience.pulse)
-            prepare(board, settings)
-            zero = find_zero(board, tracking, settings, wrist, settings.plane)
-            position = slacken(board, spools, settings.homing, zero.signs)
-        except BaseException:
-            with undisturbed():
-                board.close(emergency=not halt(board, settings.safety.watchdog).verified)
-            raise
-        board.close()
-    finally:
-        testbed.close()
+    with in_sight(testbed, settings) as (board, hello, tracking):
+        prepare(board, settings)
+        zero = find_zero(board, tracking, settings, wrist, settings.plane)
+        position = slacken(board, spools_of(settings.actuator), settings.homing, zero.signs)
     return WristCalibration(zero, settings.plane, hello.boot_nonce, position)

@@ -18,6 +18,7 @@ from wristctl.board.messages import AXES, Fault, Flag
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
+from wristctl.control.response import Estimate
 from wristctl.simulation.reference import Motion
 from wristctl.trial.following import Following
 from wristctl.trial.host_faults import HostFaults
@@ -26,7 +27,7 @@ from wristctl.trial.oddities import Oddities
 from wristctl.trial.patience import InSight, Patience
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import Paths, spools_of
-from wristctl.trial.steering import Answer, Estimate, Steering
+from wristctl.trial.steering import Answer, Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wristctl.board.driver import Board
 from wristctl.config.hw_run import CalibrateWristSettings
-from wristctl.interrupt import undisturbed
-from wristctl.trial.halt import halt
-from wristctl.trial.patience import Patience
+from wristctl.trial.in_sight import in_sight
 from wristctl.trial.rig_strokes import RigStrokes
 from wristctl.trial.testbeds import Testbed
 
@@ -30,23 +27,8 @@ def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, axis: int) ->
 
     Raises SafetyStop where it bends the wrist too far, or not at all; BoardError and CameraError.
     """
-    board = Board(testbed.transport)
-    try:
-        board.connect()
-        try:
-            patience = Patience(board)
-            testbed.face(settings.plane, patience.pulse)
-            tracking = testbed.tracking()
-            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
-            testbed.confirm(patience.pulse)
-            strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
-            steps, bend = strokes.taken_up()
-            strokes.let_go()
-        except BaseException:
-            with undisturbed():
-                board.close(emergency=not halt(board, settings.safety.watchdog).verified)
-            raise
-        board.close()
-    finally:
-        testbed.close()
+    with in_sight(testbed, settings) as (board, _, tracking):
+        strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
+        steps, bend = strokes.taken_up()
+        strokes.let_go()
     return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend)

@@ -14,8 +14,9 @@ from wristctl.board.messages import State
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import Safety
 from wristctl.config.wording import Phrase
+from wristctl.control.response import Estimate
 from wristctl.trial.spools import Spools
-from wristctl.trial.steering import Answer, Estimate
+from wristctl.trial.steering import Answer
 
 
 class SafetyStop(UserError):

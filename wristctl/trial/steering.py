@@ -12,7 +12,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import Controlled, Estimated, look_ahead, respond
+from wristctl.control.response import Controlled, Estimate, look_ahead, respond
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
@@ -24,14 +24,6 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 REMEMBERED = 256
 """Ticks that a frame may be late."""
-
-
-class Estimate(NamedTuple):
-    """What the observer makes of frames and motion: angle [rad], its rate [rad/s], load torque [N m]."""
-
-    theta: float
-    rate: float
-    load: float
 
 
 class Answer(NamedTuple):
@@ -106,7 +98,7 @@ def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float,
         control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
         if ahead > 0:
             look_ahead(control, ahead, 0.0)
-    seen = Estimated(x[0], x[1], x[2])
+    seen = Estimate(x[0], x[1], x[2])
     wanted, low, high, plus, minus = respond(control, known, seen, (bound[0], bound[1]), 0.0, period)
     row[0] = wanted
     row[1] = torque_of(x[0], known, plus, minus)

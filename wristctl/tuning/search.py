@@ -6,9 +6,9 @@ seen, among its best candidates and the law's presets, so that gains are not the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from wristctl.tuning.objective import Judge
 from wristctl.tuning.optimisers import OPTIMISERS
 from wristctl.tuning.space import GainSpace
 from wristctl.wrist.kinematics import Inverse
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Tried(NamedTuple):
@@ -195,56 +192,22 @@ def _found(controller: Controller, tried: Tried, restarts: int) -> Search:
 
 def _chosen(controller: Controller, found: Search, judge: Judge, choose: Judge | None, count: int) -> Search:
     """The best on the cases to choose by, of the search's best candidates and the presets."""
-    order = np.argsort(found.tried.values, axis=None, kind="stable")
-    flat = found.tried.gains.reshape(-1, len(controller.gains))
-    gains = list(dict.fromkeys(tuple(map(float, flat[at])) for at in order))[:count]
-    origins = ["search"] * len(gains)
-    for name, each in _presets(controller, GainSpace.of(controller.gains)).items():
-        gains.append(tuple(map(float, each)))
-        origins.append(name)
-    searched = judge(controller, np.array(gains))
-    validated = searched if choose is None else choose(controller, np.array(gains))
-    every = [Finalist(*each) for each in zip(gains, origins, map(float, searched), map(float, validated), strict=True)]
+    flat, values = found.tried.gains.reshape(-1, len(controller.gains)), found.tried.values.ravel()
+    distinct: dict[tuple[float, ...], float] = {}
+    for at in np.argsort(values, kind="stable"):
+        distinct.setdefault(tuple(map(float, flat[at])), float(values[at]))
+    known = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
+    if presets := _presets(controller, GainSpace.of(controller.gains)):
+        judged = judge(controller, np.array(list(presets.values())))
+        for (name, each), value in zip(presets.items(), judged, strict=True):
+            known.append((tuple(map(float, each)), name, float(value)))
+    if choose is None:
+        validated = np.array([value for *_, value in known])
+    else:
+        validated = choose(controller, np.array([gains for gains, *_ in known]))
+    every = [Finalist(*each, float(value)) for each, value in zip(known, validated, strict=True)]
     ordered = tuple(sorted(every, key=lambda each: each.validated))
     best = dict(zip(controller.gains, ordered[0].gains, strict=True))
     return Search(
         controller.name, best, ordered[0].validated, found.evaluations, found.tried, found.restarts, ordered
     )  # fmt: skip
-
-
-def history(found: Search) -> pd.DataFrame:
-    """Every candidate of every search: restart, iteration, candidate, objective and gains."""
-    import pandas as pd
-
-    iterations, candidates = found.tried.values.shape
-    each = -(-iterations // found.restarts)
-    at = np.repeat(np.arange(iterations), candidates)
-    columns = {
-        "restart": at // each,
-        "iteration": at % each,
-        "candidate": np.tile(np.arange(candidates), iterations),
-        "objective": found.tried.values.ravel(),
-    }
-    gains = np.concatenate(found.tried.gains).T
-    return pd.DataFrame(columns | dict(zip(found.gains, gains, strict=True)))
-
-
-def tried_of(table: pd.DataFrame, gains: Sequence[str]) -> Tried:
-    """What a history says was tried, as far as its iterations are whole."""
-    candidates = int(table["candidate"].max()) + 1
-    whole = len(table) // candidates
-    rows = table.iloc[: whole * candidates]
-    values = rows["objective"].to_numpy(float).reshape(whole, candidates)
-    return Tried(values, rows[list(gains)].to_numpy(float).reshape(whole, candidates, len(gains)))
-
-
-def finalists(found: Search) -> pd.DataFrame:
-    """The gains that were judged anew, best first."""
-    import pandas as pd
-
-    rows = [
-        {"origin": each.origin, "objective": each.objective, "validated": each.validated}
-        | dict(zip(found.gains, each.gains, strict=True))
-        for each in found.finalists
-    ]
-    return pd.DataFrame(rows)
