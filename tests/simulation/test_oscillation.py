@@ -16,6 +16,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.oscillation import LIMIT_CYCLE, hunting, oscillation, oscillation_frequency
 from wristctl.simulation.reference import motion
+from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.trajectory import Trajectory
 
@@ -46,6 +47,17 @@ def test_a_wrist_that_creeps_to_its_place_does_not_swing(time_constant: float) -
     assert oscillation(course(0.5 + creeping, np.full(5000, 0.5))) < 0.7 * LIMIT_CYCLE
     swing = 4e-3 * np.sin(2.0 * np.pi * 5.0 * TIME)
     assert oscillation(course(0.5 + creeping + swing, np.full(5000, 0.5))) == pytest.approx(4e-3, rel=0.15)
+
+
+def test_only_what_is_left_at_rest_is_called_a_limit_cycle() -> None:
+    buzz, phase = 4e-3 * np.sin(2.0 * np.pi * 25.0 * TIME), np.pi * TIME
+    still, turning = course(0.5 + buzz, np.full(5000, 0.5)), course(0.5 * np.sin(phase) + buzz, 0.5 * np.sin(phase))
+    fates = [
+        Repeated.once(Simulation(each, {"oscillation": oscillation(each)}, False, 5.0)).fate
+        for each in (still, turning)
+    ]
+    assert fates[0].startswith("LIMIT CYCLE: +-0.23 deg at 25 Hz")
+    assert fates[1].startswith("RIPPLE: +-0.") and "friction where the reference turns" in fates[1]
 
 
 def test_what_was_before_the_last_second_does_not_count() -> None:

@@ -45,6 +45,11 @@ def oscillations(theta: Array, theta_ref: Array, step: float) -> Array:
     return found
 
 
+def at_rest(course: Trajectory) -> bool:
+    """Whether the reference rests over the last second, so that what is left there is a swing of the loop's own."""
+    return bool(np.ptp(course.theta_ref[-round(WINDOW / _step(course)) :]) == 0.0)
+
+
 def hunting(course: Trajectory) -> float:
     """Half the peak-to-peak [rad] over the last half of a hold of at least LONG_HOLD; nan where there is none.
 

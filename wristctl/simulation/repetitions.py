@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation_frequency
+from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, oscillation_frequency
 from wristctl.simulation.trajectory import Trajectory
 
 _DRAWN = 64
@@ -58,7 +58,7 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: that it failed, swings, or pulls harder than tendons can; else empty."""
+        """In words what became of it: that it failed, swings, ripples or pulls harder than tendons can; else empty."""
         return "; ".join(each for each in (self._end, self._strain) if each)
 
     @property
@@ -76,8 +76,10 @@ class Repeated:
         swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
         if swing <= LIMIT_CYCLE:
             return ""
-        rate = oscillation_frequency(self.first.trajectory)
-        return f"LIMIT CYCLE: +-{np.degrees(swing):.2g} deg at {rate:.2g} Hz"
+        found = f"+-{np.degrees(swing):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
+        if at_rest(self.first.trajectory):
+            return f"LIMIT CYCLE: {found}"
+        return f"RIPPLE: {found} (a swing, or friction where the reference turns)"
 
     def labelled(self, label: str) -> Repeated:
         """The same with this label on its trajectory."""
