@@ -29,6 +29,7 @@ def check_rig(
     """Measure, and print the answer first. Exits with 3 where the loop cannot run."""
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
+    from wristctl.trial.loop_priority import prioritised
     from wristctl.trial.patience import Patience
     from wristctl.trial.rig_facts import Pictures, measure, troubles
     from wristctl.trial.testbeds import open_testbed
@@ -38,7 +39,9 @@ def check_rig(
     given: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
     settings = study.hw_run.model_copy(update=given | ({"camera": camera} if camera is not None else {}))
     pictures = Pictures()
-    with listening(quiet, False) as console:
+    with listening(quiet, False) as console, prioritised(settings.priority) as priority:
+        if priority:
+            typer.echo(priority, err=True)
         with progress(console, no_event, "opening board and camera", None, "", quiet):
             testbed = open_testbed(settings, study.wrist, study.seed, View(), lambda what, meanwhile: None, pictures)
         try:

@@ -61,16 +61,21 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     import sys
     from tempfile import TemporaryDirectory
 
-    with TemporaryDirectory(prefix="wristctl-bench-") as folder:
+    from wristctl.config.load import load_study
+    from wristctl.trial.loop_priority import prioritised
+
+    study = load_study((), override, "hw-run")
+    priority = prioritised(study.hw_run.priority)
+    with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
+        if allowed:
+            log.info(allowed)
         pictures = Path(folder) / "frame"
         with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
             from wristctl.bench.bystander import Bystander
             from wristctl.bench.film import start_film
             from wristctl.bench.rig import Rig
             from wristctl.bench.server import BenchServer
-            from wristctl.config.load import load_study
 
-            study = load_study((), override, "hw-run")
             settings, markers = study.hw_run.bench, study.hw_run.markers
             camera, film = start_film(settings, study.wrist, markers, pictures, broadcast=True)
             rig = Rig(settings, study.wrist, study.seed, markers, chip)
