@@ -141,12 +141,12 @@ def test_the_worst_cell_counts_beside_the_mean_and_a_cell_is_the_mean_of_its_rep
     assert weighed(judge, worst=0.5).value(measured)[0] == pytest.approx(mean + 0.5 * worst)
 
 
-def test_a_case_that_swings_costs_a_constant() -> None:
-    for swing, cost in ((0.99 * LIMIT_CYCLE, 0.0), (1.01 * LIMIT_CYCLE, 1.0), (np.nan, 0.0)):
-        judge, measured = made_up((0, 1), rmse=[0.1, 0.1], oscillation=[0.0, swing])
+def test_cases_that_swing_cost_the_root_of_their_share() -> None:
+    for swing, cost in ((0.99 * LIMIT_CYCLE, 0.0), (1.01 * LIMIT_CYCLE, 0.5), (np.nan, 0.0)):
+        judge, measured = made_up((0, 1, 2, 3), rmse=[0.1] * 4, oscillation=[0.0, swing, 0.0, 0.0])
         still = weighed(judge, swinging=0.0).value(measured)[0]
         assert weighed(judge, swinging=1.0).value(measured)[0] == pytest.approx(still + cost)
-        moving = replace(measured, rests=np.array([True, False]))
+        moving = replace(measured, rests=np.array([True, False, True, True]))
         assert judge.value(moving)[0] == pytest.approx(still)
 
 

@@ -43,11 +43,13 @@ class Objective(OpenSection):
     """
 
     rmse: float = choice(1.0, "weight of the RMSE", ge=0)
-    steady_state: float = choice(0.25, "weight of the error at the end", ge=0)
-    oscillation: float = choice(0.25, "weight of the oscillation at rest", ge=0)
-    chattering: float = choice(0.05, "weight of the total variation of tension per second", ge=0)
-    worst: float = choice(0.5, "weight of the worst case's terms, beside the mean's 1", ge=0)
-    swinging: float = choice(1.0, "added where any case swings by more than 0.1 deg [decades]", ge=0)
+    steady_state: float = choice(0.1, "weight of the error at the end", ge=0)
+    oscillation: float = choice(0.1, "weight of the oscillation at rest", ge=0)
+    chattering: float = choice(0.02, "weight of the total variation of tension per second", ge=0)
+    worst: float = choice(0.0, "weight of the worst case's terms, beside the mean's 1", ge=0)
+    swinging: float = choice(
+        0.5, "times the root of the share of cases that swing by more than 0.1 deg [decades]", ge=0
+    )
 
     def added(self) -> Mapping[str, Parameter]:
         """A weight for every other metric of the table."""

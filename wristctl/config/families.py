@@ -120,7 +120,7 @@ class TuningWorlds(Section):
     """Which worlds gains are searched on and chosen by."""
 
     family: str = choice("", "name of a family in `families`; empty: none")
-    draws: int = choice(8, "worlds drawn of it to search on", ge=1, le=10_000)
+    draws: int = choice(16, "worlds drawn of it to search on", ge=1, le=10_000)
     validation: int = choice(20, "other worlds of it to choose by", ge=1, le=10_000)
 
 

@@ -16,16 +16,17 @@ from wristctl.simulation.metrics import METRICS
 
 YARDSTICK = "feedforward"
 """A law without feedback, which cannot be unstable: what every gains are measured by."""
-_FAILED = 4.0
-"""Decades that a case counts where the wrist left its range at its very end; twice more by how early it did."""
+_FAILED = 3.0
+"""Decades that a case counts where the wrist left its range at its very end, and one more where it did at once."""
 
 
 class Judge:
     """The objective of gains of any law on the same cases; the yardstick runs on them once.
 
     A case's value is the weighted sum of log10((metric + floor) / (the yardstick's + floor)); where it fails it is
-    4 to 6 decades. The objective is the mean over all cases, plus a share of the worst cell (a case with its
-    repetitions), plus a constant where any case swings at rest.
+    3 to 4 decades. The objective is the mean over all cases, plus a weight times the worst cell (a case with its
+    repetitions), plus one times the square root of the share of cases that swing at rest: steep at the first of them,
+    since no ranking relies on gains that ever swing, and never the same for two that swing more and less.
     """
 
     def __init__(self, cases: Sequence[Case], wrist: WristParameters, weights: Objective) -> None:
@@ -46,11 +47,11 @@ class Judge:
             own, known = self._sizes(name, found.metrics[name]), self._known(name)
             value = value + weight * np.log10(own / known)
         lost = found.failed | np.isnan(value)
-        value = np.where(lost, _FAILED + 2.0 * (1.0 - found.lasted), value)
+        value = np.where(lost, _FAILED + 1.0 - found.lasted, value)
         cells = np.stack([value[:, self._cells == each].mean(axis=1) for each in np.unique(self._cells)], axis=1)
         total: Array = value.mean(axis=1) + self._weights.worst * cells.max(axis=1)
         if self._weights.swinging:
-            total = total + self._weights.swinging * found.swings.any(axis=1)
+            total = total + self._weights.swinging * np.sqrt(found.swings.mean(axis=1))
         return total
 
     def _known(self, name: str) -> Array:
