@@ -106,6 +106,15 @@ def test_what_is_chosen_is_the_best_on_noise_that_the_search_has_not_seen() -> N
     assert table["validated"].tolist() == validated and list(table["w"]) == [each.gains[0] for each in result.finalists]
 
 
+def test_gains_are_chosen_on_worlds_of_a_family_that_the_search_has_not_seen() -> None:
+    drawn = ["families.f.draw={plant.stiffness: x0.5..2}", "families.f.references=[{duration: 0.2}]",
+             "tune.worlds={family: f, draws: 5, validation: 6}"]  # fmt: skip
+    searched, chosen = tuning_cases(load_study([], drawn))
+    springs = [{case.loop.plant.stiffness for case in cases} for cases in (searched, chosen)]
+    assert [len(each) for each in springs] == [5, 6] and not springs[0] & springs[1]
+    assert len({case.stream for case in (*searched, *chosen)}) == 11
+
+
 def made_up(loop_cells: tuple[int, ...], **metrics: list[float]) -> tuple[Judge, Measured]:
     """A judge whose yardstick's RMSE is 1 on each case, and what was measured of one gains on them."""
     study = load_study([], list(SETTINGS), "tune")

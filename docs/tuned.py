@@ -1,0 +1,115 @@
+"""Are tuned gains ever worse than a law's preset? `python docs/tuned.py` tunes every law: docs/tuned.md.
+
+On worlds of the tune split of a family, chosen on its validation split, and compared on its test split. Ends with 1
+where the interval of a ratio says worse.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.comparison.geometric_means import GeometricMean, paired_ratio, penalised
+from wristctl.comparison.world_ranking import FAILURE, world_scores
+from wristctl.config.load import load_study
+from wristctl.config.study import Study
+from wristctl.control.law import Controller
+from wristctl.control.table import controller, gains_of
+from wristctl.seeds import stream
+from wristctl.simulation.cases import measure
+from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import search, tuning_cases
+
+HERE = Path(__file__).parent
+EXPERIMENTS = HERE.parent / "experiments"
+TEST_WORLDS = 60
+CONDITIONS = {"ideal": ("default", "exchanged", "printed"), "camera": ("stepper", "camera", "default")}
+"""The presets that a family is within the conditions of, the one for the hardest first; by family."""
+
+
+class Tuning(NamedTuple):
+    """What tuning did for a law on a family: its RMSE [rad] and the ratio of the preset's to it, over test worlds."""
+
+    law: str
+    preset: str
+    chosen: str
+    rmse: float
+    ratio: GeometricMean
+    swings: tuple[int, int]
+    """Cases in which the tuned gains and the preset swing or fail."""
+
+
+def preset_of(law: Controller, family: str) -> str:
+    """The preset that a law is used with there."""
+    return next(name for name in CONDITIONS[family] if name in law.presets)
+
+
+def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str) -> Tuning:
+    """Tune a law, and compare on the test split."""
+    found = search(study, law, lambda name: stream(study.seed, name), judges)
+    preset = preset_of(law, family)
+    gains = np.array([[found.gains[name] for name in law.gains], gains_of(law, preset)])
+    cases = drawn_cases(study.families[family], family, "test", study.seed, TEST_WORLDS, study.wrist)
+    done = measure(law, gains, cases, study.wrist, ["rmse", "oscillation"])
+    own, known = penalised(world_scores(done, TEST_WORLDS), FAILURE)
+    bad = (done.swings | done.failed).sum(axis=1)
+    ratio = paired_ratio(known, own, 1)
+    rmse = float(np.exp(np.log(own).mean()))
+    return Tuning(law.name, preset, found.finalists[0].origin, rmse, ratio, (int(bad[0]), int(bad[1])))
+
+
+def lines_of(family: str) -> tuple[list[str], list[str]]:
+    """The table of a family, and the laws whose tuned gains are worse."""
+    study = load_study([EXPERIMENTS / "scenarios" / f"{family}.yaml", EXPERIMENTS / "rivals.yaml"])
+    budget = study.compare.tuning
+    assert budget is not None
+    given = budget.model_copy(update={"worlds": budget.worlds.model_copy(update={"family": family})})
+    study = study.model_copy(update={"tune": given})
+    searched, chosen = tuning_cases(study)
+    judges = Judge(searched, study.wrist, given.objective), Judge(chosen, study.wrist, given.objective)
+    rows = []
+    for name in given.controllers:
+        rows.append(tuned(study, controller(name), judges, family))
+    rows.sort(key=lambda each: each.rmse)
+    table = [
+        f"| {each.law} | {np.degrees(each.rmse):.3f} | {each.chosen} | {each.preset} | {each.ratio.value:.2f} "
+        f"[{each.ratio.low:.2f}, {each.ratio.high:.2f}] | {each.swings[0]}, {each.swings[1]} |"
+        for each in rows
+    ]
+    return [f"## {family}: {study.families[family].about}", "", *_HEAD, *table, ""], [
+        f"{each.law} on {family}" for each in rows if each.ratio.high < 1.0
+    ]
+
+
+_HEAD = [
+    "| law | RMSE, tuned [deg] | gains from | preset | preset's RMSE over the tuned | swings or fails: tuned, preset |",
+    "| --- | --- | --- | --- | --- | --- |",
+]
+
+
+def main() -> None:
+    """Tune, compare, write the page."""
+    both = [lines_of(family) for family in CONDITIONS]
+    worse = [name for _, names in both for name in names]
+    said = f"Worse: {', '.join(worse)}." if worse else "None is worse than its preset beyond the interval."
+    begin = [
+        "# Tuned gains beside presets",
+        "",
+        f"{said} Every law is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family; among the",
+        "best candidates and its presets the gains are chosen on worlds of a second split, and judged here on",
+        f"{TEST_WORLDS} worlds of a third: how many times less the RMSE is than the preset's (geometric mean, 95 %",
+        "interval over worlds), and in how many cases either swings by more than 0.1 deg at rest or fails. A ratio of",
+        "1 is the preset itself. Made by `python docs/tuned.py`.",
+        "",
+    ]
+    (HERE / "tuned.md").write_text("\n".join([*begin, *(line for lines, _ in both for line in lines)]).rstrip() + "\n")
+    if worse:
+        sys.exit(said)
+
+
+if __name__ == "__main__":
+    main()

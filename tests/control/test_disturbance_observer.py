@@ -1,0 +1,19 @@
+"""What the disturbance observer promises beside a loop's figures: on the model itself it finds nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tests.control.conftest import ClosedLoop, Sine
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+
+WRIST = WristParameters(gravity=(-8.0, 3.0), hand_mass=0.4)
+
+
+def test_on_the_model_itself_there_is_no_load_however_fast_the_wrist_moves(closed_loop: ClosedLoop, sine: Sine) -> None:
+    """A period of 0.1 ms, so that what a period leaves out is little beside every term of the momentum's equation."""
+    law = controller("ct-dob")
+    course = closed_loop("ct-dob", gains_of(law, "default"), sine(1.4, 2.0, 1.0, 1e-4), WRIST, WRIST, period=1e-4)
+    load = np.abs(course.memory[:, 0]).max()
+    assert np.abs(course.rate).max() > 8.0 and load < 1e-3
