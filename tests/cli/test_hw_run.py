@@ -27,6 +27,7 @@ from wristctl.vision.camera import VideoCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
+from wristctl.wrist.kinematics import chain_tip
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "build" / "screenshots"
@@ -59,6 +60,7 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     _watch(run.file("data/video.avi"), len(run.data("frames")))
     _track_anew(run)
     _hear(run)
+    _learn(call, run)
     if CHROMIUM and DRIVER:
         _look(run.path / "report.html")
 
@@ -89,6 +91,22 @@ def _track_anew(run: Run) -> None:
     rows = [int(np.argmin(np.abs(taken["clock"] - start - time))) for time in usable["captured"]]
     zero = json.loads(run.file("data/zero.json").read_text())["marker"]
     assert np.abs([angles[row] for row in rows] - usable["theta"] - zero).max() < np.deg2rad(0.3)
+
+
+def _learn(call: Call, run: Run) -> None:
+    """Tips and angles of the trial's frames are a recording: nearly those of the wrist that bent."""
+    frames, truth = run.data("frames"), run.data("truth")
+    usable = frames[frames["verdict"] == "ok"]
+    angles = [np.interp(usable["captured"], truth["time"], truth[f"theta_{k}"]) for k in (1, 2, 3, 4)]
+    off = usable[["tip_x", "tip_y"]].to_numpy() - chain_tip(np.column_stack(angles), run.config.wrist.length)
+    assert np.abs(off).max() < 2e-3 and off[:, 1].std() < 3e-4  # the camera is not calibrated
+    code, _, err = call("gen-data", "--source", "run", "--run", run.id)
+    assert code == 0, err
+    samples = open_run("latest:gen-data").array("samples")
+    assert set(samples["recording"]) == {0} and len(samples["theta"]) == len(usable)
+    np.testing.assert_array_equal(samples["theta"], usable["theta"])
+    code, _, err = call("train", "--data", "latest:gen-data", "--dry-run")
+    assert code == 2 and "1 recording: training, choosing and judging need one each" in err
 
 
 def _hear(run: Run) -> None:

@@ -8,7 +8,7 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.learning.dataset import Samples, draw_samples, samples_of_courses, split_samples, unit_cube
+from wristctl.learning.dataset import Samples, draw_samples, split_samples, unit_cube
 from wristctl.wrist.kinematics import arc_tip, exact_angle
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol")
@@ -118,32 +118,6 @@ def test_a_latin_hypercube_has_one_sample_in_every_row_and_column() -> None:
     np.testing.assert_array_equal(np.sort((40 * points).astype(int), axis=0), np.arange(40)[:, None].repeat(3, axis=1))
 
 
-def course(rows: int, seed: int = 0) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    theta = rng.uniform(-0.7, 0.7, rows)
-    return np.column_stack([arc_tip(theta, 0.08), theta])
-
-
-def test_samples_of_runs_are_finite_rows_of_them_in_their_order() -> None:
-    one, other = course(30), course(40, 1)
-    one[3, 2], other[5, 0] = np.nan, np.inf
-    whole = np.concatenate([one, other])
-    finite = whole[np.isfinite(whole).all(axis=1)]
-    everything = samples_of_courses([one, other], 1000, np.random.default_rng(0))
-    np.testing.assert_array_equal(np.column_stack([everything.tip, everything.theta]), finite)
-    some = samples_of_courses([one, other], 25, np.random.default_rng(0))
-    places = [finite.tolist().index(row) for row in np.column_stack([some.tip, some.theta]).tolist()]
-    assert len(places) == 25 and places == sorted(set(places))
-    np.testing.assert_allclose(some.arc_length, 0.08)
-    assert some.domain.contains(some.tip).all() and some.segments == 1
-
-
-def test_ten_finite_samples_of_a_run_are_enough() -> None:
-    assert len(samples_of_courses([course(10)], 100, np.random.default_rng(0)).theta) == 10
-    with pytest.raises(UserError, match="9 finite samples"):
-        samples_of_courses([course(9)], 100, np.random.default_rng(0))
-
-
 def test_what_is_held_out_is_the_test_and_the_rest_is_for_validation() -> None:
     held = np.zeros(100, np.int64)
     held[40:60] = 1
@@ -160,3 +134,23 @@ def test_two_samples_to_validate_on_are_the_fewest() -> None:
     with pytest.raises(UserError, match="leave 1 for validation"):
         split_samples(12, 0.75, np.random.default_rng(0))
     assert len(split_samples(8, 0.01, np.random.default_rng(0)).train) == 1
+
+
+@pytest.mark.parametrize(("count", "share"), [(3, 0.75), (4, 0.9), (20, 0.75), (7, 0.01)])
+def test_whole_recordings_are_split_and_each_part_has_one(count: int, share: float) -> None:
+    rng = np.random.default_rng(1)
+    recording = rng.permutation(np.repeat(np.arange(count), rng.integers(2, 40, count)))
+    split = split_samples(len(recording), share, rng, None, recording)
+    parts = [set(recording[rows].tolist()) for rows in (split.train, split.validation, split.test)]
+    assert all(parts) and sum(map(len, parts)) == count == len(set().union(*parts))
+    assert len(parts[0]) == min(max(1, round(share * count)), count - 2) and abs(len(parts[1]) - len(parts[2])) <= 1
+    assert sorted(np.concatenate([split.train, split.validation, split.test])) == list(range(len(recording)))
+
+
+def test_two_recordings_cannot_train_choose_and_judge() -> None:
+    for recording, told in (([0, 0, 1, 1], "2 recordings: training"), ([5, 5, 5, 5], "1 recording: training")):
+        with pytest.raises(UserError, match=told) as caught:
+            split_samples(4, 0.5, np.random.default_rng(0), None, np.array(recording))
+        assert "split: sample" in caught.value.fix
+    with pytest.raises(UserError, match="a recording with a single sample"):
+        split_samples(5, 0.5, np.random.default_rng(0), None, np.array([0, 0, 1, 1, 2]))

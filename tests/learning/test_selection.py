@@ -137,3 +137,16 @@ def test_the_reason_names_both_networks_with_their_errors_in_degrees() -> None:
     )
     twin = CrossValidated(NetworkSettings(hidden=(4, 3), activation="silu"), 2, 10, np.radians([1.0, 1.3]))
     assert choose([best, cheap, twin]).chosen is twin, "of the same cost the better one"
+
+
+def test_a_fold_of_recordings_has_whole_ones() -> None:
+    recording = np.repeat(np.arange(8), 10)
+    split = split_samples(80, 0.75, np.random.default_rng(0), None, recording)
+    jobs = fold_jobs([NetworkSettings()], split, 3, np.random.SeedSequence(0), recording)
+    judged = [set(recording[job.split.validation].tolist()) for job in jobs]
+    assert sum(map(len, judged)) == len(set().union(*judged)) == 7
+    for job in jobs:
+        assert not set(recording[job.split.train]) & set(recording[job.split.validation])
+        assert not set(recording[job.split.train]) & set(recording[split.test])
+    with pytest.raises(UserError, match="7 recordings are too few for 8 folds"):
+        fold_jobs([NetworkSettings()], split, 8, np.random.SeedSequence(0), recording)

@@ -21,11 +21,11 @@ tune:
   iterations: 2
   horizon: 0.5
   objective: {rmse: 1.0, jerk: 1.0e-6}
-  scenarios: [{reference: {kind: chirp, angle_deg: 8, end_frequency: 1.5}}]
+  scenarios: [{reference: {kind: sweep, angle_deg: 8, end_frequency: 1.5}}]
 compare:
   horizon: 1.0
   rows: [{controller: lqr, gains: tuned}, {controller: lqr, gains: default}]
-  references: [{kind: chirp, angle_deg: 10, end_frequency: 1.5}]
+  references: [{kind: sweep, angle_deg: 10, end_frequency: 1.5}]
   inverses: [none]
   loops: {shaken: {plant_segments: 1, disturbances: {tremor: 0.5}}, hinged: {plant: {model: hinge}}}
 """
@@ -100,15 +100,15 @@ def test_a_tremor_shakes_and_another_plant_moves_otherwise(compared: tuple[Run, 
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("simulate", "--set", "reference.kind=chrp"), "did you mean 'chirp'?"),
+        (("simulate", "--set", "reference.kind=swep"), "did you mean 'sweep'?"),
         (("simulate", "--controller", "lqrr"), "did you mean 'lqr'?"),
         (("tune", "--set", "optimiser=coordinate"), "did you mean 'coordinates'?"),
         (("tune", "--set", "objective.jrk=1"), "did you mean 'jerk'?"),
         (("simulate", "--set", "loop.plant.model=hing"), "did you mean 'hinge'?"),
         (("simulate", "--set", "loop.disturbances.tremors=1"), "did you mean 'tremor'?"),
-        (("simulate", "--set", "reference={kind: chirp, end_frequenc: 1}"), "did you mean 'end_frequency'?"),
+        (("simulate", "--set", "reference={kind: sweep, end_frequenc: 1}"), "did you mean 'end_frequency'?"),
         (("simulate", "--set", "reference.end_frequency=1"), "unknown key 'end_frequency'"),
-        (("simulate", "--set", "reference={kind: chirp, end_frequency: fast}"), "'fast' should be a number"),
+        (("simulate", "--set", "reference={kind: sweep, end_frequency: fast}"), "'fast' should be a number"),
         (("tune", "--set", "objective.jerk=-1"), "the weight of jerk is negative"),
     ],
 )
@@ -118,9 +118,9 @@ def test_errors_know_the_newcomers(elsewhere: Elsewhere, arguments: tuple[str, .
 
 
 def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -> None:
-    said = elsewhere("simulate", "--dry-run", "--set", "reference={kind: chirp, end_frequency: 3}").stdout
+    said = elsewhere("simulate", "--dry-run", "--set", "reference={kind: sweep, end_frequency: 3}").stdout
     kind, model = (next(line for line in said.splitlines() if f" {key}:" in line) for key in ("kind", "model"))
-    assert kind.endswith(", chirp") and model.endswith(", hinge")
+    assert kind.endswith(", sweep") and model.endswith(", hinge")
     assert "end_frequency: 3  # [1/s] frequency after `duration`" in said
     tuned = elsewhere("tune", "--dry-run", "--set", "objective.jerk=0.5").stdout
     assert "jerk: 0.5  # weight of root mean square of the angle's third derivative" in tuned

@@ -127,7 +127,7 @@ def simulated() -> Any:
 
 def test_courses_of_a_result_are_what_is_sampled() -> None:
     given = simulated()
-    assert plan("source: run", run=given) == "at most 30 of 200 samples of a simulate result"
+    assert plan("source: run", run=given) == "at most 30 of 200 samples of a simulate result, 1 recording"
     study = wristctl.load_study(None, "gen-data={source: run, samples: 30}")
     done: Any = GEN_DATA.perform(session(study, inputs={"run": given}))
     course = given.trajectory
@@ -150,7 +150,7 @@ def made_run(tmp_path: Path, tables: dict[str, Sequence[str]], arrays: dict[str,
 def test_every_table_and_array_of_a_run_with_tip_and_angle_is_a_course(tmp_path: Path) -> None:
     whole = ("tip_y", "theta", "tip_x")
     run = made_run(tmp_path, {"b": whole, "a": (*whole, "time"), "c": whole[:2]}, {"z": whole, "y": ("theta",)})
-    assert plan("source: run", run=run) == f"at most 30 of {12 + 12 + 8} samples of {run.id}"
+    assert plan("source: run", run=run) == f"at most 30 of {12 + 12 + 8} samples of {run.id}, 4 recordings"
     with pytest.raises(UserError) as caught:
         plan("source: run", run=made_run(tmp_path, {"c": whole[:2]}, {}))
     assert caught.value.what == "no course in that compare run: it has no data with tip_x, tip_y, theta"

@@ -82,7 +82,7 @@ def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_
         assert found["interval"] == list(getattr(done.fit, name)[1:])
         assert found["interval"][0] <= truth <= found["interval"][1]
     source = json.loads((done.run.path / "data/source.json").read_text())
-    assert source == {"name": str(recorded), "sha256": sha256_of(recorded)}
+    assert source == {"name": recorded.name, "sha256": sha256_of(recorded)}
     kept = done.run.data("measured")
     np.testing.assert_allclose(kept.theta - kept.theta_model, done.fit.residuals[0], atol=1e-15)
     np.testing.assert_allclose(kept.tension_minus - kept.tension_minus_model, done.fit.residuals[2], atol=1e-12)

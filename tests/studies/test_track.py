@@ -103,7 +103,7 @@ def test_a_row_of_the_table_is_a_frame_with_both_markers_corners(follow: Follow)
     np.testing.assert_allclose(np.degrees(table["theta"]), [np.nan if each is None else each for each in DEGREES])
     assert list(table["verdict"]) == ["ok"] * 4 + ["no tip", "ok", "no tip", "no tip"]
     corners = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
-    assert list(table.columns) == ["time", "number", "theta", "verdict", *corners]
+    assert list(table.columns) == ["time", "number", "theta", "tip_x", "tip_y", "verdict", *corners]
     np.testing.assert_allclose(table.loc[2, "base_x1":"base_y4"].astype(float), [-20, -20, 20, -20, 20, 20, -20, 20])
     np.testing.assert_allclose(table.loc[2, "tip_x1":"tip_y4"].astype(float), 200.0 + np.arange(8.0))
 

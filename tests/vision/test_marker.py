@@ -19,6 +19,7 @@ from wristctl.vision.detector import askew, square_angle
 from wristctl.vision.marker import MEANING, Sighting, SightingVerdict, Tracker
 from wristctl.vision.scene import Scene
 from wristctl.vision.view import View
+from wristctl.wrist.kinematics import chain_tip
 
 COUNT = 200 if os.environ.get("WRISTCTL_THOROUGH") else 30
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -58,6 +59,22 @@ def test_angle_does_not_depend_on_the_cameras_side_or_roll() -> None:
         tracker = Tracker(markers, scene.view, Gates())
         (frame,) = frames(scene, np.array([20.0]))
         assert np.degrees(tracker.see(frame).theta) == pytest.approx(20.0, abs=0.4)
+
+
+@pytest.mark.parametrize("positive", ["right", "left"])
+def test_the_tip_is_where_the_last_disc_is_in_metres_from_the_first(positive: str) -> None:
+    """Four segments that do not bend alike: no one arc ends there."""
+    markers = Markers(positive=positive)  # type: ignore[arg-type]
+    scene, rng = Scene(SceneSettings(tilt_deg=8.0), WristParameters(), markers), np.random.default_rng(2)
+    angles = rng.uniform(-0.2, 0.2, (COUNT, 4))
+    pictures = [Frame(scene.render(each, rng), 0.2 * k, k) for k, each in enumerate(angles)]
+    tips = chain_tip(angles, WristParameters().length)
+    tracker = Tracker(markers, scene.view, Gates())
+    off = np.array([(seen.tip_x, seen.tip_y) for seen in map(tracker.see, pictures)]) - tips
+    assert np.sqrt(np.mean(off**2, axis=0)).max() < 2e-4 and np.abs(off.mean(axis=0)).max() < 1e-4
+    moved = Tracker(markers.model_copy(update={"base_at": -0.03, "side": 0.01}), scene.view, Gates()).see(pictures[0])
+    assert moved.tip_x == pytest.approx(-0.03 + 0.5 * (tips[0, 0] + 0.022), abs=4e-4)
+    assert moved.tip_y == pytest.approx(0.5 * tips[0, 1], abs=4e-4)
 
 
 def test_corners_lie_where_the_marker_was_drawn(scene: Scene) -> None:

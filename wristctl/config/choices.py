@@ -88,6 +88,22 @@ REFERENCES: Choices[Any] = Choices(
         "sine": "wristctl.simulation.references:SINE",
         "multi-step": "wristctl.simulation.references:MULTI_STEP",
         "tip-path": "wristctl.simulation.references:TIP_PATH",
+        "two-sided-sine": "wristctl.simulation.excitations:TWO_SIDED_SINE",
+        "chirp": "wristctl.simulation.excitations:CHIRP",
+        "square": "wristctl.simulation.excitations:SQUARE",
+        "random-steps": "wristctl.simulation.excitations:RANDOM_STEPS",
+        "recording": "wristctl.simulation.recording:RECORDING",
+        "adl:personal-care": "wristctl.simulation.daily_living:PERSONAL_CARE",
+        "adl:eating": "wristctl.simulation.daily_living:EATING",
+        "adl:stirring": "wristctl.simulation.daily_living:STIRRING",
+        "adl:combing": "wristctl.simulation.daily_living:COMBING",
+        "adl:jar": "wristctl.simulation.daily_living:JAR",
+        "adl:phone": "wristctl.simulation.daily_living:PHONE",
+        "adl:mean-flexion": "wristctl.simulation.daily_living:MEAN_FLEXION",
+        "adl:mean-deviation": "wristctl.simulation.daily_living:MEAN_DEVIATION",
+        "adl:most-flexion": "wristctl.simulation.daily_living:MOST_FLEXION",
+        "adl:all-flexion": "wristctl.simulation.daily_living:ALL_FLEXION",
+        "adl:all-deviation": "wristctl.simulation.daily_living:ALL_DEVIATION",
     },
 )
 """Of `wristctl.simulation.reference.ReferenceKind`."""
@@ -125,6 +141,7 @@ METRICS: Choices[Any] = Choices(
         "hunting": "wristctl.simulation.metrics:HUNTING",
         "observer_consistency": "wristctl.simulation.metrics:OBSERVER",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
+        "range_untracked": "wristctl.simulation.tracked_range:RANGE_UNTRACKED",
     },
 )
 """Of `wristctl.simulation.metrics.Metric`."""

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from wristctl.config.given_files import given_file
 from wristctl.config.section import Section, choice, quantity
 
 Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
@@ -16,8 +17,10 @@ Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
 class DataSettings(Section):
     """Samples of tip positions and bending angles."""
 
-    source: Literal["pcc", "plant", "run"] = choice(
-        "pcc", "constant curvature (E1), static equilibria of the loaded wrist, or an earlier run's courses", "paper"
+    source: Literal["pcc", "plant", "run", "csv"] = choice(
+        "pcc",
+        "constant curvature (E1), static equilibria of the loaded wrist, or measured: in an earlier run, in CSV files",
+        "paper",
     )
     samples: int = choice(1000, "number of samples", "paper", ge=10, le=10_000_000)
     sampling: Literal["uniform", "latin-hypercube", "sobol"] = choice(
@@ -37,7 +40,10 @@ class DataSettings(Section):
     held_out_payload: tuple[float, float] = quantity(
         (0.2, 0.3), "", "plant: part of that range kept from training, to judge by"
     )
-    run: str | None = choice(None, "run: a simulate or compare run: path, id or latest:simulate")
+    run: str | None = choice(
+        None, "run: one with tips and angles (hw-run, track, simulate, compare): path, id or latest:hw-run"
+    )
+    files: tuple[str, ...] = given_file("csv: files with units in their headers (docs/measured-data.md)", ())
 
     @model_validator(mode="after")
     def _ranges_in_order(self) -> Self:
@@ -157,6 +163,9 @@ class TrainSettings(NetworkSettings):
         "paper",
         gt=0,
         lt=1,
+    )
+    split: Literal["recording", "sample"] = choice(
+        "recording", "of measured data: whole recordings, or samples by themselves, whose neighbours then judge them"
     )
     seeds: int = choice(
         1,

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
 from wristctl.config.former import leave_out_former
-from wristctl.config.keys import home_of, keys_of, section_keys
+from wristctl.config.given_files import beside, names_a_file
+from wristctl.config.keys import field_at, home_of, keys_of, section_keys
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Phrase, Setting
@@ -56,7 +57,7 @@ def _read(file: Path) -> Document:
             f"{file}:1",
             f"one of {', '.join(keys_of(Study))} at the top",
         )
-    return document
+    return Document(_found_from(document.data, file.parent), document.lines)
 
 
 def _override(text: str, command: str | None) -> Document:
@@ -76,7 +77,22 @@ def _override(text: str, command: str | None) -> Document:
         raise error.at((where, error.where)) from error
     for key in reversed(keys):
         data = {key: data}
-    return Document(data, {})
+    return Document(_found_from(data, Path()), {})
+
+
+def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:
+    """What was read, with the files that it names as they are meant from a folder."""
+    if isinstance(data, dict):
+        return {key: _found_from(each, folder, (*path, key)) for key, each in data.items()}
+    if not isinstance(data, str | tuple):
+        return data
+    if names_a_file(field_at(path)[1]):
+        return beside(folder, data)
+    return (
+        tuple(_found_from(each, folder, (*path, at)) for at, each in enumerate(data))
+        if isinstance(data, tuple)
+        else data
+    )
 
 
 def _merge(data: dict[str, Any], document: Document, source: Phrase, origins: dict[KeyPath, Phrase]) -> None:

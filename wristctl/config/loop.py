@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.choices import REFERENCES
+from wristctl.config.given_files import given_file, of_file
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
@@ -58,7 +59,8 @@ class Reference(OpenSection):
     """The wanted motion, from rest and straight.
 
     step and minimum-jerk move to an angle or a tip position, sine swings between straight and the angle, multi-step
-    jumps through angles, tip-path moves through tip positions, each move a minimum jerk of `duration`.
+    jumps through angles, tip-path moves through tip positions, each move a minimum jerk of `duration`. Others have a
+    course of their own: recordings, excitations, motions of daily living.
     """
 
     kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of it")
@@ -69,7 +71,9 @@ class Reference(OpenSection):
         ((0.078, 0.014), (0.076, 0.021), (0.079, -0.010), (0.076, 0.021)), "m", "tips of a tip-path", min_length=1
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
-    frequency: float = quantity(0.5, "1/s", "frequency of a sine", "assumed", gt=0)
+    frequency: float = quantity(0.5, "1/s", "frequency of a sine, a chirp's at first", "assumed", gt=0)
+    file: str | None = given_file("recording: a CSV with units in its header")
+    column: str | None = of_file("recording: name of the angle's column, or tip; by default angle, bend, theta, tip")
     inverse: InverseName = choice(
         "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
     )
@@ -103,6 +107,8 @@ class Reference(OpenSection):
             raise ValueError("give angle_deg or tip, not both")
         if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
             raise ValueError("a tip target needs inverse: network or exact")
+        if (self.kind == "recording") != (self.file is not None):
+            raise ValueError("kind: recording goes with its file, and no other kind does")
         return self
 
 

@@ -26,6 +26,11 @@ _READ |= {command: (subject,) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 
+def sections_read(command: str) -> tuple[str, ...]:
+    """The sections of a study that a command reads, by their names as attributes."""
+    return tuple(name.replace("-", "_") for name in (command, *_READ.get(command, ())) if name in keys_of(Study))
+
+
 def resolved_yaml(study: Study, command: str) -> str:
     """What `command` reads of the study (seed, wrist, sections) as YAML that gives the same study."""
     entries = [entry for entry in _entries(study) if entry[0] in (*_SHARED, command, *_READ.get(command, ()))]

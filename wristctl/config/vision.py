@@ -15,6 +15,12 @@ class Markers(Section):
     base: int = choice(0, "id of the marker on the clamp", ge=0, lt=50)
     tip: int = choice(1, "id of the marker on the last disc", ge=0, lt=50)
     side: float = quantity(0.020, "m", "side of the black square", "assumed", gt=0)
+    base_at: float = quantity(
+        -0.022,
+        "m",
+        "middle of the base's marker from the first disc, along the straight wrist",
+        "assumed: on the clamp",
+    )
     distance: float = quantity(
         0.25, "m", "from the lens to the markers; scales the bend across the plane", "assumed", gt=0.02
     )

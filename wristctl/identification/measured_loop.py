@@ -6,10 +6,8 @@ lines that begin with # say nothing. The + side is the one that pulls the angle 
 
 from __future__ import annotations
 
-import csv
 import math
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,20 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError, meant
+from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected
 
-_LENGTHS, _FORCES = {"m": 1.0, "mm": 1e-3, "um": 1e-6}, {"N": 1.0}
-COLUMNS = {
-    "time": {"s": 1.0, "ms": 1e-3},
-    "angle": {"deg": math.pi / 180.0, "rad": 1.0},
-    "spool_plus": _LENGTHS,
-    "spool_minus": _LENGTHS,
-    "tension_plus": _FORCES,
-    "tension_minus": _FORCES,
-}
+_FORCES = {"N": 1.0}
+LOOP_TABLE = Expected(
+    "measured loop",
+    {
+        "time": TIME,
+        "angle": ANGLE,
+        "spool_plus": LENGTH,
+        "spool_minus": LENGTH,
+        "tension_plus": _FORCES,
+        "tension_minus": _FORCES,
+    },
+    needed=("time", "angle"),
+    example="time [s],angle [deg],spool_plus [mm],spool_minus [mm]",
+)
 """The columns that there may be, and their units; a tension is one tendon's at its spool, a side has two alike."""
-_HEAD = re.compile(r"\s*(\w+)\s*\[\s*(\w+)\s*\]\s*")
 _FEWEST = 100
 _TREMBLE = 0.05
 """Share of its whole way that what drives a loop goes back by before that is a turn."""
@@ -98,67 +101,17 @@ class MeasuredLoop:
 
 def read_loop(file: Path, wrist: WristParameters) -> MeasuredLoop:
     """A measured loop. Raises UserError for a file that is none, with line and column, and what would mend it."""
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        told = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-        raise UserError(
-            f"cannot read the measured loop: {told}", str(file), "a CSV file, see docs/hysteresis.md"
-        ) from error
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if not lines:
-        raise UserError("the measured loop is empty", str(file), f"a header such as {_EXAMPLE}, and samples below")
-    names, scales = _header(lines[0][1], f"{file}:{lines[0][0]}")
-    values = np.array([_row(line, names, f"{file}:{number}") for number, line in lines[1:]]).reshape(-1, len(names))
-    known = {name: scale * column for name, scale, column in zip(names, scales, values.T, strict=True)}
+    read = LOOP_TABLE.read(file)
+    known = read.columns
     spools, tensions = (_pair(known, name, str(file)) for name in ("spool", "tension"))
     if spools is None and tensions is None:
-        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {_EXAMPLE}")
+        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {LOOP_TABLE.example}")
     found = MeasuredLoop(file.name, known["time"], known["angle"], spools, tensions)
-    _check(found, wrist, str(file), [number for number, _ in lines[1:]])
+    _check(found, wrist, str(file), read.lines)
     return found
 
 
-_EXAMPLE = "time [s],angle [deg],spool_plus [mm],spool_minus [mm]"
-
-
-def _header(line: str, where: str) -> tuple[list[str], list[float]]:
-    names, scales = [], []
-    for cell in next(csv.reader([line])):
-        match = _HEAD.fullmatch(cell)
-        if match is None:
-            raise UserError(f"column {cell.strip()!r} is no name with a unit", where, f"name [unit], as in {_EXAMPLE}")
-        name, unit = match.groups()
-        if name not in COLUMNS:
-            raise UserError(f"unknown column {name!r}", where, f"{meant(name, COLUMNS)} Else leave it out")
-        if unit not in COLUMNS[name]:
-            raise UserError(f"{name} is in {unit!r}", where, f"{name} [{'] or ['.join(COLUMNS[name])}]")
-        if name in names:
-            raise UserError(f"column {name} stands there twice", where, "leave one out")
-        names.append(name)
-        scales.append(COLUMNS[name][unit])
-    for name in ("time", "angle"):
-        if name not in names:
-            raise UserError(f"no column {name}", where, f"a header such as {_EXAMPLE}")
-    return names, scales
-
-
-def _row(line: str, names: Sequence[str], where: str) -> list[float]:
-    cells = next(csv.reader([line]))
-    if len(cells) != len(names):
-        raise UserError(f"{len(cells)} cells under {len(names)} columns", where, "one number for each column")
-    found = []
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            found.append(float(cell))
-        except ValueError:
-            found.append(math.nan)
-        if not math.isfinite(found[-1]):
-            raise UserError(f"{name} is {cell.strip()!r}", where, "a number with a decimal point")
-    return found
-
-
-def _pair(known: dict[str, Array], name: str, where: str) -> Array | None:
+def _pair(known: Mapping[str, Array], name: str, where: str) -> Array | None:
     sides = [f"{name}_plus", f"{name}_minus"]
     there = [side for side in sides if side in known]
     if len(there) == 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +42,8 @@ class Samples:
     """(N,) KEPT, HELD_PAYLOAD or HELD_POSE"""
     segments: int
     """of the wrist they come from; 1: any"""
+    recording: NDArray[np.int64] | None = None
+    """(N,) which recording each was measured in; None where each was drawn by itself"""
 
     @property
     def inputs(self) -> Array:
@@ -63,6 +65,7 @@ class Samples:
         ends = np.array([self.domain.theta, self.domain.arc_length, *self.domain.others])
         own = {name: self.others[:, k] for k, name in enumerate(self.names)}
         more = {"held_out": self.held_out} if self.held_out.any() else {}
+        more |= {} if self.recording is None else {"recording": self.recording}
         arrays = {"tip": self.tip, "theta": self.theta, "arc_length": self.arc_length, "domain": ends}
         return arrays | own | more | {"segments": np.array(self.segments)}
 
@@ -76,7 +79,8 @@ class Samples:
         held_out = arrays.get("held_out", np.zeros(count)).astype(np.int64)
         domain = Domain(theta, arc_length, tuple(rest))
         tip, lengths = arrays["tip"], arrays["arc_length"]
-        return Samples(tip, arrays["theta"], lengths, domain, others, names, held_out, int(arrays["segments"]))
+        whose = arrays["recording"].astype(np.int64) if "recording" in arrays else None
+        return Samples(tip, arrays["theta"], lengths, domain, others, names, held_out, int(arrays["segments"]), whose)
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,8 @@ class Split:
     train: NDArray[np.int64]
     validation: NDArray[np.int64]
     test: NDArray[np.int64]
+    recording: NDArray[np.int64] | None = None
+    """(N,) which recording each sample is of, where whole ones were split"""
 
 
 def draw_samples(settings: DataSettings, wrist: WristParameters, rng: np.random.Generator) -> Samples:
@@ -101,27 +107,21 @@ def draw_samples(settings: DataSettings, wrist: WristParameters, rng: np.random.
     return _samples(length[:, None] * chain_tip(angles, 1.0), theta, segments=n)
 
 
-def samples_of_courses(tables: Sequence[Array], count: int, rng: np.random.Generator) -> Samples:
-    """At most `count` samples out of courses with columns x, y [m] and theta [rad], each (T, 3).
-
-    Raises UserError where too few are finite.
-    """
-    rows = np.concatenate(tables)
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    if len(rows) < 10:
-        raise UserError(f"the run holds {len(rows)} finite samples", "gen-data.run", "name a run with longer courses")
-    rows = rows[np.sort(rng.choice(len(rows), min(count, len(rows)), replace=False))]
-    return _samples(rows[:, :2], rows[:, 2])
-
-
 def split_samples(
-    count: int, train_share: float, rng: np.random.Generator, held_out: NDArray[np.int64] | None = None
+    count: int,
+    train_share: float,
+    rng: np.random.Generator,
+    held_out: NDArray[np.int64] | None = None,
+    recording: NDArray[np.int64] | None = None,
 ) -> Split:
     """A random split: `train_share` for training, the rest halved into validation and test.
 
-    Where samples are held out, those are the test, and the rest of the others is for validation. Raises UserError
-    where fewer than two samples would be left for either.
+    Where samples are held out, those are the test, and the rest of the others is for validation. Where they were
+    measured in recordings, whole recordings are split: samples of one are alike, and one that stands beside another in
+    training is no test. Raises UserError where fewer than two samples, or no recording, would be left for either.
     """
+    if recording is not None:
+        return _split_recordings(recording, train_share, rng)
     held = np.flatnonzero(held_out) if held_out is not None else np.empty(0, np.int64)
     order = rng.permutation(count)
     order = order[~np.isin(order, held)]
@@ -135,6 +135,23 @@ def split_samples(
         )
     test = held if len(held) else order[train + validation :]
     return Split(order[:train], order[train : train + validation], test)
+
+
+def _split_recordings(recording: NDArray[np.int64], train_share: float, rng: np.random.Generator) -> Split:
+    found = rng.permutation(np.unique(recording))
+    if len(found) < 3:
+        raise UserError(
+            f"{len(found)} recording{'s' * (len(found) != 1)}: training, choosing and judging need one each",
+            where="train.data",
+            fix="measure more, or train with split: sample, which judges by neighbours of what it was trained on",
+        )
+    train = min(max(1, round(len(found) * train_share)), len(found) - 2)
+    validation = train + max(1, (len(found) - train) // 2)
+    parts = found[:train], found[train:validation], found[validation:]
+    rows = tuple(np.flatnonzero(np.isin(recording, part)) for part in parts)
+    if min(map(len, rows)) < LEAST_SHARE:
+        raise UserError("a recording with a single sample", "train.data", "leave it out")
+    return Split(rows[0], rows[1], rows[2], recording)
 
 
 def unit_cube(sampling: str, count: int, dimensions: int, rng: np.random.Generator) -> Array:

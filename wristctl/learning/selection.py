@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.errors import UserError
@@ -60,13 +61,26 @@ def grid_points(settings: TrainSettings) -> list[NetworkSettings]:
     ]
 
 
-def fold_jobs(points: Sequence[NetworkSettings], split: Split, folds: int, seed: np.random.SeedSequence) -> list[Job]:
+def fold_jobs(
+    points: Sequence[NetworkSettings],
+    split: Split,
+    folds: int,
+    seed: np.random.SeedSequence,
+    recording: NDArray[np.int64] | None = None,
+) -> list[Job]:
     """One training for each point and fold; training and validation samples are cut in `folds`, the test is not used.
 
-    A fold has the same samples and the same random stream at every point.
+    A fold has the same samples and the same random stream at every point. Where the samples are of recordings a fold
+    has whole ones.
     """
-    rows = np.concatenate([split.train, split.validation])
-    parts, seeds = np.array_split(rows, folds), seed.spawn(folds)
+    rows, seeds = np.concatenate([split.train, split.validation]), seed.spawn(folds)
+    parts = np.array_split(rows, folds)
+    if recording is not None:
+        whole = np.unique(recording[rows])
+        if len(whole) < folds:
+            what, fix = f"{len(whole)} recordings are too few for {folds} folds", "measure more, or fewer folds"
+            raise UserError(what, "train.grid.folds", fix)
+        parts = [rows[np.isin(recording[rows], part)] for part in np.array_split(whole, folds)]
     if min(len(part) for part in parts) < 2:
         raise UserError(f"{len(rows)} samples are too few for {folds} folds", "train.grid.folds", "draw more samples")
     cuts = [Split(np.setdiff1d(rows, part, assume_unique=True), part, split.test) for part in parts]

@@ -58,10 +58,13 @@ def stream(seed: int, name: str) -> tuple[int, int]:
 class LiveRun:
     """The writing side of a run directory, handed out by `start_run`."""
 
-    def __init__(self, path: Path, manifest: Manifest, page: Page | None = None) -> None:
-        self.path, self.id, self._page = path, manifest.id, page
+    def __init__(
+        self, path: Path, manifest: Manifest, page: Page | None = None, files: Mapping[str, str] | None = None
+    ) -> None:
+        self.path, self.id, self._page, self.files = path, manifest.id, page, dict(files or {})
         self._home = path.stat()
-        self._provenance = {name: sha256_of(path / name) for name in _PROVENANCE if (path / name).is_file()}
+        known = (*_PROVENANCE, *self.files.values())
+        self._provenance = {name: sha256_of(path / name) for name in known if (path / name).is_file()}
         self._handed: set[str] = set()
         with (path / RESERVE).open("wb") as file:
             file.write(bytes(_RESERVED))

@@ -38,6 +38,7 @@ from wristctl.records.manifest import (
     Timing,
 )
 from wristctl.records.run import Run
+from wristctl.records.sealed_files import SealedFiles, sealed_files, write_files
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ def start_run(
     exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Raises
     UserError where the directory cannot be created or the disk is full.
     """
-    digest = config_hash(study, kind)
+    files = sealed_files(study, kind)
+    digest = config_hash(files.study, kind)
     path, lock = None, None
     with interrupts() as seen:
         try:
@@ -73,7 +75,7 @@ def start_run(
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 lock = RunLock(path)
-            run = _begin(path, kind, study, label, argv, inputs, digest, page)
+            run = _begin(path, kind, files, label, argv, inputs, digest, page)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
                 if path is not None:
@@ -138,7 +140,7 @@ def _keep(path: Path) -> None:
 def _begin(
     path: Path,
     kind: str,
-    study: Study,
+    files: SealedFiles,
     label: str,
     argv: Sequence[str],
     inputs: Sequence[InputRun],
@@ -147,7 +149,8 @@ def _begin(
 ) -> LiveRun:
     code, patch, sources = code_state()
     environment, packages = environment_state()
-    write_text(path / CONFIG, resolved_yaml(study, kind))
+    write_text(path / CONFIG, resolved_yaml(files.study, kind))
+    write_files(path, files.contents)
     write_text(path / PACKAGES, packages)
     write_text(path / SOURCES, sources)
     if patch:
@@ -172,7 +175,7 @@ def _begin(
             label=label,
             argv=list(argv or sys.argv),
             config_sha256=digest,
-            seed=study.seed,
+            seed=files.study.seed,
             code=code,
             environment=environment,
             inputs=records,
@@ -180,6 +183,7 @@ def _begin(
             fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in records}),
         ),
         page,
+        files.names,
     )
 
 

@@ -26,6 +26,7 @@ UNITS = {
     "pose": "rad",
     "hand_mass": "kg",
     "held_out": "1",
+    "recording": "1",
     "trial": "1",
     "epoch": "1",
     "train_loss": "rad^2",
@@ -44,6 +45,7 @@ MEANING = {
     "pose": "tilt of the base from upright",
     "hand_mass": "mass of hand and payload",
     "held_out": "0: not; held out of training by 1: its payload, 2: its pose",
+    "recording": "which of the recordings it was measured in",
     "trial": "which of the trainings with different initial weights",
     "epoch": "passes over the training data so far",
     "train_loss": "mean squared error of the angle over the epoch's batches, each before its own step",
@@ -57,10 +59,11 @@ GRID_UNITS = {"rmse_deg": "deg", "error_deg": "deg"}
 
 
 def samples_table(samples: Samples) -> pd.DataFrame:
-    """One row per sample: x, y, the other inputs, theta, arc_length, and held_out where any is."""
+    """One row per sample: x, y, the other inputs, theta, arc_length; held_out where any is, recording if measured."""
     x, y = samples.tip.T
     others = dict(zip(samples.names, samples.others.T, strict=True))
     held = {"held_out": samples.held_out} if samples.held_out.any() else {}
+    held |= {} if samples.recording is None else {"recording": samples.recording}
     return pd.DataFrame({"x": x, "y": y} | others | {"theta": samples.theta, "arc_length": samples.arc_length} | held)
 
 

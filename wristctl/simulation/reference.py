@@ -26,15 +26,19 @@ class ReferenceKind:
 
     meaning: str
     course: Callable[[Reference, Array], Array]
-    """One move from 0 to 1 with two derivatives, (3, T), by the time (T,) since it began; 0 before."""
+    """One move from 0 to 1 with two derivatives, (3, T), by the time (T,) since it began; 0 before.
+
+    Without targets the angle itself [rad], or, as (2, 3, T), that and the length of the arc [m]."""
     rest: Callable[[Reference, float, float], float]
     """When the reference rests, by when its last move begins and the horizon (which means never) [s]."""
     described: Callable[[Reference], str]
     """A short name of the reference: kind, duration and target."""
-    targets: Literal["end", "angles_deg", "tips"] = "end"
+    targets: Literal["end", "angles_deg", "tips", "none"] = "end"
     """Where its targets stand: one angle or tip at the end, or the leaf with several, one every `duration`."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
+    plane: Literal["", "ulnar", "flexion"] = ""
+    """Plane in which its angles are anatomical, whatever direction is named; empty: they count toward the direction."""
 
 
 REFERENCES: Choices[ReferenceKind] = _TABLE
@@ -46,7 +50,12 @@ def reference_name(reference: Reference) -> str:
 
 
 def toward(reference: Reference, direction: DirectionName) -> Reference:
-    """The reference whose angles count toward this direction."""
+    """The reference whose angles count toward this direction. Raises UserError for a motion of the other plane."""
+    if plane := REFERENCES[reference.kind].plane:
+        if plane != DIRECTIONS[direction].plane:
+            what = f"{reference.kind} is a motion of the {plane} plane, and {direction} is not in it"
+            raise UserError(what, "direction", f"direction: {plane}")
+        return reference
     return reference if DIRECTIONS[direction].sign > 0 else reference.mirrored()
 
 
@@ -96,7 +105,7 @@ def motion(
     from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
     What needs no network is worked out once; the arrays are read-only.
     """
-    if reference.inverse == "network":
+    if reference.inverse == "network" or reference.file:  # a file may be another by now
         return _evaluated(reference, wrist, horizon, period, network)
     return _known(reference, wrist, horizon, period)
 
@@ -111,13 +120,7 @@ def _evaluated(
 ) -> Motion:
     kind = REFERENCES[reference.kind]
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
-    targets = np.array(_targets(reference, kind, wrist))
-    before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
-    arc = np.zeros((2, 3, len(time)))
-    arc[:, 0] = before[0][:, None]
-    for number, change in enumerate(targets - before):
-        arc += change[:, None, None] * kind.course(reference, time - number * reference.duration)
-    move, begin = float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
+    arc, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
     rest = kind.rest(reference, begin, horizon)
     theta, tip = arc[0], arc_path(arc[0], arc[1])
     angles, outside = (theta[0], theta[1], theta[2]), 0.0
@@ -127,6 +130,45 @@ def _evaluated(
     for each in (time, *angles, theta, tip.position):
         each.setflags(write=False)
     return Motion(time, *angles, theta[0], tip.position, move, begin, rest, horizon, outside)
+
+
+def _moves(
+    reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
+) -> tuple[Array, float, float]:
+    """Angle and length of the arc with two derivatives (2, 3, T), the last move [rad], and when it begins."""
+    targets = np.array(_targets(reference, kind, wrist))
+    before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
+    arc = _straight(wrist, time)
+    for number, change in enumerate(targets - before):
+        arc += change[:, None, None] * kind.course(reference, time - number * reference.duration)
+    return arc, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
+
+
+def _whole(
+    reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
+) -> tuple[Array, float, float]:
+    """The same of a course that has no targets: its last move is from straight to where it ends."""
+    course, arc = kind.course(reference, time), _straight(wrist, time)
+    if course.ndim == 3:
+        arc[:] = course
+    else:
+        arc[0] = course
+    most = float(np.abs(arc[0, 0]).max(initial=0.0))
+    if most > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
+        at = time[int(np.argmax(np.abs(arc[0, 0])))]
+        raise UserError(
+            f"{reference_name(reference)} bends by {np.rad2deg(most):.1f} deg at {at:.3g} s, "
+            f"beyond the wrist's range of +-{wrist.range_deg:g} deg",
+            where="reference",
+            fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",
+        )
+    return arc, float(arc[0, 0, -1]), 0.0
+
+
+def _straight(wrist: WristParameters, time: Array) -> Array:
+    arc = np.zeros((2, 3, len(time)))
+    arc[1, 0] = wrist.length
+    return arc
 
 
 def _targets(reference: Reference, kind: ReferenceKind, wrist: WristParameters) -> list[tuple[float, float]]:

@@ -62,7 +62,7 @@ def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
         fix = "measure the spools' positions too, or hang weights"
         told = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
         log.warning(told, loop.tremble, fix)
-    findings.plain("data/source.json", {"name": str(source), "sha256": sha256_of(source)})
+    findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
     _write(findings, found)
     findings.figure("measured", measured, found)
     return found, _table(findings, found)

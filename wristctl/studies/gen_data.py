@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl.config.errors import UserError
@@ -21,8 +22,8 @@ from wristctl.studies.study_result import StudyResult
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.arrays import Array
     from wristctl.learning.dataset import Samples
+    from wristctl.learning.measured_samples import RecordedCourse
 
 
 READABLE = 200_000
@@ -47,13 +48,17 @@ class Generated(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """What a run would draw."""
     settings, wrist = study.gen_data, study.wrist
-    if "run" in inputs and settings.source != "run":
-        fix = Setting("source=run", "gen-data", option=True)
-        raise UserError("a run is given, but source is " + settings.source, "gen-data.source", fix)
-    if settings.source == "run":
-        courses, run = _courses(inputs), inputs.runs().get("run")
-        whose = run.id if run else f"a {inputs['run'].kind} result"
-        return f"at most {settings.samples} of {sum(map(len, courses))} samples of {whose}"
+    for name, given in (("run", "run" in inputs), ("csv", bool(settings.files))):
+        if given and settings.source != name:
+            fix, what = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
+            raise UserError(f"{what} given, but source is {settings.source}", "gen-data.source", fix)
+    if settings.source in ("run", "csv"):
+        courses, run = _courses(study, inputs), inputs.runs().get("run")
+        whose = (
+            run.id if run else f"a {inputs['run'].kind} result" if "run" in inputs else _counted(settings.files, "file")
+        )
+        count = sum(len(course.theta) for course in courses)
+        return f"at most {settings.samples} of {count} samples of {whose}, {_counted(courses, 'recording')}"
     begin = f"{settings.samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
     if settings.source == "plant":
         tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))
@@ -112,11 +117,13 @@ def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, done: Callable
     """The samples that the study's gen-data section asks for; `done` is told how many there are by now."""
     import numpy as np
 
-    from wristctl.learning.dataset import draw_samples, samples_of_courses
+    from wristctl.learning.dataset import draw_samples
 
     settings, rng = study.gen_data, np.random.default_rng(entropy)
-    if settings.source == "run":
-        return samples_of_courses(_courses(inputs), settings.samples, rng)
+    if settings.source in ("run", "csv"):
+        from wristctl.learning.measured_samples import samples_of_courses
+
+        return samples_of_courses(_courses(study, inputs), settings.samples, rng)
     if settings.source == "plant":
         from wristctl.learning.equilibria import draw_equilibria
 
@@ -131,7 +138,17 @@ def samples_of(given: Run | Generated) -> Samples:
     return Samples.from_arrays(given.array("samples")) if isinstance(given, Run) else given.samples
 
 
-def _courses(inputs: Inputs) -> list[Array]:
+def _counted(what: Sequence[object], name: str) -> str:
+    return f"{len(what)} {name}{'s' * (len(what) != 1)}"
+
+
+def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
+    if study.gen_data.source == "csv":
+        from wristctl.learning.measured_samples import read_courses
+
+        if not study.gen_data.files:
+            raise UserError("source csv needs files", "gen-data.files", Setting("files=[recording.csv]", "gen-data"))
+        return [course for file in study.gen_data.files for course in read_courses(Path(file))]
     found = inputs.read("run", _courses_of)
     if found is None:
         fix = Call("gen-data", arguments=(Argument("run", "latest:simulate"),))
@@ -139,37 +156,33 @@ def _courses(inputs: Inputs) -> list[Array]:
     return found
 
 
-def _courses_of(given: Given) -> list[Array]:
+def _courses_of(given: Given) -> list[RecordedCourse]:
     """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
-    import numpy as np
+    from wristctl.learning.measured_samples import NEEDED, courses_in
 
-    wanted = ("tip_x", "tip_y", "theta")
-    found = [
-        np.column_stack([np.asarray(columns[name], np.float64).ravel() for name in wanted])
-        for columns in _kept(given)
-        if all(name in columns for name in wanted)
-    ]
+    found = [course for name, columns in _kept(given) for course in courses_in(columns, name)]
     if not found:
+        tips = "name a simulate, compare, track or hw-run run; one made before tips were logged has to be repeated"
         raise UserError(
-            f"no course in that {given.kind} run: it has no data with {', '.join(wanted)}",
+            f"no course in that {given.kind} run: it has no data with {', '.join(NEEDED)}",
             str(given.path) if isinstance(given, Run) else "run",
-            "name a simulate or compare run",
+            tips,
         )
     return found
 
 
-def _kept(given: Given) -> list[Mapping[str, Any]]:
-    """Every table and every set of arrays of a run, or what a result would have written of that."""
+def _kept(given: Given) -> list[tuple[str, Mapping[str, Any]]]:
+    """Every table and every set of arrays of a run by its name, or what a result would have written of that."""
     if isinstance(given, Run):
         from wristctl.records.formats import read_arrays, read_table
 
         folder = given.path / "data"
-        frames = [read_table(file) for file in sorted(folder.glob("*.csv"))]
-        tables = [{str(name): column.to_numpy() for name, column in frame.items()} for frame in frames]
-        return [*tables, *(read_arrays(file) for file in sorted(folder.glob("*.npz")))]
+        frames = [(file.stem, read_table(file)) for file in sorted(folder.glob("*.csv"))]
+        tables = [(at, {str(name): column.to_numpy() for name, column in frame.items()}) for at, frame in frames]
+        return [*tables, *((file.stem, read_arrays(file)) for file in sorted(folder.glob("*.npz")))]
     if isinstance(given, Simulated):
-        return [given.trajectory.columns()]
-    return [given.series()] if isinstance(given, Compared) else []
+        return [("trajectory", given.trajectory.columns())]
+    return [("series", given.series())] if isinstance(given, Compared) else []
 
 
 GEN_DATA = Procedure("gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),))

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any, Generic
 
 from wristctl.config.errors import UserError
+from wristctl.config.given_files import renamed
 from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import TABLES, Manifest
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
+from wristctl.studies.given_motions import check_motions
 from wristctl.studies.inputs import Inputs, named_for_good, opened
 from wristctl.studies.procedure import Found, Procedure
 from wristctl.studies.session import Operator, Session, ShowProgress
@@ -44,6 +46,7 @@ def prepare(
     if inputs:
         own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=own)
+    check_motions(study, procedure.kind)
     return Prepared(procedure, study, inputs)
 
 
@@ -62,8 +65,10 @@ def perform(
     operator: Operator,
 ) -> Found:
     """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
-    work, findings = prepared.procedure.perform, Findings(prepared.study.seed, run)
-    session = Session(prepared.study, prepared.inputs, findings, show, operator)
+    work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
+    if run is not None and run.files:  # what is read is what was sealed
+        study = renamed(study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name)
+    session = Session(study, prepared.inputs, findings, show, operator)
     if run is None:
         return work(session)
     try:

@@ -31,11 +31,13 @@ log = logging.getLogger(__name__)
 _ASKEW = 0.3
 """Warn from here on [deg]; noise of the corners alone is below 0.1."""
 _CORNERS = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
-_UNITS = {"time": "s", "theta": "rad"} | dict.fromkeys(_CORNERS, "px")
+_UNITS = {"time": "s", "theta": "rad", "tip_x": "m", "tip_y": "m"} | dict.fromkeys(_CORNERS, "px")
 _MEANING = {
     "time": "of the frame in the recording",
     "number": "of the frame",
     "theta": "bending angle, empty where the frame cannot be used",
+    "tip_x": "tip from the first disc along the base's marker; track.markers says where that stands",
+    "tip_y": "tip across, toward theta > 0",
     "verdict": "ok, or why it cannot be used",
 } | dict.fromkeys(_CORNERS, "marker's corner, from its top left clockwise")
 
@@ -160,7 +162,9 @@ def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:
     import numpy as np
     import pandas as pd
 
-    known = {name: [getattr(each, name) for each in sightings] for name in ("time", "number", "theta")}
+    known = {
+        name: [getattr(each, name) for each in sightings] for name in ("time", "number", "theta", "tip_x", "tip_y")
+    }
     verdicts = {"verdict": [str(each.verdict) for each in sightings]}
     corners = np.array([each.corners.ravel() for each in sightings]).T
     return pd.DataFrame(known | verdicts | dict(zip(_CORNERS, corners, strict=True)))

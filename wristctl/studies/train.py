@@ -27,7 +27,9 @@ from wristctl.studies.train_outputs import (
 from wristctl.studies.train_ranking import ranking_tables, trials_frame
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import NDArray
 
     from wristctl.learning.dataset import Samples, Split
     from wristctl.learning.network import Network
@@ -63,12 +65,13 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.selection import grid_points
 
-    settings, samples, held_out = study.train, inputs.read("data", samples_of), None
+    settings, samples, held_out, whose = study.train, inputs.read("data", samples_of), None, None
     count, source = study.gen_data.samples, "samples of its own"
     if samples is not None:
         run = inputs.runs().get("data")
         count, source, held_out = len(samples.theta), run.id if run else "those given", samples.held_out
-    split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out)
+        whose = recordings(samples, settings)
+    split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
     lines = [
         f"{settings.seeds} x {row.epochs} epochs of a {'-'.join(map(str, row.hidden))} {row.activation} network"
         + (f" ({name})" if name else "")
@@ -82,8 +85,21 @@ def plan(study: Study, inputs: Inputs) -> str:
             *lines,
             f"on {source}: {len(split.train)} samples to train on, {len(split.validation)} to choose by, "
             f"{len(split.test)} to judge by",
+            *([] if split.recording is None else [_shares(split, split.recording)]),
         ]
     )
+
+
+def recordings(samples: Samples, settings: TrainSettings) -> NDArray[np.int64] | None:
+    """The recording of each sample where these are what is split, else None."""
+    return samples.recording if settings.split == "recording" else None
+
+
+def _shares(split: Split, whose: NDArray[np.int64]) -> str:
+    import numpy as np
+
+    counts = [len(np.unique(whose[rows])) for rows in (split.train, split.validation, split.test)]
+    return f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"
 
 
 def networks(settings: TrainSettings) -> dict[str, NetworkSettings]:
@@ -112,7 +128,8 @@ def train(session: Session) -> Trained:
         samples = drawn(session.study, findings.stream("samples"), Inputs())
         findings.arrays("data/samples.npz", samples.arrays())
     rng = np.random.default_rng(findings.stream("split"))
-    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out)
+    whose = recordings(samples, settings)
+    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out, whose)
     checkpoints = checkpoints_of(session)
 
     began, choice, tables = time.perf_counter(), None, []

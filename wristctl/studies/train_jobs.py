@@ -66,7 +66,7 @@ def chosen_by_folds(session: Session, samples: Samples, split: Split, checkpoint
 
     settings = session.study.train
     seed = np.random.SeedSequence(session.findings.stream("folds"))
-    jobs = fold_jobs(grid_points(settings), split, settings.grid.folds, seed)
+    jobs = fold_jobs(grid_points(settings), split, settings.grid.folds, seed, split.recording)
     trials = _train_all(session, "cross-validation", samples, jobs, checkpoints)
     if len(trials) < len(jobs) or any(trial.interrupted for trial in trials):
         raise KeyboardInterrupt

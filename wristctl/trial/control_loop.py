@@ -179,7 +179,9 @@ class ControlLoop:
                 found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
             if task.trial >= 0:
                 used = self._clock.now() - task.begin
-                self._log.frame(task.trial, seen.number, seen.time - task.begin, used, seen.theta, seen.verdict)
+                at = seen.time - task.begin
+                tip = seen.tip_x, seen.tip_y
+                self._log.frame(task.trial, seen.number, at, used, seen.theta, seen.verdict, *tip)
         return found
 
     def _watch(self, estimate: Estimate, position: Array, clock: float, late: float) -> None:

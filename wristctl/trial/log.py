@@ -67,6 +67,8 @@ FRAMES: Columns = {
     "used": ("s", "when the loop had its angle, on the trial's time"),
     "theta": ("rad", "marker angle less zero; empty where unusable"),
     "verdict": ("", "whether it can be used, and if not why"),
+    "tip_x": ("m", "tip from the first disc along the straight wrist, by the same frame; empty where unusable"),
+    "tip_y": ("m", "tip across, toward theta > 0"),
 }
 
 _RESERVED = 4 << 20

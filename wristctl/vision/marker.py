@@ -65,6 +65,10 @@ class Sighting(NamedTuple):
     """Of the tip's marker over the base's, by the edges that a bend across the plane does not foreshorten"""
     came: float = math.nan
     """When the frame was there to be looked at [s]; nan in recordings"""
+    tip_x: float = math.nan
+    """Of the tip's marker from the first disc, along the base's marker [m]; nan unless the verdict is ok"""
+    tip_y: float = math.nan
+    """The same across, toward theta > 0 [m]"""
 
 
 class _Base(NamedTuple):
@@ -97,12 +101,13 @@ class Tracker:
         found = self._find(frame)
         bases, tips = (found.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)
-        size = math.nan
+        size, tip = math.nan, (math.nan, math.nan)
         if verdict is SightingVerdict.OK and self._base is not None:
             self._used = frame.time, theta
-            size = _width(self._view.rectify(tips[0])) / _width(self._base.corners)
+            rectified = self._view.rectify(tips[0])
+            size, tip = _width(rectified) / _width(self._base.corners), self._place(self._base.corners, rectified)
         shown = np.stack([each[0] if each else _UNSEEN for each in (bases, tips)])
-        return Sighting(frame.time, frame.number, theta, verdict, shown, size)
+        return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip)
 
     def _find(self, frame: Frame) -> dict[int, list[Array]]:
         wanted = (self._markers.base, self._markers.tip)
@@ -160,6 +165,14 @@ class Tracker:
         sign = 1.0 if self._markers.positive == "right" else -1.0
         turned = sign * (square_angle(tip) - square_angle(base)) - self.zero
         return math.remainder(turned, math.tau)
+
+    def _place(self, base: Array, tip: Array) -> tuple[float, float]:
+        """Middle of the tip's marker in the base's axes [m]; the base's own sides are the scale, so none is asked."""
+        along, right = base[0] + base[1] - base[2] - base[3], base[1] + base[2] - base[0] - base[3]
+        away, side = tip.mean(axis=0) - base.mean(axis=0), self._markers.side
+        sign = 1.0 if self._markers.positive == "right" else -1.0
+        x, y = (2.0 * side * float(away @ axis) / float(axis @ axis) for axis in (along, right))
+        return self._markers.base_at + x, sign * y
 
     def _is_square(self, corners: Array) -> bool:
         along = edges(corners)

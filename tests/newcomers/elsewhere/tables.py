@@ -15,7 +15,7 @@ from wristctl.tuning.optimisers import OPTIMISERS
 from wristctl.wrist.plant import PLANTS
 
 CONTROLLERS["lqr"] = LQR
-REFERENCES["chirp"] = CHIRP
+REFERENCES["sweep"] = CHIRP
 DISTURBANCES["tremor"] = TREMOR
 METRICS["jerk"] = JERK
 OPTIMISERS["coordinates"] = CoordinateSearch

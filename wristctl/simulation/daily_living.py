@@ -1,0 +1,70 @@
+"""Motions of daily living in one plane, as curves between the ends that were measured of people.
+
+Cited are the ends; the course between them is ours: smooth strokes (minimum jerk, Flash and Hogan 1985) of `duration`
+from straight to one end, to the other and back to straight, over and over. Angles are anatomical, flexion + and
+extension -, ulnar deviation + and radial deviation - (Wu et al., ISB, J. Biomech. 38 (2005) 981), whatever direction of
+its plane is named. Two-plane motions are shown by the component that their plane has.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Reference
+from wristctl.config.section import Parameter
+from wristctl.simulation.reference import ReferenceKind, minimum_jerk
+
+_RYU = "Ryu et al., J. Hand Surg. 16A (1991) 409"
+_PALMER = "Palmer et al. 1985, as cited by Nelson et al. 1994"
+_BRUMFIELD = "Brumfield and Champoux, Clin. Orthop. 187 (1984) 23"
+_MODERN = "22 tasks of today, J. Hand Surg. 2022"
+
+
+def _task(
+    name: str, plane: Literal["ulnar", "flexion"], low_deg: float, high_deg: float, what: str, source: str
+) -> ReferenceKind:
+    """A task that takes the wrist from `low_deg` to `high_deg` in a plane; an end at 0 is where it starts."""
+    ends = [end for end in (high_deg, low_deg) if end != 0.0]
+
+    def course(reference: Reference, time: Array) -> Array:
+        angles = np.deg2rad([0.0, *ends, 0.0]) * reference.value("scale")
+        duration = reference.duration
+        whole = (len(angles) - 1) * duration
+        local = np.maximum(time - whole * np.floor(time / whole + 1e-12), 0.0)
+        found = np.zeros((3, len(time)))
+        for number, change in enumerate(np.diff(angles)):
+            found += change * np.stack(minimum_jerk(local - number * duration, duration))
+        return found
+
+    signs = ("extension", "flexion") if plane == "flexion" else ("radial", "ulnar")
+    told = " to ".join(f"{abs(end):g} deg {signs[end > 0.0]}" for end in (low_deg, high_deg) if end != 0.0)
+    return ReferenceKind(
+        f"{what}: {told} ({source})",
+        course=course,
+        rest=lambda reference, begin, horizon: horizon,
+        described=lambda reference: f"adl:{name} {reference.duration:g} s strokes" + _scaled(reference),
+        targets="none",
+        parameters={"scale": Parameter(1.0, "", "factor on the angles")},
+        plane=plane,
+    )
+
+
+def _scaled(reference: Reference) -> str:
+    scale = reference.value("scale")
+    return "" if scale == 1.0 else f" x{scale:g}"
+
+
+PERSONAL_CARE = _task("personal-care", "flexion", -15.0, 10.0, "placing the hand on the body", _BRUMFIELD)
+EATING = _task("eating", "flexion", -35.0, 5.0, "eating, drinking, telephoning, reading", _BRUMFIELD)
+STIRRING = _task("stirring", "flexion", 0.0, 46.6, "stirring", _MODERN)
+COMBING = _task("combing", "flexion", -63.8, 0.0, "combing one's hair", _MODERN)
+JAR = _task("jar", "ulnar", -15.6, 0.0, "opening a jar", _MODERN)
+PHONE = _task("phone", "ulnar", 0.0, 32.5, "telephoning", _MODERN)
+MEAN_FLEXION = _task("mean-flexion", "flexion", -30.0, 5.0, "mean over tasks and people", _PALMER)
+MEAN_DEVIATION = _task("mean-deviation", "ulnar", -10.0, 15.0, "mean over tasks and people", _PALMER)
+MOST_FLEXION = _task("most-flexion", "flexion", -40.0, 40.0, "most placing and motion tasks", _RYU)
+ALL_FLEXION = _task("all-flexion", "flexion", -60.0, 54.0, "every task", _RYU)
+ALL_DEVIATION = _task("all-deviation", "ulnar", -17.0, 40.0, "every task", _RYU)

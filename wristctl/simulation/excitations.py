@@ -1,0 +1,111 @@
+"""References that never rest, or rest nowhere in particular: what a loop is tried and identified with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.errors import UserError
+from wristctl.config.loop import Reference
+from wristctl.config.section import Parameter
+from wristctl.seeds import stream
+from wristctl.simulation.reference import ReferenceKind
+
+_OFFSET = Parameter(0.0, "deg", "middle of the motion", mirrors=True)
+
+
+def _about(reference: Reference, swing: Array) -> Array:
+    """The middle plus the angle times a swing within -1 and 1 with its two derivatives, (3, T) [rad]."""
+    found: Array = np.deg2rad(reference.end_deg) * swing
+    found[0] += np.deg2rad(reference.value("offset_deg"))
+    return found
+
+
+def _turning(phase: Array, rate: Array, acceleration: Array | float) -> Array:
+    """The sine of a phase that moves, with two derivatives."""
+    sine, cosine = np.sin(phase), np.cos(phase)
+    return np.stack([sine, rate * cosine, acceleration * cosine - rate * rate * sine])
+
+
+def _two_sided(reference: Reference, time: Array) -> Array:
+    rate = 2.0 * np.pi * reference.frequency
+    phase = rate * time + np.deg2rad(reference.value("phase_deg"))
+    return _about(reference, _turning(phase, np.full_like(time, rate), 0.0))
+
+
+def _chirp(reference: Reference, time: Array) -> Array:
+    low, high = (2.0 * np.pi * each for each in (reference.frequency, _end_frequency(reference)))
+    ramp, within = (high - low) / reference.duration, np.minimum(time, reference.duration)
+    rate = low + ramp * within
+    phase = low * within + 0.5 * ramp * within**2 + high * (time - within)
+    return _about(reference, _turning(phase, rate, np.where(time < reference.duration, ramp, 0.0)))
+
+
+def _end_frequency(reference: Reference) -> float:
+    end = reference.value("end_frequency")
+    if end <= 0.0:
+        raise UserError(f"a chirp does not end at {end:g} 1/s", "reference.end_frequency", "a frequency above 0")
+    return end
+
+
+def _square(reference: Reference, time: Array) -> Array:
+    halves = np.floor(2.0 * reference.frequency * time + 1e-9)
+    return _about(reference, np.stack([np.where(halves % 2.0 == 0.0, 1.0, -1.0), 0.0 * time, 0.0 * time]))
+
+
+def _random_steps(reference: Reference, time: Array) -> Array:
+    seed = reference.value("seed")
+    if seed < 0 or seed != int(seed):
+        raise UserError(f"{seed:g} is no seed", "reference.seed", "a whole number, 0 or more")
+    held = np.floor(time / reference.duration + 1e-9).astype(np.int64)
+    drawn = np.random.default_rng(stream(int(seed), "random steps")).uniform(-1.0, 1.0, int(held.max(initial=0)) + 1)
+    return _about(reference, np.stack([drawn[held], 0.0 * time, 0.0 * time]))
+
+
+def _swing(reference: Reference) -> str:
+    middle = reference.value("offset_deg")
+    return f"+-{abs(reference.end_deg):g} deg" + (f" about {middle:g} deg" if middle else "")
+
+
+def _with_phase(reference: Reference) -> str:
+    phase = reference.value("phase_deg")
+    return f"{reference.frequency:g} Hz {_swing(reference)}" + (f" from {phase:g} deg" if phase else "")
+
+
+TWO_SIDED_SINE = ReferenceKind(
+    "offset + angle sin(2 pi `frequency` t + phase): to both sides",
+    course=_two_sided,
+    rest=lambda reference, begin, horizon: horizon,
+    described=lambda reference: f"two-sided sine {_with_phase(reference)}",
+    targets="none",
+    parameters={"offset_deg": _OFFSET, "phase_deg": Parameter(0.0, "deg", "where in its cycle it begins")},
+)
+CHIRP = ReferenceKind(
+    "a sine whose frequency rises from `frequency` by the same each second over `duration`, and then stays",
+    course=_chirp,
+    rest=lambda reference, begin, horizon: horizon,
+    described=lambda reference: (
+        f"chirp {reference.frequency:g} to {reference.value('end_frequency'):g} Hz "
+        f"in {reference.duration:g} s {_swing(reference)}"
+    ),
+    targets="none",
+    parameters={"end_frequency": Parameter(3.0, "1/s", "frequency at the end"), "offset_deg": _OFFSET},
+)
+SQUARE = ReferenceKind(
+    "jumps between offset + angle and offset - angle, `frequency` times a second there and back",
+    course=_square,
+    rest=lambda reference, begin, horizon: horizon,
+    described=lambda reference: f"square {reference.frequency:g} Hz {_swing(reference)}",
+    targets="none",
+    parameters={"offset_deg": _OFFSET},
+)
+RANDOM_STEPS = ReferenceKind(
+    "jumps to angles drawn evenly between offset - angle and offset + angle, one each `duration`",
+    course=_random_steps,
+    rest=lambda reference, begin, horizon: horizon,
+    described=lambda reference: (
+        f"random steps {reference.duration:g} s {_swing(reference)} seed {reference.value('seed'):g}"
+    ),
+    targets="none",
+    parameters={"seed": Parameter(0, "", "of the draw: another one, other angles"), "offset_deg": _OFFSET},
+)

@@ -1,0 +1,157 @@
+"""A recorded motion as a reference: angles or tips over time, from a CSV file whose header has units.
+
+The samples' angles, and of tips the angles and lengths of the arcs that end there, are joined by a cubic spline with
+continuous second derivatives (not-a-knot, de Boor, A Practical Guide to Splines, 1978; SciPy), whose own derivatives
+are the rate and the acceleration. With `noise_deg` a quintic smoothing spline passes them by about as much (Dierckx,
+Curve and Surface Fitting with Splines, 1993). Time counts from the first sample; after the last the angle is held.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.errors import UserError, meant
+from wristctl.config.loop import Reference
+from wristctl.config.section import Parameter
+from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected, MeasuredTable
+from wristctl.simulation.reference import ReferenceKind
+from wristctl.wrist.kinematics import exact_arc
+
+ANGLES = ("angle", "bend", "theta")
+"""Names of the bending angle, the first of which that stands there is taken."""
+TIP = ("tip_x", "tip_y")
+_EXAMPLE = "time [s],angle [deg]"
+_FEWEST = 4
+_GAP = 5.0
+"""How many of its usual steps a recording's time may skip."""
+_JUMP = np.deg2rad(10.0)
+"""Between two samples [rad]: beyond it a spline through them swings."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """T samples of a motion, SI units: `arc` (2, T) has the angle and, of tips, the length of the arc, else 0."""
+
+    time: Array
+    arc: Array
+    of_tips: bool
+
+
+def read_recording(file: Path, column: str | None = None) -> Recording:
+    """The motion in a file: the column named, else an angle by one of its names, else tips.
+
+    Raises UserError for a file that is none, with line and column: gaps, times that repeat, jumps, units that are not
+    there or not known.
+    """
+    if column is not None and column not in (*ANGLES, "tip"):
+        names: tuple[str, ...] = (column,)
+    else:
+        names = ANGLES if column is None else TIP if column == "tip" else (column,)
+    units = {"time": TIME} | {name: LENGTH if name in TIP else ANGLE for name in (*names, *TIP)}
+    table = Expected("recording", units, ("time",), _EXAMPLE, others=True).read(file)
+    chosen = next((name for name in names if name in table.columns), None)
+    if chosen is None or chosen in TIP:
+        if column not in (None, "tip"):
+            raise UserError(
+                f"no column {column}", str(file), f"reference.column: {meant(str(column), _columns(table))}"
+            )
+        if not all(name in table.columns for name in TIP):
+            fix = f"a header such as {_EXAMPLE}, or time [s],tip_x [mm],tip_y [mm]"
+            raise UserError("neither an angle nor tips", str(file), fix)
+        arc = np.stack(exact_arc(np.column_stack([table.columns[name] for name in TIP])))
+    else:
+        angle = table.columns[chosen]
+        arc = np.stack([angle, 0.0 * angle])
+    time = table.columns["time"]
+    _check(table, time, arc[0])
+    return Recording(time - time[0], arc, chosen is None or chosen in TIP)
+
+
+def _columns(table: MeasuredTable) -> list[str]:
+    return [name for name in table.columns if name != "time"]
+
+
+def _check(table: MeasuredTable, time: Array, angle: Array) -> None:
+    if len(time) < _FEWEST:
+        raise UserError(f"{len(time)} samples, too few for a motion", str(table.file), f"at least {_FEWEST}")
+    steps = np.diff(time)
+    if (bad := np.flatnonzero(steps <= 0.0)).size:
+        told = "time repeats" if steps[bad[0]] == 0.0 else "time goes back"
+        raise UserError(told, table.at(bad[0] + 1), "one motion a file, its samples in the order of their times")
+    usual = float(np.median(steps))
+    if (bad := np.flatnonzero(steps > _GAP * usual)).size:
+        told = f"a gap of {steps[bad[0]]:.3g} s, where samples are {usual:.3g} s apart"
+        raise UserError(told, table.at(bad[0] + 1), "fill it in, or cut the recording there")
+    if not np.isfinite(angle).all():
+        raise UserError("a tip at the base", table.at(int(np.argmin(np.isfinite(angle)))), "tips in front of the base")
+    jumps = np.abs(np.diff(angle))
+    if (bad := np.flatnonzero(jumps > _JUMP)).size:
+        told = f"the angle jumps by {np.rad2deg(jumps[bad[0]]):.3g} deg from a sample to the next"
+        fix = "mend that sample, record more often, or put the right unit into the header"
+        raise UserError(told, table.at(bad[0] + 1), fix)
+
+
+def recording_of(reference: Reference) -> Recording:
+    """What the file of a reference holds; read again where it has changed. Raises UserError as `read_recording`."""
+    if not reference.file:
+        raise UserError("a recording needs its file", "reference.file", "reference.file: walk.csv")
+    file = Path(reference.file)
+    stamp = file.stat() if file.is_file() else None
+    return _read(file, reference.column, stamp and (stamp.st_mtime_ns, stamp.st_size))
+
+
+@lru_cache(maxsize=16)
+def _read(file: Path, column: str | None, stamp: object) -> Recording:
+    return read_recording(file, column)
+
+
+def _course(reference: Reference, time: Array) -> Array:
+    """Angle [rad] and, of tips, arc length [m], with two derivatives each: (3, T) or (2, 3, T)."""
+    recorded, scale = recording_of(reference), reference.value("scale")
+    noise = (np.deg2rad(reference.value("noise_deg")), 0.0)
+    end = recorded.time[-1]
+    within = np.clip(time, 0.0, end)
+    found = np.stack([_splined(recorded.time, each, sd, within) for each, sd in zip(recorded.arc, noise, strict=True)])
+    found[:, 1:, (time < 0.0) | (time > end + 1e-12)] = 0.0
+    found[0] *= scale
+    return found if recorded.of_tips else found[0]
+
+
+def _splined(time: Array, samples: Array, noise: float, at: Array) -> Array:
+    """A spline through samples, or past them by a standard deviation, and its two derivatives, (3, T)."""
+    from scipy.interpolate import CubicSpline, UnivariateSpline
+
+    if noise == 0.0:
+        spline = CubicSpline(time, samples)
+        return np.stack([spline(at), spline(at, 1), spline(at, 2)])
+    smooth = UnivariateSpline(time, samples, k=5, s=len(time) * noise**2)
+    return np.stack([smooth(at), smooth.derivative(1)(at), smooth.derivative(2)(at)])
+
+
+def _rest(reference: Reference, begin: float, horizon: float) -> float:
+    return min(float(recording_of(reference).time[-1]), horizon)
+
+
+def _described(reference: Reference) -> str:
+    name = Path(reference.file or "no file").name
+    scale = reference.value("scale")
+    parts = ("recording", name, reference.column or "", "" if abs(scale) == 1.0 else f"x{abs(scale):g}")
+    return " ".join(part for part in parts if part)
+
+
+RECORDING = ReferenceKind(
+    "a recorded motion: `file`, a CSV with units in its header (docs/motions.md)",
+    course=_course,
+    rest=_rest,
+    described=_described,
+    targets="none",
+    parameters={
+        "scale": Parameter(1.0, "", "factor on the recorded angle", mirrors=True),
+        "noise_deg": Parameter(0.0, "deg", "how far a smoothing spline passes the samples by, RMS; 0: none"),
+    },
+)
