@@ -18,8 +18,8 @@ import wristctl
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
-    "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "lanes", "records", "config",
-    "arrays", "interrupt", "seeds", "version",
+    "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work", "lanes", "records",
+    "config", "arrays", "interrupt", "seeds", "version",
 )  # fmt: skip
 
 
