@@ -25,7 +25,7 @@ LAYERS = (
 
 FACE = {
     "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "runs", "simulate",
-    "train", "tune",
+    "study", "train", "tune",
 }  # fmt: skip
 
 SMALL = """

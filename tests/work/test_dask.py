@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -50,9 +50,9 @@ class Cluster:
         with (self._file.parent / f"{tool}.log").open("ab") as log:
             return subprocess.Popen(command, env={**os.environ, **environment}, stdout=log, stderr=log)
 
-    def _wait(self, ready: object) -> None:
+    def _wait(self, ready: Callable[[], bool]) -> None:
         begun = time.monotonic()
-        while not ready():  # type: ignore[operator]
+        while not ready():
             assert time.monotonic() - begun < PATIENCE
             time.sleep(0.05)
 

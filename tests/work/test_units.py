@@ -14,7 +14,7 @@ from wristctl.work import unit as units_of_work
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
 from wristctl.work.unit import Unit, file_of, read_unit, take_over, write_unit
-from wristctl.work.worker import Computed
+from wristctl.work.worker import Computed, Golden
 
 
 def same(one: UnitsDone, other: UnitsDone) -> bool:

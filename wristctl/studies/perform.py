@@ -60,10 +60,11 @@ def perform(
     run: LiveRun | None,
     show: ShowProgress,
     operator: Operator,
+    executor: str = "serial",
 ) -> Found:
     """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
     work, findings = prepared.procedure.perform, Findings(prepared.study.seed, run)
-    session = Session(prepared.study, prepared.inputs, findings, show, operator)
+    session = Session(prepared.study, prepared.inputs, findings, show, operator, executor)
     if run is None:
         return work(session)
     try:
