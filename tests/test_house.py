@@ -16,7 +16,7 @@ GENERATED = {"board/messages.py"}
 SHARED_FILE_NAMES = {
     "a command: its options in cli, what it does in studies, its settings in config": {
         "analyse", "audit", "calibrate_camera", "calibrate_wrist", "compare", "gen_data", "hw_run", "hysteresis",
-        "identify", "simulate", "track", "train", "tune",
+        "identify", "simulate", "study", "fair_study", "track", "train", "tune",
     },
     "a verb of `wristctl runs` in cli/runs, and what it does": {"lineage", "replay", "report"},
     "the settings, in config, of what has that name": {"bench", "control", "learning", "plant", "vision", "wrist"},

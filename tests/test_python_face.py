@@ -18,14 +18,14 @@ import wristctl
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
-    "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "lanes", "records", "config",
-    "arrays", "interrupt", "seeds", "version",
+    "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work", "lanes", "records",
+    "config", "arrays", "interrupt", "seeds", "version",
 )  # fmt: skip
 
 
 FACE = {
     "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "runs", "simulate",
-    "train", "tune",
+    "study", "train", "tune",
 }  # fmt: skip
 
 SMALL = """

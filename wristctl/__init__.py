@@ -12,7 +12,8 @@ In a notebook:
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `compare`, `analyse`, `hysteresis`, `identify` and `audit` go the same way: wristctl.api.
+`gen_data`, `train`, `tune`, `compare`, `study`, `analyse`, `hysteresis`, `identify` and `audit` go the same way:
+wristctl.api.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
         open_run,
         runs,
         simulate,
+        study,
         train,
         tune,
     )
@@ -50,6 +52,7 @@ __all__ = [
     "open_run",
     "runs",
     "simulate",
+    "study",
     "train",
     "tune",
 ]

@@ -21,11 +21,13 @@ from wristctl.studies.analyse import ANALYSE, Analysed
 from wristctl.studies.audit import AUDIT, Audited
 from wristctl.studies.compare import COMPARE, Compared
 from wristctl.studies.counting import Watch
+from wristctl.studies.fair_study import FAIR_STUDY
 from wristctl.studies.gen_data import GEN_DATA, Generated
 from wristctl.studies.hysteresis import HYSTERESIS, Hysteresis
 from wristctl.studies.identify import IDENTIFY, Identified
 from wristctl.studies.in_python import RESULTS, Folder, Ref, carry_out, in_python
 from wristctl.studies.simulate import SIMULATE, Simulated
+from wristctl.studies.studied import Studied
 from wristctl.studies.train import TRAIN, Trained
 from wristctl.studies.tune import TUNE, Tuned
 
@@ -114,6 +116,24 @@ def compare(
     figures)` is called as it goes on.
     """
     return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
+
+
+@in_python()
+def study(
+    study: Study, *, resume: Ref | None = None, executor: str = "serial", out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Studied:  # fmt: skip
+    """Every law tuned and judged at equal budget on families of worlds, by the study's `study` section.
+
+    `resume` is a study run that was stopped, whose units of work are taken over. `executor` does the work: serial,
+    processes[:N], dask://host:port or module:factory. The result has `.rankings` by family, `.terms`, `.shifts` and
+    `.searches`; `.frame()` is a row per family and law, best first. Raises UserError for unknown laws or families, and
+    for workers that compute other numbers or are gone.
+
+    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
+    figures)` is called as it goes on.
+    """
+    return carry_out(FAIR_STUDY, study, {"resume": resume}, out, label, progress, executor)
 
 
 @in_python()

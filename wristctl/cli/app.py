@@ -29,6 +29,7 @@ COMMANDS = {
     "train": ("wristctl.cli.train", _REPRODUCE, "Train the network from tip position to bending angle."),
     "tune": ("wristctl.cli.tune", _REPRODUCE, "Search the gains of controllers."),
     "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
+    "study": ("wristctl.cli.study", _REPRODUCE, "Tune and judge all laws at equal budget: which is for which rig."),
     "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
     "analyse": ("wristctl.cli.analyse", _REPRODUCE, "Find the margins of one loop, with pictures."),
     "hysteresis": (

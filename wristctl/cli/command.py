@@ -26,6 +26,8 @@ from wristctl.config.plausible import check_lengths
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
 
+_EXECUTOR = "Who does the work: serial, processes[:N], dask://host:port or module:factory."
+
 
 def study_command(
     procedure: Procedure[Any],
@@ -47,10 +49,11 @@ def study_command(
     def call(**given: Any) -> None:
         own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if given.pop(name))
+        executor = (given.pop("executor") or "serial") if procedure.in_units else "serial"
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
         options = Options(**given)
-        _execute(procedure, options, set_, raised | ({"force"} if options.force else set()))
+        _execute(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
 
     keys = section_keys(procedure.kind)
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
@@ -64,6 +67,7 @@ def study_command(
         for leaf in (*first, *named, *shortcuts)
     ]
     own += [Own(name, text, bool) for name, text in flags.items()]
+    own += [Own("executor", _EXECUTOR, str)] * procedure.in_units
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(["Examples:", *examples]) if examples else None
@@ -71,7 +75,9 @@ def study_command(
     return app
 
 
-def _execute(procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str]) -> None:
+def _execute(
+    procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
+) -> None:
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)
@@ -89,7 +95,7 @@ def _execute(procedure: Procedure[Any], options: Options, shortcuts: Sequence[st
         show, run = partial(progress, console, quiet=options.quiet), None
         try:
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
-                found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags))
+                found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor)
         except KeyboardInterrupt:
             console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)
             raise

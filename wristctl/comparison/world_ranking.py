@@ -28,7 +28,7 @@ from wristctl.wrist.kinematics import Inverse
 if TYPE_CHECKING:
     import pandas as pd
 
-RANKED = ("rmse", "steady_state", "oscillation", "chattering", "peak_tension", "rms_tension", "saturation")
+RANKED = ("rmse", "steady_state", "oscillation", "chattering", "peak_tension", "rms_tension", "saturation", "energy")
 """Metrics that are kept of every row in every case."""
 FAILURE = float(np.deg2rad(90.0))
 """RMSE [rad] that a failure counts as in means; a row that fails stands in no group."""
@@ -118,11 +118,13 @@ def world_scores(found: Measured, worlds: int) -> Array:
     return scores
 
 
-def ranking(name: str, family: Family, rows: Sequence[RankedRow], yardstick: int) -> WorldRanking:
-    """The ranking of rows that were measured on the same worlds."""
+def ranking(
+    name: str, family: Family, rows: Sequence[RankedRow], yardstick: int, tolerated: float = 0.0
+) -> WorldRanking:
+    """The ranking of rows that were measured on the same worlds, of which each may fail or swing in a share."""
     scores = np.array([row.rmse for row in rows])
     known = penalised(scores, FAILURE)
-    stands = standing(scores, np.array([row.swings for row in rows]), FAILURE, _STREAM)
+    stands = standing(scores, np.array([row.swings for row in rows]), FAILURE, _STREAM, tolerated)
     means = [geometric_mean(each, _STREAM) for each in known]
     gains = [paired_ratio(known[yardstick], each, _STREAM) for each in known]
     return WorldRanking(name, family, scores.shape[1], list(rows), yardstick, stands, means, gains)

@@ -134,6 +134,7 @@ METRICS: Choices[Any] = Choices(
         "chattering": "wristctl.simulation.metrics:CHATTERING",
         "saturation": "wristctl.simulation.metrics:SATURATION",
         "slack": "wristctl.simulation.metrics:SLACK",
+        "energy": "wristctl.simulation.metrics:ENERGY",
         "rmse_desired": "wristctl.simulation.metrics:RMSE_DESIRED",
         "tip_rmse_mm": "wristctl.simulation.metrics:TIP_RMSE",
         "tip_steady_mm": "wristctl.simulation.metrics:TIP_STEADY",

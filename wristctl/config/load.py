@@ -17,6 +17,9 @@ from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Phrase, Setting
 
+INCLUDE = "include"
+"""The key of a study file that names others, which are read before it."""
+
 
 def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None) -> Study:
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
@@ -35,7 +38,7 @@ def read_study(
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
     for file in files:
-        _merge(data, _read(file), str(file), origins)
+        _merge_file(data, file, origins, ())
     leave_out_former(data, origins)
     for override in overrides:
         _merge(data, _override(override, command), Setting(override), origins)
@@ -43,6 +46,25 @@ def read_study(
         return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
         raise explained(error, origins) from error
+
+
+def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase], outer: Sequence[Path]) -> None:
+    """A file after those that it includes, which it names from where it stands."""
+    document = _read(file)
+    content = dict(document.data or {})
+    included = content.pop(INCLUDE, ())
+    where = f"{file}:{document.lines.get((INCLUDE,), 1)}"
+    if not isinstance(included, tuple) or not all(isinstance(each, str) for each in included):
+        raise UserError(f"{INCLUDE} should be a list of study files", where, f"{INCLUDE}: [scenarios/camera.yaml]")
+    for name in included:
+        inner = file.parent / name
+        if inner.resolve() in [each.resolve() for each in (*outer, file)]:
+            raise UserError(f"{inner} includes itself", where, "leave one of them out")
+        if not inner.is_file():
+            raise UserError(f"there is no {inner} to include", where, "paths are from the file that includes")
+        _merge_file(data, inner, origins, (*outer, file))
+    lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
+    _merge(data, Document(content, lines), str(file), origins)
 
 
 def _read(file: Path) -> Document:

@@ -22,6 +22,7 @@ Entry = tuple[str, Any, str]
 
 _SHARED = ("seed", "wrist")
 _READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "tune": ("families",), "compare": ("families",)}
+_READ["study"] = ("families",)
 _READ |= {command: (subject,) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 

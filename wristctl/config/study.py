@@ -7,6 +7,7 @@ from pydantic import Field
 from wristctl.config.analyse import AnalyseSettings
 from wristctl.config.audit import AuditSettings
 from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.fair_study import FairStudySettings
 from wristctl.config.families import Family
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.hysteresis import HysteresisSettings
@@ -31,6 +32,7 @@ class Study(Section):
     train: TrainSettings = TrainSettings()
     tune: TuneSettings = TuneSettings()
     compare: CompareSettings = CompareSettings()
+    study: FairStudySettings = FairStudySettings()
     simulate: SimulateSettings = SimulateSettings()
     analyse: AnalyseSettings = AnalyseSettings()
     audit: AuditSettings = AuditSettings()

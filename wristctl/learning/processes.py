@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
@@ -21,6 +18,7 @@ from wristctl.interrupt import deferred
 from wristctl.learning.dataset import Samples
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
+from wristctl.work.serving import serve_parent
 
 Report = Callable[[int, Epoch], None]
 """Told the job's number and its last epoch."""
@@ -105,18 +103,9 @@ def _ended() -> Iterator[None]:
 
 
 def _begin(given: dict[str, Any]) -> None:
-    """Leave Ctrl-C to the parent, and end with it: a parent that was killed tells nobody."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _given.update(given)
     given["begun"].set()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    serve_parent()
 
 
 def _work(number: int, job: Job) -> TrainingResult | None:

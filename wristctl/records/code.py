@@ -21,7 +21,7 @@ def code_state() -> tuple[Code, bytes, str]:
 
     The files are lines of hash and path as sha256sum writes them.
     """
-    sources = [(name, sha256_of(_PACKAGE / name)) for name in files_below(_PACKAGE) if "__pycache__" not in name]
+    sources = _sources()
     listing = "".join(f"{digest}  {name}\n" for name, digest in sources)
     code = Code(version=__version__, tree_sha256=sha256_of_list(sources))
     commit = _git("rev-parse", "HEAD")
@@ -31,6 +31,15 @@ def code_state() -> tuple[Code, bytes, str]:
     branch = (_git("rev-parse", "--abbrev-ref", "HEAD") or b"").decode().strip()
     update = {"commit": commit.decode().strip(), "branch": branch, "dirty": bool(patch)}
     return code.model_copy(update=update), patch, listing
+
+
+def tree_digest() -> str:
+    """One hash over the files of the package, as they are now."""
+    return sha256_of_list(_sources())
+
+
+def _sources() -> list[tuple[str, str]]:
+    return [(name, sha256_of(_PACKAGE / name)) for name in files_below(_PACKAGE) if "__pycache__" not in name]
 
 
 def _patch() -> bytes:

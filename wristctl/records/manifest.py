@@ -15,8 +15,8 @@ TABLES = "tables.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
 KINDS = (
-    "gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "audit", "hw-run", "identify", "track",
-    "calibrate-camera", "calibrate-wrist",
+    "gen-data", "train", "tune", "compare", "study", "simulate", "analyse", "hysteresis", "audit", "hw-run", "identify",
+    "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
 """What commands make runs."""
 

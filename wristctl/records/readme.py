@@ -22,7 +22,14 @@ def readme(manifest: Manifest, summary: str) -> str:
         *(["", "## Result", "", summary.strip()] if summary else []),
         *(["", "## Files", ""] if manifest.outputs else []),
     ]
+    units = [each for each in manifest.outputs if each.path.startswith("units/")]
+    if units:
+        lines.append(
+            f"- `units/` (outside the result hash): {len(units)} units of work, for a run that goes on from here"
+        )
     for output in manifest.outputs:
+        if output in units:
+            continue
         lines.append(f"- `{output.path}`" + " (outside the result hash)" * output.volatile)
         for column in output.columns:
             unit = f" [{column.unit}]" if column.unit else ""

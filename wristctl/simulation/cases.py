@@ -17,10 +17,9 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.kernel import RECORDED
-from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.metrics import METRICS, energy
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.rollout import Outcome, rollout, structure
@@ -28,6 +27,10 @@ from wristctl.simulation.worlds import plant_of
 
 _RECORDED_AT_ONCE = 12_000_000
 """Numbers that are kept of rollouts whose samples are wanted."""
+
+
+_AT_ONCE = ("oscillation", "energy")
+"""Metrics of courses that are taken of many rollouts without a trajectory for each."""
 
 
 class Case(NamedTuple):
@@ -79,16 +82,16 @@ def measure(
     failed, lasted = np.empty(shape, bool), np.empty(shape)
     done = 0
     for own in _alike(cases):
-        chosen = [cases[each] for each in own]
-        for first, last in _pieces(len(gains), chosen, _recorded(metrics)):
-            outcome, values = _measured(law, gains[first:last], chosen, wrist, metrics)
-            at = np.ix_(range(first, last), own)
+        for rows, there in _pieces(len(gains), own, cases[own[0]], _recorded(metrics)):
+            chosen = [cases[each] for each in there]
+            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics)
+            at = np.ix_(rows, there)
             for name in metrics:
-                found[name][at] = values[name].reshape(last - first, -1)
-            failed[at] = outcome.failed.reshape(last - first, -1)
+                found[name][at] = values[name].reshape(len(rows), -1)
+            failed[at] = outcome.failed.reshape(len(rows), -1)
             horizon = np.array([each.motion.horizon for each in chosen])
-            lasted[at] = outcome.until.reshape(last - first, -1) / horizon
-            done += (last - first) * len(own)
+            lasted[at] = outcome.until.reshape(len(rows), -1) / horizon
+            done += len(rows) * len(there)
             if progress is not None:
                 progress(done / failed.size)
     return Measured(found, failed, np.clip(lasted, 0.0, 1.0), np.array([case.rests for case in cases]))
@@ -107,13 +110,15 @@ def _alike(cases: Sequence[Case]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _pieces(rows: int, cases: Sequence[Case], recorded: bool) -> list[tuple[int, int]]:
-    """Rows that are run at once: all, or as many as can be kept in memory."""
+def _pieces(rows: int, own: Sequence[int], like: Case, recorded: bool) -> list[tuple[Sequence[int], Sequence[int]]]:
+    """Rows and cases that are run at once: all, or as many as can be kept in memory."""
     if not recorded:
-        return [(0, rows)]
-    columns = len(RECORDED) + cases[0].loop.plant_segments
-    each = max(1, _RECORDED_AT_ONCE // (columns * len(cases[0].motion.time) * len(cases)))
-    return [(first, min(first + each, rows)) for first in range(0, rows, each)]
+        return [(range(rows), own)]
+    columns = len(RECORDED) + like.loop.plant_segments
+    most = max(1, _RECORDED_AT_ONCE // (columns * len(like.motion.time)))
+    parts = [own[at : at + most] for at in range(0, len(own), most)]
+    each = max(1, most // min(most, len(own)))
+    return [(range(first, min(first + each, rows)), part) for part in parts for first in range(0, rows, each)]
 
 
 def _measured(
@@ -131,9 +136,13 @@ def _measured(
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics),
     )  # fmt: skip
     found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
-    slow = [name for name in metrics if name not in found and name != "oscillation"]
+    slow, step = [name for name in metrics if name not in found and name not in _AT_ONCE], motions[0].time[1]
     if "oscillation" in metrics:
-        found["oscillation"] = _oscillation(outcome, motions, which, sample_period(cases[0].loop.control_period))
+        found["oscillation"] = _oscillation(outcome, motions, which, step)
+    if "energy" in metrics:
+        assert outcome.samples is not None
+        torque, rate = (outcome.samples[:, :, RECORDED.index(each)] for each in ("torque", "rate"))
+        found["energy"] = energy(torque, rate, step)
     if slow:
         plants = [plant_of(wrist, case.loop.plant) for case in cases]
         courses = [

@@ -32,11 +32,15 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
 
 
 def drawn_cases(
-    family: Family, name: str, split: str, seed: int, draws: int, wrist: WristParameters, network: Inverse | None = None
-) -> list[Case]:
-    """Every reference in each of so many worlds; the cases of a world follow one another, each a cell of its own."""
-    cases, motions = list[Case](), dict[tuple[str, float], Motion]()
-    for world in range(draws):
+    family: Family, name: str, split: str, seed: int, draws: int, wrist: WristParameters,
+    network: Inverse | None = None, first: int = 0, noises: int = 1,
+) -> list[Case]:  # fmt: skip
+    """Every reference in each of so many worlds from the `first` on, each as often as there are `noises`.
+
+    The cases of a world follow one another, and those of a reference in it, which are a cell, differ in noise alone.
+    """
+    cases, motions, cell = list[Case](), dict[tuple[str, float], Motion](), 0
+    for world in range(first, first + draws):
         loop = world_of(family, name, split, seed, world)
         period = sample_period(loop.control_period)
         for number in range(len(family.references)):
@@ -50,7 +54,8 @@ def drawn_cases(
             if key not in motions:
                 motions[key] = motion(reference, wrist, family.horizon, period, network)
             noise = *stream(seed, _camera(split, name, number)), world
-            cases.append(Case(loop, motions[key], noise, len(cases)))
+            cases += [Case(loop, motions[key], (*noise, k) if k else noise, cell) for k in range(noises)]
+            cell += 1
     return cases
 
 

@@ -99,6 +99,11 @@ def metrics_of(
     return {name: float(value[0]) for name, value in summary(totals).items()}
 
 
+def energy(torque: Array, rate: Array, step: float) -> Any:
+    """Integral of |torque * rate| [J] over torques [N m] and rates [rad/s] (..., T) sampled every `step` [s]."""
+    return np.abs(torque * rate).sum(axis=-1) * step
+
+
 def _rests(of: Totals) -> Any:
     return (of.goals["rest"] < of.goals["horizon"]) & (np.abs(of.goals["move"]) > _LEAST_MOVE)
 
@@ -203,6 +208,12 @@ SLACK = Metric(
     lambda of: of.sums["slack"] / of.sums["ticks"],
     of_error=False,
     floor=0.001,
+)
+ENERGY = Metric(
+    "J",
+    "integral of |torque * rate|: the work that tendons do on the wrist, and the wrist on them",
+    of_trajectory=lambda course: energy(course.torque, course.rate, float(course.time[1] - course.time[0])),
+    of_error=False,
 )
 RMSE_DESIRED = Metric(
     "rad",

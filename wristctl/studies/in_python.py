@@ -33,13 +33,13 @@ def in_python() -> Iterator[None]:
 
 def carry_out(
     procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
-    progress: Watch | None,
+    progress: Watch | None, executor: str = "serial",
 ) -> Found:  # fmt: skip
     """Plan and perform a procedure with inputs by their roles; with a folder `out` it leaves a sealed run there."""
     folder, show = Path(RESULTS if out is None else out), watched(progress)
     prepared = prepare(procedure, study, folder, given)
     prepared.plan()
     if out is None:
-        return perform(prepared, None, show, Unattended())
+        return perform(prepared, None, show, Unattended(), executor)
     with recording(prepared, folder, label, [f"wristctl.{procedure.kind.replace('-', '_')}()"]) as run:
-        return perform(prepared, run, show, Unattended())
+        return perform(prepared, run, show, Unattended(), executor)

@@ -63,12 +63,13 @@ def perform(
     run: LiveRun | None,
     show: ShowProgress,
     operator: Operator,
+    executor: str = "serial",
 ) -> Found:
     """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
     work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
     if run is not None and run.files:  # what is read is what was sealed
         study = renamed(study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name)
-    session = Session(study, prepared.inputs, findings, show, operator)
+    session = Session(study, prepared.inputs, findings, show, operator, executor)
     if run is None:
         return work(session)
     try:

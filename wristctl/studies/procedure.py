@@ -26,6 +26,8 @@ class Procedure(Generic[Found]):
     perform: Callable[[Session], Found]
     """Computes; writes what it finds where the session's findings have a run directory."""
     needs: tuple[EarlierRun, ...] = ()
+    in_units: bool = False
+    """Whether it works in units, which other processes and machines may do."""
 
     def section(self, study: Study) -> Any:
         """The section of a study that names what it reads."""

@@ -66,6 +66,8 @@ class Session:
     findings: Findings
     show: ShowProgress
     operator: Operator
+    executor: str = "serial"
+    """Who does units of work, as `--executor` names it: what is found does not depend on it."""
 
     def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
         """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""

@@ -1,0 +1,65 @@
+"""The study of all laws: which are tuned and judged on which families of worlds, and at what budget."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import model_validator
+
+from wristctl.config.choices import OPTIMISERS
+from wristctl.config.control import ControllerName, Objective, Row
+from wristctl.config.section import OneOf, Section, choice
+
+
+class StudyBudget(Section):
+    """How much is run, for every law and family alike."""
+
+    candidates: int = choice(10, "candidates per iteration of a search", ge=2, le=10_000)
+    iterations: int = choice(8, "iterations of a search", ge=1, le=100_000)
+    finalists: int = choice(8, "best candidates that are judged anew on other worlds", ge=1, le=1000)
+    draws: int = choice(3, "worlds of a family that a search runs on", ge=1, le=10_000)
+    validation: int = choice(8, "other worlds that its gains are chosen by", ge=1, le=10_000)
+    worlds: int = choice(20, "held-out worlds of a family that all are judged on", ge=8, le=100_000)
+    noises: int = choice(1, "streams of camera noise that each motion in each of these meets", ge=1, le=1000)
+
+
+class StudyVariant(Section):
+    """Another way to tune, to see whether the order of the laws hangs on it."""
+
+    optimiser: str = choice("", "another optimiser; empty: the study's")
+    objective: Objective | None = choice(None, "another objective; null: the study's")
+    share: float = choice(1.0, "of the study's iterations", gt=0, le=10)
+
+    @model_validator(mode="after")
+    def _a_known_optimiser(self) -> Self:
+        if self.optimiser:
+            OPTIMISERS.named(self.optimiser)
+        return self
+
+
+class FairStudySettings(Section):
+    """Every law tuned with the same budget on each family of worlds, and judged on worlds that no search has seen."""
+
+    laws: tuple[ControllerName, ...] = choice(("pd-ff", "pid-ff"), "laws that are tuned", min_length=1)
+    families: tuple[str, ...] = choice((), "families of worlds, by their names in `families`; none: all")
+    presets: tuple[Row, ...] = choice((), "rows judged beside the tuned laws")
+    terms: dict[str, tuple[str, str]] = choice(
+        {}, "what is asked for: in words, and the rows without and with it, as pid-ff/tuned"
+    )
+    optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("differential-evolution", "ask/tell optimiser of searches")
+    objective: Objective = Objective()
+    tolerated: float = choice(
+        0.01, "share of the worlds in which a row may fail or swing and still be recommended", ge=0, lt=1
+    )
+    variants: dict[str, StudyVariant] = choice({}, "other ways to tune, by name")
+    varied: str = choice("", "the family that the variants are tried on; empty: the first")
+    budget: str = choice("small", "which of the budgets")
+    budgets: dict[str, StudyBudget] = choice({"small": StudyBudget()}, "budgets by name", min_length=1)
+    resume: str | None = choice(None, "study run that was cut short: its units are taken over")
+
+    @model_validator(mode="after")
+    def _laws_once(self) -> Self:
+        twice = sorted({each for each in self.laws if self.laws.count(each) > 1})
+        if twice:
+            raise ValueError(f"{twice[0]} is among the laws twice")
+        return self

@@ -1,0 +1,68 @@
+"""Numbers that every machine of a study must come to: short rollouts of its laws on its kinds of worlds, as one hash.
+
+All that the study will run is compiled by them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wristctl.config.families import Family
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.control.table import controller
+from wristctl.simulation.batch import sample_period
+from wristctl.simulation.drawn_worlds import world_of
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout, structure
+
+GOLDEN = "wristctl.simulation.golden:golden"
+"""As a unit of work names it."""
+_TICKS, _LANES, _DRAWN = 40, 16, 40
+
+
+def golden_spec(laws: Iterable[str], loops: Iterable[Loop], wrist: WristParameters) -> dict[str, Any]:
+    """What `golden` runs: one loop of each structure with the first law, and the first loop with each law."""
+    kinds = {structure(each): each for each in loops}
+    return {
+        "laws": list(laws),
+        "loops": [json.loads(each.model_dump_json(by_alias=True)) for each in kinds.values()],
+        "wrist": json.loads(wrist.model_dump_json(by_alias=True)),
+    }
+
+
+def kinds_of_worlds(families: Mapping[str, Family], names: Iterable[str], seed: int) -> list[Loop]:
+    """A world of every kind that the first of each family are."""
+    drawn = [world_of(families[name], name, "test", seed, number) for name in names for number in range(_DRAWN)]
+    return list({structure(each): each for each in drawn}.values())
+
+
+def golden(spec: Mapping[str, Any]) -> str:
+    """SHA-256 of the metrics of these rollouts."""
+    wrist = WristParameters.model_validate_json(json.dumps(spec["wrist"]))
+    loops = [Loop.model_validate_json(json.dumps(each)) for each in spec["loops"]]
+    digest, laws = hashlib.sha256(), [controller(each) for each in spec["laws"]]
+    for law, loop in [*((laws[0], each) for each in loops), *((each, loops[0]) for each in laws[1:])]:
+        digest.update(_numbers(law, loop, wrist).tobytes())
+    return digest.hexdigest()
+
+
+def _numbers(law: Controller, loop: Loop, wrist: WristParameters) -> np.ndarray:
+    period = sample_period(loop.control_period)
+    followed = motion(Reference(kind="step"), wrist, _TICKS * period, period)
+    outcome = rollout(
+        law, np.tile(_gains(law), (_LANES, 1)), [followed], np.zeros(_LANES, np.int64), loop, wrist,
+        streams=[(lane,) for lane in range(_LANES)], record=True, threads=1,
+    )  # fmt: skip
+    assert outcome.samples is not None
+    return np.nan_to_num(outcome.samples)
+
+
+def _gains(law: Controller) -> Sequence[float]:
+    return law.values(next(iter(law.presets.values()))) if law.presets else ()

@@ -1,0 +1,110 @@
+"""The study of all laws: tuned and judged at equal budget on every family of worlds, and which is for which rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.config.errors import UserError, meant, under
+from wristctl.config.study import Study
+from wristctl.studies.fair_outputs import written
+from wristctl.studies.fair_units import budget_of, families_of, golden_of, judge_all, performed, search_units
+from wristctl.studies.inputs import EarlierRun, Inputs
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.session import Session
+from wristctl.studies.studied import Studied
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from wristctl.studies.fair_units import Place
+    from wristctl.work.unit import Unit
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check all names, and say what it costs."""
+    from wristctl.comparison.judge_unit import noises_of
+    from wristctl.control.table import controller
+    from wristctl.simulation.size import check_size
+    from wristctl.studies.loop_inputs import check_inverses, check_row, inverses_of
+    from wristctl.tuning.search import check_tunable
+
+    settings = study.study
+    with under("study"):
+        budget = budget_of(settings)
+        if not families_of(study):
+            raise UserError("no families of worlds", "families", "include some of experiments/scenarios")
+        for name in (*families_of(study), *filter(None, [settings.varied])):
+            if name not in study.families:
+                raise UserError(f"unknown family of worlds '{name}'", "families", meant(name, study.families))
+        for number, name in enumerate(settings.laws):
+            with under(f"laws.{number}"):
+                check_tunable(controller(name))
+        for number, row in enumerate(settings.presets):
+            with under(f"presets.{number}"):
+                check_row(row, None)
+        labels = _labels(study)
+        for term, pair in settings.terms.items():
+            for label in pair:
+                if label not in labels:
+                    raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
+        families = {name: study.families[name] for name in families_of(study)}
+        for family in families.values():
+            check_size([family.loop], family.horizon)
+            check_inverses(inverses_of(family.references), None)
+    searches = sum(unit.size for unit in search_units(study).values())
+    each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
+    judged = each * budget.worlds * len(labels)
+    evaluations = budget.candidates * budget.iterations
+    return (
+        f"{len(settings.laws)} laws with {evaluations} evaluations each on {', '.join(families)}, judged with "
+        f"{len(labels) - len(settings.laws)} presets on {budget.worlds} held-out worlds of each: "
+        f"{searches} rollouts of searches and {judged} of judgements"
+    )
+
+
+def _labels(study: Study) -> list[str]:
+    """The rows of every ranking."""
+    from wristctl.tuning.objective import YARDSTICK
+
+    presets = [row.label for row in study.study.presets]
+    return list(dict.fromkeys([*(f"{law}/tuned" for law in study.study.laws), *presets, f"{YARDSTICK}/default"]))
+
+
+def fair_study(session: Session) -> Studied:
+    """Tune and judge all laws at equal budget on families of worlds: which is for which rig, what each term buys."""
+    from wristctl.tuning.search_unit import search_of
+
+    study = session.study
+    with session.progress("compiling, and computing the golden rollouts"):
+        golden = golden_of(study)
+    session.findings.numerics(golden=golden.expected, executor=session.executor)
+    wanted = search_units(study)
+    tuned = performed(session, "tuning", list(wanted.values()), golden)
+    searches = {
+        place: search_of(arrays, place.law, 1)
+        for place, arrays in zip(wanted, tuned.arrays, strict=True)
+        if arrays is not None
+    }
+    pieces = judge_all(study, {place: found.gains for place, found in searches.items()})
+    judged = performed(session, "judging", [unit for units in pieces.values() for unit in units], golden)
+    poisoned = [*tuned.poisoned, *judged.poisoned]
+    return written(session, _whole(pieces, judged.arrays), searches, poisoned)
+
+
+def _whole(
+    wanted: Mapping[Place, Sequence[Unit]], arrays: Sequence[dict[str, np.ndarray] | None]
+) -> dict[Place, list[dict[str, np.ndarray]]]:
+    """What was judged whole, in its ranges of worlds."""
+    found, given = {}, iter(arrays)
+    for place, units in wanted.items():
+        own = [next(given) for _ in units]
+        known = [each for each in own if each is not None]
+        if len(known) == len(own):
+            found[place] = known
+    return found
+
+
+FAIR_STUDY = Procedure(
+    "study", plan, fair_study, (EarlierRun("resume", kind="study", optional=True, unfinished=True),), in_units=True
+)

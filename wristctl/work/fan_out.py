@@ -1,0 +1,183 @@
+"""Units given to workers and their results brought together, in the order of the study whatever the order they end in.
+
+What a unit gave is kept at once. One that fails is tried twice more and then named, and the others go on; one that a
+worker died of is tried alone, so that none is blamed for another.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from wristctl.config.errors import UserError
+from wristctl.config.wording import Argument
+from wristctl.work.executors import Pool, Workers
+from wristctl.work.unit import Unit, read_unit, take_over, write_unit
+from wristctl.work.worker import Computed, Golden, WorkerDiffers, compute
+
+if TYPE_CHECKING:
+    import numpy as np
+
+_TRIES = 3
+_FINAL = ("KilledWorker",)
+"""Errors after which no worker is risked again: several have died of it, since Dask tries by itself."""
+_LOOK = 0.5
+"""Seconds between two looks at whether the cluster is still there."""
+RESUME = ("go on with ", Argument("resume", "RUN"), ": what is done is kept")
+
+
+class Poisoned(NamedTuple):
+    """A unit that fails wherever it is tried."""
+
+    unit: Unit
+    why: str
+
+
+@dataclass
+class UnitsDone:
+    """What units gave, in their order; None of those that failed."""
+
+    arrays: list[dict[str, np.ndarray] | None]
+    poisoned: list[Poisoned] = field(default_factory=list)
+    taken_over: int = 0
+    """Units that were there already."""
+    seconds: float = 0.0
+    """That workers have spent on units here, all together."""
+    processor: float = 0.0
+
+
+Told = Callable[[Unit, Computed | None], None]
+"""Called with each unit that is done; None: it was there already."""
+
+
+def perform_units(
+    units: Sequence[Unit],
+    workers: Workers,
+    golden: Golden | None = None,
+    folder: Path | None = None,
+    earlier: Path | None = None,
+    told: Told = lambda unit, computed: None,
+) -> UnitsDone:
+    """Compute units, those left out that are in `folder` or in the folder of an `earlier` run.
+
+    UserError, with exit code 3, where the workers compute other numbers or are gone; all that was done by then is in
+    `folder`.
+    """
+    done = UnitsDone([None] * len(units))
+    waiting = deque[int]()
+    for number, unit in enumerate(units):
+        done.arrays[number] = _known(unit, folder, earlier)
+        if done.arrays[number] is None:
+            waiting.append(number)
+        else:
+            done.taken_over += 1
+            told(unit, None)
+    if waiting:
+        _Fan(units, workers, golden, folder, told, done, waiting).run()
+    return done
+
+
+def _known(unit: Unit, folder: Path | None, earlier: Path | None) -> dict[str, np.ndarray] | None:
+    found = read_unit(folder, unit.key) if folder else None
+    if found is None and earlier is not None:
+        found = take_over(earlier, folder, unit.key) if folder else read_unit(earlier, unit.key)
+    return found
+
+
+@dataclass
+class _Fan:
+    """The units on their way."""
+
+    units: Sequence[Unit]
+    workers: Workers
+    golden: Golden | None
+    folder: Path | None
+    told: Told
+    done: UnitsDone
+    waiting: deque[int]
+    alone: deque[int] = field(default_factory=deque)
+    """Units that were under way when a worker died."""
+    failures: Counter[int] = field(default_factory=Counter)
+    running: dict[Future[Any], int] = field(default_factory=dict)
+
+    breaks: int = 0
+    """Of pools in which nothing was under way."""
+
+    def run(self) -> None:
+        """Until all are done or poisoned, with a new pool where one breaks."""
+        while self.waiting or self.alone or self.running:
+            with self.workers.open() as pool:
+                while (self.waiting or self.alone or self.running) and not self._broken(pool):
+                    pass
+        self.done.poisoned.sort(key=lambda each: self.units.index(each.unit))
+
+    def _broken(self, pool: Pool) -> bool:
+        """Hand out what there is room for and take what is done; whether the pool broke meanwhile."""
+        try:
+            self._hand_out(pool)
+        except BrokenProcessPool:
+            return self._blame([])
+        ended, _ = wait(self.running, timeout=_LOOK, return_when=FIRST_COMPLETED)
+        if what := pool.lost():
+            raise UserError(what, Argument("executor"), RESUME, exit_code=3)
+        numbers = [(future, self.running.pop(future)) for future in ended]
+        died = [number for future, number in numbers if not self._take(future, number, pool)]
+        return bool(died) and self._blame(died)
+
+    def _hand_out(self, pool: Pool) -> None:
+        while source := self.alone or self.waiting:
+            if len(self.running) >= (1 if self.alone else pool.width()):
+                return
+            unit = self.units[source[0]]
+            future = pool.executor.submit(compute, unit.does, dict(unit.spec), self.golden if pool.apart else None)
+            self.running[future] = source.popleft()
+
+    def _take(self, future: Future[Any], number: int, pool: Pool) -> bool:
+        """Take in what a unit gave or how it failed; False where its worker died."""
+        unit = self.units[number]
+        try:
+            computed: Computed = future.result()
+        except WorkerDiffers as error:
+            fix = ("workers of the same version and kind of processor; then ", *RESUME)
+            raise UserError(str(error), Argument("executor"), fix, exit_code=3) from error
+        except BrokenProcessPool:
+            return False
+        except CancelledError as error:
+            what = pool.lost() or "the executor has dropped a unit"
+            raise UserError(what, Argument("executor"), RESUME, exit_code=3) from error
+        except Exception as error:
+            notes = " ".join(getattr(error, "__notes__", ()))
+            self._failed(number, f"{type(error).__name__}: {error} {notes}", type(error).__name__ in _FINAL)
+            return True
+        if self.folder is not None:
+            write_unit(self.folder, unit.key, computed.arrays)
+        self.done.arrays[number] = dict(computed.arrays)
+        self.done.seconds += computed.seconds
+        self.done.processor += computed.processor
+        self.told(unit, computed)
+        return True
+
+    def _failed(self, number: int, why: str, final: bool = False) -> None:
+        self.failures[number] += 1
+        if self.failures[number] < _TRIES and not final:
+            self.alone.append(number)
+        else:
+            self.done.poisoned.append(Poisoned(self.units[number], " ".join(why.split())))
+
+    def _blame(self, died: Sequence[int]) -> bool:
+        """Of the units that were under way when a worker died: one alone has failed, several are tried alone."""
+        suspects = sorted({*died, *self.running.values()})
+        self.running.clear()
+        if len(suspects) == 1:
+            self._failed(suspects[0], "its worker process died")
+        else:
+            self.alone.extend(suspects)
+        self.breaks += not suspects
+        if self.breaks >= _TRIES:
+            raise UserError("worker processes die as they begin", Argument("executor"), "fewer of them, or serial", 3)
+        return True
