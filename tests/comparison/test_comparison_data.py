@@ -32,7 +32,7 @@ def row(name: str, metrics: dict[str, list[float]], failed: list[bool], segments
     values = {each: np.array(given) for each, given in metrics.items()}
     first = Simulation(course(segments), {each: given[0] for each, given in metrics.items()}, failed[0], 0.5)
     repeated = Repeated(first, values, np.array(failed), np.full(len(failed), 0.5), first.trajectory.error[None])
-    return ComparedRow("four", "step 30 deg", "exact", name, "printed", repeated)
+    return ComparedRow("four", "step 30 deg", "closed-form", name, "printed", repeated)
 
 
 def once(name: str, rmse: float, settling: float = 1.2, steady: float = 1e-4, failed: bool = False) -> ComparedRow:
@@ -64,7 +64,7 @@ def test_a_row_stands_beside_the_papers_numbers_and_their_verdict() -> None:
     near = T2["smc"]
     table = frame([once("smc", *near), once("pid", 0.5, failed=True), once("feedforward", 0.1)])
     named = ["loop", "reference", "controller", "gains", "inverse"]
-    assert list(table[named].iloc[0]) == ["four", "step 30 deg", "smc", "printed", "exact"]
+    assert list(table[named].iloc[0]) == ["four", "step 30 deg", "smc", "printed", "closed-form"]
     assert table["rmse"].tolist() == [near.rmse, 0.5, 0.1] and table["failed"].tolist() == [False, True, False]
     printed = table[["paper_rmse", "paper_settling", "paper_steady_state"]].to_numpy()
     for at, name in enumerate(("smc", "pid")):

@@ -60,7 +60,7 @@ def result(row: str, reference: str, rmse: float, failed: bool = False) -> Compa
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
     done = Simulation(course(row, 1.0, failed), metrics, failed, 0.5)
-    return ComparedRow("default", reference, "exact", controller, gains, Repeated.once(done))
+    return ComparedRow("default", reference, "closed-form", controller, gains, Repeated.once(done))
 
 
 def results() -> list[ComparedRow]:

@@ -143,7 +143,7 @@ def test_courses_of_a_comparison_are_grouped_by_loop_and_reference(
     both = compared(tmp_path / "two", [results[0], replace(results[0], inverse="network")], study)
     assert both is not None
     assert [each["group"] for each in both["courses"]] == [
-        "default, step 30 deg, exact inverse",
+        "default, step 30 deg, closed-form inverse",
         "default, step 30 deg, network inverse",
     ]
 

@@ -98,7 +98,7 @@ def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_momen
 def test_several_inverses_are_rows_of_their_own(results: list[ComparedRow]) -> None:
     both = [*results, *(dataclasses.replace(result, inverse="network") for result in results)]
     names = tick_labels(rmse_map(both).axes[0])
-    assert len(names) == 12 and {"smc/tuned, exact", "smc/tuned, network"} <= set(names)
+    assert len(names) == 12 and {"smc/tuned, closed-form", "smc/tuned, network"} <= set(names)
 
 
 def test_bars_are_medians_over_the_references(results: list[ComparedRow]) -> None:

@@ -26,7 +26,7 @@ ROWS = "rows: [{controller: pid, gains: printed}, {controller: feedforward}]"
 Compare = Callable[..., Compared]
 
 
-def row(loop: str, reference: str, label: str, inverse: str = "exact", **how: Any) -> ComparedRow:
+def row(loop: str, reference: str, label: str, inverse: str = "closed-form", **how: Any) -> ComparedRow:
     controller, gains = label.split("/")
     return ComparedRow(loop, reference, inverse, controller, gains, repeated(label, **how))
 
@@ -39,7 +39,7 @@ def both(loop: str, reference: str, **how: Any) -> list[ComparedRow]:
 def compare(monkeypatch: pytest.MonkeyPatch) -> Compare:
     """A comparison that came out with these rows; a control step takes 1, 2, ... us, at worst ten times as long."""
 
-    def compared(rows: list[ComparedRow], loops: str = "{fast: {}}", inverses: str = "[exact]") -> Compared:
+    def compared(rows: list[ComparedRow], loops: str = "{fast: {}}", inverses: str = "[closed-form]") -> Compared:
         monkeypatch.setattr(combinations, "compare", lambda *_: rows)
         times = iter(range(1, 10))
         monkeypatch.setattr(step_cost, "step_time", lambda *_: StepTime((at := float(next(times))), 10.0 * at))
@@ -54,7 +54,7 @@ def test_each_loop_and_reference_has_a_table_with_a_row_for_each_controller(comp
     titles = [f"Loop {loop}, {reference}" for loop in ("fast", "slow") for reference in (STEP, MOVE)]
     assert [table.title for table in done.tables] == [*titles, "Control step of one wrist on this machine"]
     assert [[line[:2] for line in table.rows] for table in done.tables[:-1]] == [
-        [("pid/printed", "exact"), ("feedforward/default", "exact")]
+        [("pid/printed", "closed-form"), ("feedforward/default", "closed-form")]
     ] * 4
     assert done.tables[-1].rows == [("pid/printed", 1.0, 10.0), ("feedforward/default", 2.0, 20.0)]
     assert done.tables[-1].columns == ("controller", "median [us]", "p99 [us]")
@@ -115,7 +115,9 @@ def test_one_loop_is_drawn_over_its_references(compare: Compare) -> None:
     angles = done.figures["angles-fast"]
     assert angles.get_suptitle() == "loop fast" and len(angles.axes) == 2 * 2, "the first inverse alone"
     names = [label.get_text() for label in done.figures["rmse-fast"].axes[0].get_yticklabels()]
-    assert names == [f"{label}, {way}" for way in ("exact", "none") for label in ("pid/printed", "feedforward/default")]
+    assert names == [
+        f"{label}, {way}" for way in ("closed-form", "none") for label in ("pid/printed", "feedforward/default")
+    ]
     plain, log = (done.figures[name].axes[0] for name in ("error-pid-fast", "error-log-pid-fast"))
     assert plain.get_title("left") == f"pid, loop fast, {MOVE}", "a move sooner than a step"
     assert (plain.get_yscale(), log.get_yscale()) == ("linear", "log")

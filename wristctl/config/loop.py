@@ -12,7 +12,12 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
-InverseName = Literal["none", "exact", "network"]
+_WRITTEN = {"exact": "closed-form"}
+"""What older studies call it, when a loop had that name too."""
+InverseName = Annotated[
+    Literal["none", "closed-form", "network"],
+    BeforeValidator(lambda given: _WRITTEN.get(given, given) if isinstance(given, str) else given),
+]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 
@@ -71,7 +76,8 @@ class Reference(OpenSection):
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine", "assumed", gt=0)
     inverse: InverseName = choice(
-        "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
+        "none",
+        "how wanted tips become reference angles: a network, one arc's closed-form inverse, or the angle itself",
     )
 
     @property
@@ -102,7 +108,7 @@ class Reference(OpenSection):
         if self.angle_deg is not None and self.tip is not None:
             raise ValueError("give angle_deg or tip, not both")
         if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
-            raise ValueError("a tip target needs inverse: network or exact")
+            raise ValueError("a tip target needs inverse: network or closed-form")
         return self
 
 
