@@ -53,7 +53,7 @@ def test_exact_inverse_changes_nothing_on_an_inextensible_arc() -> None:
 
 def test_frame_and_series_hold_one_row_per_result() -> None:
     found = results(f"[{SMC}]")
-    table, courses = frame(found), series(found)
+    table, courses = frame(found, ()), series(found)
     assert len(table) == len(found) == 8 and courses["theta"].shape == (8, 80) == courses["theta_ref"].shape
     assert (table["reference"] == [r.reference for r in found]).all()
 

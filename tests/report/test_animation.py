@@ -118,7 +118,7 @@ def compared(tmp_path: Path, results: list[ComparedRow], study: Study) -> dict[s
         replace(r, repeated=Repeated.once(replace(r.simulation, metrics=r.simulation.metrics | full))) for r in results
     ]
     with start_run("compare", study, "", tmp_path) as live:
-        live.table("data/comparison.csv", frame(done))
+        live.table("data/comparison.csv", frame(done, ()))
         live.arrays("data/trajectories.npz", series(done, every=1))
     return animation(Run(live.path))
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.simulation.arrival import arrives
 from wristctl.simulation.oscillation import LIMIT_CYCLE, oscillation_frequency
 from wristctl.simulation.trajectory import Trajectory
 
@@ -58,26 +59,45 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: that it failed, swings, or pulls harder than tendons can; else empty."""
+        """In words what became of it: failed, does not arrive, swings, pulls harder than tendons can; else empty."""
         return "; ".join(each for each in (self._end, self._strain) if each)
 
     @property
-    def _strain(self) -> str:
-        """What no tendon bears; 1 % more is what a spool's steps and a swing of the wrist may add to the limit."""
+    def beyond(self) -> float:
+        """Largest tension, where it is above what a tendon bears, else 0 [N].
+
+        1 % more is what a spool's steps and a swing of the wrist may add to the limit.
+        """
         known = self.metrics.get("peak_tension", np.empty(0))
         most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
-        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 1.01 * self.bears else ""
+        return most if most > 1.01 * self.bears else 0.0
+
+    @property
+    def swing(self) -> float:
+        """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
+        known = self.metrics.get("oscillation", np.empty(0))
+        swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        return swing if swing > LIMIT_CYCLE else 0.0
+
+    @property
+    def arrives(self) -> bool:
+        """Whether the first repetition ends where it was asked to."""
+        return not self.first.failed and arrives(self.first.trajectory)
+
+    @property
+    def _strain(self) -> str:
+        most = self.beyond
+        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 0.0 else ""
 
     @property
     def _end(self) -> str:
         if self.failure:
             return f"FAILED: {self.failure}"
-        known = self.metrics.get("oscillation", np.empty(0))
-        swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
-        if swing <= LIMIT_CYCLE:
-            return ""
-        rate = oscillation_frequency(self.first.trajectory)
-        return f"LIMIT CYCLE: +-{np.degrees(swing):.2g} deg at {rate:.2g} Hz"
+        short = [] if self.arrives else ["DOES NOT ARRIVE"]
+        if self.swing > 0.0:
+            rate = oscillation_frequency(self.first.trajectory)
+            short.append(f"LIMIT CYCLE: +-{np.degrees(self.swing):.2g} deg at {rate:.2g} Hz")
+        return "; ".join(short)
 
     def labelled(self, label: str) -> Repeated:
         """The same with this label on its trajectory."""
