@@ -26,7 +26,7 @@ TUNE = (
     "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]",
 )  # fmt: skip
 COMPARE = (
-    "compare", *LOOP, "--set", "inverses=[none, exact]", "--set", f"references=[{MOVE % 30}, {{kind: step}}]",
+    "compare", *LOOP, "--set", "inverses=[none, closed-form]", "--set", f"references=[{MOVE % 30}, {{kind: step}}]",
     "--set", "rows=[{controller: smc, gains: exchanged}, {controller: computed-torque, gains: default}]",
 )  # fmt: skip
 
@@ -100,7 +100,7 @@ def test_compare_has_a_row_for_every_combination_and_the_papers_numbers_beside(c
     assert len(table) == 8 and set(table["loop"]) == {"fast"}
     smc, ours = table[table["controller"] == "smc"], table[table["controller"] == "computed-torque"]
     assert (smc["paper_rmse"] == 2.7e-4).all() and ours["paper_rmse"].isna().all()
-    assert (table["inverse"].tolist() == ["none", "exact"] * 4) and not table["failed"].any()
+    assert (table["inverse"].tolist() == ["none", "closed-form"] * 4) and not table["failed"].any()
 
 
 def test_the_same_command_and_seed_give_the_same_result(call: Call, tuning: Path, comparison: Path) -> None:

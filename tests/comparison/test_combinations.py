@@ -27,7 +27,7 @@ def study(*settings: str) -> Study:
 
 
 BOTH = (
-    f"rows=[{SOFTER}, {SMC}, {PID}]", "loops={four: {}, one: {plant_segments: 1}}", "inverses=[exact, none]",
+    f"rows=[{SOFTER}, {SMC}, {PID}]", "loops={four: {}, one: {plant_segments: 1}}", "inverses=[closed-form, none]",
     "references=[{kind: step, angle_deg: 10}, {duration: 0.1}]", "directions=[flexion, radial]",
 )  # fmt: skip
 
@@ -44,7 +44,8 @@ def test_rows_come_by_loop_reference_direction_row_and_inverse(both: list[Compar
     labels = ["pid/Kp=3 Ki=1 Kd=0.1", "smc/exchanged", "pid/Kp=30 Ki=10 Kd=0.5"]
     wanted = [
         (loop, reference, label, inverse)
-        for loop in ("four", "one") for reference in references for label in labels for inverse in ("exact", "none")
+        for loop in ("four", "one") for reference in references for label in labels
+        for inverse in ("closed-form", "none")
     ]  # fmt: skip
     assert [(row.loop, row.reference, row.label, row.inverse) for row in both] == wanted
 
@@ -97,7 +98,7 @@ def test_a_loops_own_period_samples_its_references() -> None:
 
 def test_repetitions_meet_another_plant_each_and_the_same_for_every_row() -> None:
     drawn = study(f"loops={{drawn: {DRAWN}}}", "repetitions=3", f"rows=[{PID}, {SOFTER}]",
-                  "inverses=[none, exact]", "references=[{duration: 0.1}]")  # fmt: skip
+                  "inverses=[none, closed-form]", "references=[{duration: 0.1}]")  # fmt: skip
     found = compare(drawn)
     assert len(found) == 4 and all(len(set(row.repeated.metrics["rmse"])) == 3 for row in found)
     for direct, through_tip in zip(found[::2], found[1::2], strict=True):
@@ -151,8 +152,8 @@ def test_a_network_changes_the_reference_of_its_inverse_and_not_what_is_wanted()
         right = exact_inverse(path)
         return replace(right, theta=0.9 * right.theta)
 
-    asked = study("loops={one: {}}", "inverses=[exact, network]", "references=[{duration: 0.1}]")
+    asked = study("loops={one: {}}", "inverses=[closed-form, network]", "references=[{duration: 0.1}]")
     ((exact, learned),) = [condition.courses for condition in planned(asked, short)]
-    assert (exact.inverse, learned.inverse) == ("exact", "network")
+    assert (exact.inverse, learned.inverse) == ("closed-form", "network")
     np.testing.assert_allclose(learned.motion.theta_ref, 0.9 * exact.motion.theta_ref, atol=1e-12)
     np.testing.assert_array_equal(learned.motion.theta_desired, exact.motion.theta_desired)

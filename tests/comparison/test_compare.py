@@ -19,7 +19,7 @@ from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.simulation.reference import reference_name
 
 SETTINGS = (
-    "loops={one: {plant_segments: 1}, four: {}}", "horizon=0.4", "inverses=[none, exact]",
+    "loops={one: {plant_segments: 1}, four: {}}", "horizon=0.4", "inverses=[none, closed-form]",
     "references=[{kind: step, angle_deg: 10}, {duration: 0.3}]",
 )  # fmt: skip
 PID, SMC = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: smc, gains: exchanged}"
@@ -53,7 +53,7 @@ def test_exact_inverse_changes_nothing_on_an_inextensible_arc() -> None:
 
 def test_frame_and_series_hold_one_row_per_result() -> None:
     found = results(f"[{SMC}]")
-    table, courses = frame(found), series(found)
+    table, courses = frame(found, ()), series(found)
     assert len(table) == len(found) == 8 and courses["theta"].shape == (8, 80) == courses["theta_ref"].shape
     assert (table["reference"] == [r.reference for r in found]).all()
 
@@ -67,7 +67,7 @@ def test_verdict_needs_rmse_and_settling_near_the_papers() -> None:
 
 def test_references_are_named_by_kind_duration_and_target() -> None:
     assert reference_name(Reference(kind="step")) == "step 30 deg"
-    assert reference_name(Reference(tip=(0.07, 0.02), inverse="exact")) == "minimum jerk 1 s tip 70, 20 mm"
+    assert reference_name(Reference(tip=(0.07, 0.02), inverse="closed-form")) == "minimum jerk 1 s tip 70, 20 mm"
 
 
 def test_step_time_is_measured_for_every_controller() -> None:

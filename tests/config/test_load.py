@@ -137,3 +137,13 @@ def test_named_loops_are_all_there_are_and_a_built_in_one_keeps_what_is_not_give
     assert load_study([]).compare.loops == LOOPS
     with pytest.raises(UserError, match="at least 1 item"):
         load_study([], ["loops={}"], "compare")
+
+
+def test_studies_that_call_the_closed_form_exact_still_read() -> None:
+    """A loop has that name too, so what is written now is another."""
+    study = load_study(
+        [], ["compare.inverses=[network, exact]", "simulate.reference={tip: [0.07, 0.02], inverse: exact}"]
+    )
+    assert study.compare.inverses == ("network", "closed-form") and study.simulate.reference.inverse == "closed-form"
+    with pytest.raises(UserError, match="closed-form"):
+        load_study([], ["compare.inverses=[closed-from]"])

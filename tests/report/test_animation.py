@@ -118,7 +118,7 @@ def compared(tmp_path: Path, results: list[ComparedRow], study: Study) -> dict[s
         replace(r, repeated=Repeated.once(replace(r.simulation, metrics=r.simulation.metrics | full))) for r in results
     ]
     with start_run("compare", study, "", tmp_path) as live:
-        live.table("data/comparison.csv", frame(done))
+        live.table("data/comparison.csv", frame(done, ()))
         live.arrays("data/trajectories.npz", series(done, every=1))
     return animation(Run(live.path))
 
@@ -143,7 +143,7 @@ def test_courses_of_a_comparison_are_grouped_by_loop_and_reference(
     both = compared(tmp_path / "two", [results[0], replace(results[0], inverse="network")], study)
     assert both is not None
     assert [each["group"] for each in both["courses"]] == [
-        "default, step 30 deg, exact inverse",
+        "default, step 30 deg, closed-form inverse",
         "default, step 30 deg, network inverse",
     ]
 

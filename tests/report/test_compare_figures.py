@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from tests.report.conftest import result as compared_row
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
-from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.report.compare_figures import rmse_map, variation_dots
 from wristctl.report.repetition_figures import error_sizes
 from wristctl.report.style import WIDTH
 from wristctl.simulation.repetitions import Repeated
@@ -23,16 +23,6 @@ def texts(axes: Axes) -> list[str]:
 
 def tick_labels(axes: Axes) -> list[str]:
     return [label.get_text() for label in axes.get_yticklabels()]
-
-
-def test_grid_has_a_row_for_each_controller_and_a_column_for_each_reference(results: list[ComparedRow]) -> None:
-    axes = np.array(angle_grid(results).axes).reshape(6, 3)
-    assert axes[0, 0].get_title("left") == "step 30 deg"
-    assert texts(axes[3, 2]) == ["pid/\ntuned"]
-    for panel, result in zip(axes.flat, results, strict=True):
-        every_tenth = np.degrees(result.simulation.trajectory.theta[::10])
-        np.testing.assert_array_equal(panel.lines[0].get_ydata(), every_tenth)
-    assert "diverged" in texts(axes[1, 0]) and "diverged" not in texts(axes[1, 1])
 
 
 def test_map_prints_every_rmse_and_marks_what_failed(results: list[ComparedRow]) -> None:
@@ -69,13 +59,13 @@ def test_of_repetitions_map_and_bars_show_the_median_with_its_interval_and_what_
     values = [1e-3 * k for k in range(1, 13)]
     row = dataclasses.replace(one_result(), repeated=repeated(values))
     assert texts(rmse_map([row]).axes[0]) == ["0.0065\n0.003 to 0.01"]
-    (axes,) = chattering_bars([row]).axes
-    (bar,), (dot, whisker) = axes.patches, axes.lines
-    assert bar.get_width() == pytest.approx(6.5e4)  # type: ignore[attr-defined]
+    (axes,) = variation_dots([row]).axes
+    dot, median, whisker = axes.lines
+    assert median.get_xdata() == pytest.approx([6.5e4] * 2)
     assert dot.get_xdata() == pytest.approx([6.5e4]) and whisker.get_xdata() == pytest.approx([3e4, 10e4])
     one_failed = dataclasses.replace(row, repeated=repeated(values, failed=1))
     assert texts(rmse_map([one_failed]).axes[0]) == ["0.0075\n0.004 to 0.011\n1 of 12 failed"]
-    assert chattering_bars([one_failed]).axes[0].patches[0].get_hatch()
+    assert [variation_dots([each]).axes[0].lines[0].get_marker() for each in (row, one_failed)] == ["o", "x"]
     few = dataclasses.replace(row, repeated=repeated(values[:3]))
     assert texts(rmse_map([few]).axes[0]) == ["0.002"]
 
@@ -98,52 +88,22 @@ def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_momen
 def test_several_inverses_are_rows_of_their_own(results: list[ComparedRow]) -> None:
     both = [*results, *(dataclasses.replace(result, inverse="network") for result in results)]
     names = tick_labels(rmse_map(both).axes[0])
-    assert len(names) == 12 and {"smc/tuned, exact", "smc/tuned, network"} <= set(names)
-
-
-def test_bars_are_medians_over_the_references(results: list[ComparedRow]) -> None:
-    (axes,) = chattering_bars(results).axes
-    bars = [bar.get_width() for bar in axes.patches]  # type: ignore[attr-defined]
-    assert bars == pytest.approx([10.0 * (3 * row + 2) for row in range(6)])
-    assert tick_labels(axes)[1] == "smc/exchanged" and axes.patches[1].get_hatch()
-
-
-def test_a_grid_is_drawn_in_degrees_with_the_desired_angle_and_its_units(results: list[ComparedRow]) -> None:
-    made = angle_grid(results, "Loop default")
-    assert (made.get_suptitle(), made.get_supxlabel(), made.get_supylabel()) == (
-        "Loop default",
-        "time [s]",
-        "bending angle [deg]",
-    )
-    panels = np.array(made.axes).reshape(6, 3)
-    for panel, result in zip(panels.flat, results, strict=True):
-        np.testing.assert_array_equal(panel.lines[0].get_xdata(), result.simulation.trajectory.time[::10])
-        np.testing.assert_allclose(np.asarray(panel.lines[1].get_ydata()), 30.0)
-    titles = [each.get_title("left").replace("\n", " ") for each in panels[0]]
-    assert titles == ["step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg"]
-    assert not any(each.get_title("left") for each in panels[1:].flat)
-    sides = [[text for text in texts(each) if text != "diverged"] for each in panels.flat]
-    assert sides == [own for result in results[::3] for own in ([], [], [result.label.replace("/", "/\n")])]
-    assert panels[0, 0].get_ylim() == pytest.approx((-15.0, 45.0)), "what diverged hides no other"
+    assert len(names) == 12 and {"smc/tuned, closed-form", "smc/tuned, network"} <= set(names)
 
 
 def test_loops_may_be_the_columns_of_one_reference(results: list[ComparedRow]) -> None:
     one = [each for each in results if each.reference == "step 30 deg"]
     stiff = [dataclasses.replace(each, loop="stiff") for each in one]
-    made = angle_grid([*one, *stiff], across="loop")
-    panels = np.array(made.axes).reshape(6, 2)
-    assert [each.get_title("left") for each in panels[0]] == ["default", "stiff"]
     ours = rmse_map([*one, *stiff], across="loop").axes[0]
     assert [label.get_text() for label in ours.get_xticklabels()] == ["default", "stiff"]
 
 
 def test_figures_grow_with_their_rows_and_columns(results: list[ComparedRow]) -> None:
     many = [dataclasses.replace(results[0], reference=f"r{k}") for k in range(12)]
-    for draw in (angle_grid, rmse_map):
-        small, wide = draw(results[:1]), draw(many)
-        assert wide.get_figwidth() > 1.5 * small.get_figwidth() and wide.get_figheight() == small.get_figheight()
-        assert small.get_figwidth() == draw(results[:2]).get_figwidth() == WIDTH
-    for each in (angle_grid, rmse_map, chattering_bars):
+    small, wide = rmse_map(results[:1]), rmse_map(many)
+    assert wide.get_figwidth() > 1.5 * small.get_figwidth() and wide.get_figheight() == small.get_figheight()
+    assert small.get_figwidth() == rmse_map(results[:2]).get_figwidth() == WIDTH
+    for each in (rmse_map, variation_dots):
         assert each(results).get_figheight() > 1.5 * each(results[:3]).get_figheight()
 
 
@@ -180,23 +140,29 @@ def test_chattering_shows_each_reference_beside_the_median(results: list[Compare
         )
         for k, r in enumerate(results)
     ]
-    (axes,) = chattering_bars(uneven, "Loop default").axes
-    bars = [(bar.get_width(), bar.get_y() + 0.5 * bar.get_height()) for bar in axes.patches]  # type: ignore[attr-defined]
-    assert bars == [pytest.approx((10.0, row)) for row in range(6)]
-    for row, line in enumerate(axes.lines):
-        np.testing.assert_allclose(np.asarray(line.get_data()), np.array([[1.0, 10.0, 100.0], [row] * 3]))
-    assert [bool(bar.get_hatch()) for bar in axes.patches] == [False, True, False, False, False, False]
+    (axes,) = variation_dots(uneven, "Loop default").axes
+    dots, medians = axes.lines[::2], axes.lines[1::2]
+    for row, (dot, median) in enumerate(zip(dots, medians, strict=True)):
+        np.testing.assert_allclose(np.asarray(dot.get_data()), np.array([[1.0, 10.0, 100.0], [row] * 3]))
+        np.testing.assert_allclose(np.asarray(median.get_data()), np.array([[10.0, 10.0], [row - 0.3, row + 0.3]]))
+    assert [dot.get_marker() for dot in dots] == ["o", "x", "o", "o", "o", "o"] and tick_labels(axes)[
+        0
+    ] == "smc/printed"
     assert axes.get_xscale() == "log" and axes.yaxis_inverted() and axes.get_title("left") == "Loop default"
-    assert "[N/s]" in axes.get_xlabel() and not any(line.get_visible() for line in axes.get_ygridlines())
+    assert "[N/s]" in axes.get_xlabel() and not axes.patches, "a bar's length says nothing on a logarithmic axis"
 
 
-def test_panels_and_cells_of_many_rows_and_columns_are_large_enough_to_read_and_no_larger(
+def test_the_papers_column_stands_where_it_is_asked_for_alone(results: list[ComparedRow]) -> None:
+    assert len(rmse_map(results).axes) == 3 and len(rmse_map(results, beside=False).axes) == 2
+    others = [each for each in results if each.controller not in T2]
+    assert len(rmse_map(others).axes) == 2, "no column without a number in it"
+
+
+def test_cells_of_many_rows_and_columns_are_large_enough_to_read_and_no_larger(
     results: list[ComparedRow],
 ) -> None:
     rows = [dataclasses.replace(results[0], reference=f"r{k}", gains=f"g{k}") for k in range(12)]
-    for draw, least, most in ((angle_grid, (0.8, 0.6), (1.6, 1.3)), (rmse_map, (0.7, 0.25), (1.2, 0.45))):
-        made = draw(rows)
-        made.draw_without_rendering()
-        box = made.axes[0].get_window_extent().transformed(made.dpi_scale_trans.inverted())
-        count = 1 if draw is angle_grid else 12
-        assert least[0] < box.width / count < most[0] and least[1] < box.height / count < most[1], "in inches"
+    made = rmse_map(rows)
+    made.draw_without_rendering()
+    box = made.axes[0].get_window_extent().transformed(made.dpi_scale_trans.inverted())
+    assert 0.7 < box.width / 12 < 1.2 and 0.25 < box.height / 12 < 0.45, "in inches"

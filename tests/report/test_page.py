@@ -19,7 +19,7 @@ from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
-from wristctl.report.compare_figures import angle_grid, chattering_bars, rmse_map
+from wristctl.report.compare_figures import rmse_map, variation_dots
 from wristctl.report.comparison_page import several_page
 from wristctl.report.page import page
 from wristctl.simulation.repetitions import Repeated
@@ -44,11 +44,10 @@ def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow
     inputs = [InputRun("network", Run(network.path))]
     argv = ["wristctl", "compare", "--label", MARKUP]
     with start_run("compare", Study(), "quick", out, argv, inputs, lambda path, man: page(Run(path), man)) as run:
-        run.table("data/comparison.csv", frame(found))
+        run.table("data/comparison.csv", frame(found, ()))
         run.arrays("data/trajectories.npz", series(found, every=1))
-        run.figure("angles-default", angle_grid(found, "loop default"))
         run.figure("rmse-default", rmse_map(found, "loop default"))
-        run.figure("chattering-default", chattering_bars(found, "loop default"))
+        run.figure("tension-variation-default", variation_dots(found, "loop default"))
         for each in found:
             value = each.simulation.metrics["rmse"]
             run.metric(f"rmse_{each.label}_{each.reference}", value, "rad", "lower", meaning=MARKUP)

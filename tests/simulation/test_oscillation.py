@@ -57,7 +57,7 @@ def test_only_what_is_left_at_rest_is_called_a_limit_cycle() -> None:
         for each in (still, turning)
     ]
     assert fates[0].startswith("LIMIT CYCLE: +-0.23 deg at 25 Hz")
-    assert fates[1].startswith("RIPPLE: +-0.") and "friction where the reference turns" in fates[1]
+    assert fates[1].startswith("RIPPLE: +-0.") and "friction at the turns" in fates[1]
 
 
 def test_what_was_before_the_last_second_does_not_count() -> None:

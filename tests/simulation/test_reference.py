@@ -32,7 +32,7 @@ def test_minimum_jerk_starts_and_ends_at_rest_and_derivatives_agree() -> None:
 
 
 def test_exact_inverse_of_the_tip_path_is_the_wanted_angle() -> None:
-    direct, through_tip = evaluated(), evaluated(inverse="exact")
+    direct, through_tip = evaluated(), evaluated(inverse="closed-form")
     np.testing.assert_allclose(through_tip.theta_ref, direct.theta_ref, atol=1e-15)
     np.testing.assert_allclose(through_tip.rate_ref, direct.rate_ref, atol=1e-13)
     np.testing.assert_allclose(through_tip.acceleration_ref, direct.acceleration_ref, atol=1e-11)
@@ -40,7 +40,7 @@ def test_exact_inverse_of_the_tip_path_is_the_wanted_angle() -> None:
 
 def test_a_tip_target_is_reached_whatever_its_stretch() -> None:
     tip = arc_tip(np.array(0.4), 0.084)
-    m = evaluated(tip=tuple(float(v) for v in tip), inverse="exact")
+    m = evaluated(tip=tuple(float(v) for v in tip), inverse="closed-form")
     assert m.final == pytest.approx(0.4, abs=1e-14)
     np.testing.assert_allclose(m.tip_desired[-1], tip, atol=1e-16)
     np.testing.assert_allclose(m.tip_desired[0], [WRIST.length, 0.0], atol=1e-16)
@@ -51,11 +51,11 @@ def test_impossible_references_are_refused() -> None:
     with pytest.raises(UserError, match="beyond the wrist's range"):
         evaluated(angle_deg=51.0)
     with pytest.raises(UserError, match="beyond the range"):
-        evaluated(tip=(0.0, 0.08), inverse="exact")
+        evaluated(tip=(0.0, 0.08), inverse="closed-form")
     with pytest.raises(UserError, match="network"):
         evaluated(inverse="network")
     with pytest.raises(ValidationError, match="not both"):
-        Reference(angle_deg=10.0, tip=(0.08, 0.0), inverse="exact")
+        Reference(angle_deg=10.0, tip=(0.08, 0.0), inverse="closed-form")
     with pytest.raises(ValidationError, match="needs inverse"):
         Reference(tip=(0.08, 0.0))
 
@@ -67,7 +67,7 @@ def test_the_share_of_tips_that_a_network_never_learned_is_told() -> None:
     network = Network(weight, (np.zeros(1), np.zeros(1)), "tanh", *scaler, domain)
     m = motion(Reference(inverse="network", duration=2.0), WRIST, 3.0, 1e-3, network.along)
     assert m.outside == np.mean(evaluated(duration=2.0).theta_ref > 0.3) > 0.3
-    assert evaluated(inverse="exact").outside == 0.0
+    assert evaluated(inverse="closed-form").outside == 0.0
 
 
 def test_chain_tip_equals_the_compiled_kinematics() -> None:
@@ -94,7 +94,7 @@ def test_multi_step_holds_each_angle_for_its_duration() -> None:
 
 def test_tip_path_visits_its_tips_and_rests_at_each() -> None:
     tips = tuple(tuple(float(v) for v in arc_tip(np.array(a), r)) for a, r in ((0.4, 0.082), (-0.2, 0.079)))
-    m = evaluated(kind="tip-path", tips=tips, duration=0.8, inverse="exact")
+    m = evaluated(kind="tip-path", tips=tips, duration=0.8, inverse="closed-form")
     np.testing.assert_allclose(m.tip_desired[[800, 1600]], tips, atol=1e-15)
     np.testing.assert_allclose(m.theta_ref[[800, 1600]], [0.4, -0.2], atol=1e-14)
     np.testing.assert_allclose(m.rate_ref[[0, 800, 1600]], 0.0, atol=1e-12)
@@ -106,7 +106,7 @@ def test_every_target_of_a_path_must_be_within_reach() -> None:
     with pytest.raises(UserError, match="beyond the wrist's range"):
         evaluated(kind="multi-step", angles_deg=(10.0, 60.0))
     with pytest.raises(UserError, match="beyond the range"):
-        evaluated(kind="tip-path", tips=((0.078, 0.014), (0.0, 0.08)), inverse="exact")
+        evaluated(kind="tip-path", tips=((0.078, 0.014), (0.0, 0.08)), inverse="closed-form")
     with pytest.raises(ValidationError, match="needs inverse"):
         Reference(kind="tip-path")
 
@@ -115,10 +115,10 @@ def test_every_target_of_a_path_must_be_within_reach() -> None:
     "reference",
     [
         Reference(kind="step", angle_deg=25.0),
-        Reference(tip=(0.078, 0.014), inverse="exact"),
+        Reference(tip=(0.078, 0.014), inverse="closed-form"),
         Reference(kind="sine", angle_deg=15.0),
         Reference(kind="multi-step", angles_deg=(20.0, -10.0, 5.0), duration=0.3),
-        Reference(kind="tip-path", inverse="exact", duration=0.3),
+        Reference(kind="tip-path", inverse="closed-form", duration=0.3),
     ],
     ids=lambda reference: reference.kind if reference.tip is None else "tip",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.statistics import spread
 from wristctl.comparison.step_cost import StepTime
 from wristctl.config.errors import UserError
+from wristctl.records.overview import read_overview
 from wristctl.simulation.metrics import METRICS
 from wristctl.studies.compare import COMPARE, Compared
 from wristctl.studies.inputs import Inputs
@@ -26,7 +28,7 @@ ROWS = "rows: [{controller: pid, gains: printed}, {controller: feedforward}]"
 Compare = Callable[..., Compared]
 
 
-def row(loop: str, reference: str, label: str, inverse: str = "exact", **how: Any) -> ComparedRow:
+def row(loop: str, reference: str, label: str, inverse: str = "closed-form", **how: Any) -> ComparedRow:
     controller, gains = label.split("/")
     return ComparedRow(loop, reference, inverse, controller, gains, repeated(label, **how))
 
@@ -39,7 +41,7 @@ def both(loop: str, reference: str, **how: Any) -> list[ComparedRow]:
 def compare(monkeypatch: pytest.MonkeyPatch) -> Compare:
     """A comparison that came out with these rows; a control step takes 1, 2, ... us, at worst ten times as long."""
 
-    def compared(rows: list[ComparedRow], loops: str = "{fast: {}}", inverses: str = "[exact]") -> Compared:
+    def compared(rows: list[ComparedRow], loops: str = "{fast: {}}", inverses: str = "[closed-form]") -> Compared:
         monkeypatch.setattr(combinations, "compare", lambda *_: rows)
         times = iter(range(1, 10))
         monkeypatch.setattr(step_cost, "step_time", lambda *_: StepTime((at := float(next(times))), 10.0 * at))
@@ -54,7 +56,7 @@ def test_each_loop_and_reference_has_a_table_with_a_row_for_each_controller(comp
     titles = [f"Loop {loop}, {reference}" for loop in ("fast", "slow") for reference in (STEP, MOVE)]
     assert [table.title for table in done.tables] == [*titles, "Control step of one wrist on this machine"]
     assert [[line[:2] for line in table.rows] for table in done.tables[:-1]] == [
-        [("pid/printed", "exact"), ("feedforward/default", "exact")]
+        [("pid/printed", "closed-form"), ("feedforward/default", "closed-form")]
     ] * 4
     assert done.tables[-1].rows == [("pid/printed", 1.0, 10.0), ("feedforward/default", 2.0, 20.0)]
     assert done.tables[-1].columns == ("controller", "median [us]", "p99 [us]")
@@ -102,43 +104,68 @@ def test_of_repetitions_medians_are_shown_with_the_interval_of_the_rmse(compare:
     assert table.columns[at : at + 4] == ("RMSE's 95 % low", "high", "paper's", "verdict")
     expected = spread(np.array(rmse))
     assert table.rows[0][at : at + 2] == (expected.low, expected.high) and table.rows[0][2:4] == (5.0, 2.0)
-    metric = done.findings.metrics[f"rmse_fast_pid/printed_exact_{STEP.replace(' ', '-')}"]
+    metric = done.findings.metrics[f"rmse_fast_pid/printed_closed-form_{STEP.replace(' ', '-')}"]
     assert (metric["value"], metric["n"], metric["interval"]) == (5.0, 9, (expected.low, expected.high))
     assert (metric["unit"], metric["better"]) == ("rad", "lower")
 
 
-def test_one_loop_is_drawn_over_its_references(compare: Compare) -> None:
+def test_the_answer_is_drawn_and_each_class_by_itself(compare: Compare) -> None:
     rows = [*both("fast", STEP), *both("fast", MOVE), *both("fast", MOVE, inverse="none")]
-    done = compare(rows, inverses="[exact, none]")
-    drawn = ["angles", "rmse", "chattering", "error-pid", "error-log-pid"]
-    assert list(done.figures) == [f"{name}-fast" for name in drawn]
-    angles = done.figures["angles-fast"]
-    assert angles.get_suptitle() == "loop fast" and len(angles.axes) == 2 * 2, "the first inverse alone"
-    names = [label.get_text() for label in done.figures["rmse-fast"].axes[0].get_yticklabels()]
-    assert names == [f"{label}, {way}" for way in ("exact", "none") for label in ("pid/printed", "feedforward/default")]
-    plain, log = (done.figures[name].axes[0] for name in ("error-pid-fast", "error-log-pid-fast"))
-    assert plain.get_title("left") == f"pid, loop fast, {MOVE}", "a move sooner than a step"
-    assert (plain.get_yscale(), log.get_yscale()) == ("linear", "log")
-    assert [line.get_label() for line in log.lines] == ["pid/printed"]
+    done = compare(rows, inverses="[closed-form, none]")
+    assert list(done.figures) == [
+        "answer", "error-over-time-sampled", "tension-over-time-sampled", "rmse-against-tension-variation",
+        "rmse-by-reference-fast", "tension-variation-fast",
+    ]  # fmt: skip
+    names = [label.get_text() for label in done.figures["rmse-by-reference-fast"].axes[0].get_yticklabels()]
+    ways = ("closed-form", "none")
+    assert names == [f"{label}, {way}" for way in ways for label in ("pid/printed", "feedforward/default")]
+    errors = done.figures["error-over-time-sampled"].axes[0]
+    assert errors.get_title("left") == f"sampled: loop fast, {MOVE}", "a move sooner than a step"
+    assert errors.get_yscale() == "log" and len(errors.lines) == 2, "several controllers on one axis"
+    assert done.findings.overview.figure == "answer" and list(done.findings.overview.captions) == list(done.figures)
 
 
 def test_where_all_references_are_steps_the_first_of_them_is_drawn(compare: Compare) -> None:
     done = compare([*both("fast", STEP), *both("fast", "step 5 deg")])
-    assert done.figures["error-pid-fast"].axes[0].get_title("left") == f"pid, loop fast, {STEP}"
+    assert done.figures["error-over-time-sampled"].axes[0].get_title("left") == f"sampled: loop fast, {STEP}"
 
 
-def test_several_loops_are_drawn_over_each_other_and_of_many_only_the_first_on_its_own(compare: Compare) -> None:
-    for count in (3, 4):
-        loops = [f"l{k}" for k in range(count)]
-        rows = [each for loop in loops for reference in (STEP, MOVE) for each in both(loop, reference)]
-        done = compare(rows, f"{{{', '.join(f'{loop}: {{}}' for loop in loops)}}}")
-        alone = [name.removeprefix("angles-") for name in done.figures if name.startswith("angles-")]
-        assert alone == (loops if count == 3 else ["l0"])
-        assert list(done.figures)[:3] == ["robustness-1", "robustness-2", "angles"]
-        columns = [label.get_text() for label in done.figures["robustness-1"].axes[0].get_xticklabels()]
-        assert columns == loops
-        assert done.figures["robustness-1"].axes[0].get_title("left") == STEP
-        assert done.figures["angles"].get_suptitle() == MOVE and len(done.figures["angles"].axes) == 2 * count
+def test_loops_stand_beside_each_other_for_each_reference(compare: Compare) -> None:
+    rows = [each for loop in ("a", "b") for reference in (STEP, MOVE) for each in both(loop, reference)]
+    done = compare(rows, "{a: {}, b: {plant: {payload: 0.1}}}")
+    made = done.figures["rmse-by-loop-minimum-jerk-1-s-30-deg"]
+    assert [label.get_text() for label in made.axes[0].get_xticklabels()] == ["a", "b"]
+    assert len(made.axes) == 2, "the paper has no such loops"
+    assert "error-over-time-off-nominal" in done.figures
+
+
+def test_a_run_draws_the_answer_alone_and_says_what_else_there_is(compare: Compare, tmp_path: Path) -> None:
+    rows = both("fast", MOVE)
+    done = compare(rows)
+    with pytest.MonkeyPatch.context() as during:
+        during.setattr(combinations, "compare", lambda *_: rows)
+        kept = wristctl.compare(done.study, out=tmp_path)
+    assert kept.run is not None
+    assert {file.stem for file in (kept.run.path / "figures").iterdir()} == {"answer"}
+    overview = read_overview(kept.run.path)
+    assert overview.answer == list(kept.summary) and "tension-variation-fast" in overview.captions
+    assert (kept.run.path / "README.md").read_text().index(kept.summary[1]) < 700, "the page begins with it"
+
+
+def test_the_papers_columns_stand_where_its_numbers_can_be_meant_and_a_sine_never_settles(compare: Compare) -> None:
+    sine = "sine 0.5 Hz 30 deg"
+    rows = [each for loop in ("a", "b") for reference in (MOVE, sine) for each in both(loop, reference)]
+    time = rows[0].simulation.trajectory.time
+    for at, each in enumerate(rows):
+        if each.reference == sine:
+            moving = dataclasses.replace(each.simulation.trajectory, theta_ref=np.sin(time))
+            done = dataclasses.replace(each.simulation, trajectory=moving)
+            rows[at] = dataclasses.replace(each, repeated=dataclasses.replace(each.repeated, first=done))
+    told = compare(rows, "{a: {}, b: {sensor: {level: camera}}}")
+    for table in told.tables[:4]:
+        papers = table.title == f"Loop a, {MOVE}"
+        assert ("paper's" in table.columns) == papers == ("verdict" in table.columns)
+        assert (METRICS["settling"].heading in table.columns) == ("sine" not in table.title)
 
 
 def test_a_plan_counts_rollouts_and_names_the_row_that_cannot_be() -> None:

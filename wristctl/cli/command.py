@@ -99,6 +99,6 @@ def _execute(
         except KeyboardInterrupt:
             console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)
             raise
-    print_result(run.path, found.tables, options.as_json)
+    print_result(run.path, found.tables, options.as_json, found.summary, options.all_)
     if found.fault is not None:
         raise found.fault

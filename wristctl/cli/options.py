@@ -49,6 +49,7 @@ class Options:
         bool, typer.Option("--dry-run", help="Print the resolved study and the plan; write nothing.")
     ] = False
     as_json: Json = False
+    all_: Annotated[bool, typer.Option("--all", help="Print every table, where the answer alone would be.")] = False
     quiet: Quiet = False
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details too.")] = False
     debug: Debug = False

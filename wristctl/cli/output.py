@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from wristctl.config.printable import printable
 from wristctl.config.resolved import resolved_yaml
 from wristctl.config.study import Study
 from wristctl.records import Run
@@ -28,8 +29,13 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> 
         print(f"# {line}")
 
 
-def print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
-    """The tables as wide as the terminal, then the run directory; or all of the result as one JSON object."""
+def print_result(
+    path: Path, tables: Sequence[Table], as_json: bool, answer: Sequence[str] = (), everything: bool = False
+) -> None:
+    """The answer, or where there is none or `everything` is asked for the tables as wide as the terminal; then the run.
+
+    Or all of the result as one JSON object.
+    """
     if as_json:
         run = Run(path)
         result = {
@@ -39,12 +45,15 @@ def print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
             "run": str(path),
             "state": run.state,
             "result_sha256": run.result_hash,
+            "answer": list(answer),
             "metrics": run.metrics,
             "tables": plain_tables(tables),
         }
         print(json.dumps(jsonable(result), indent=2, allow_nan=False))
         return
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    for table in tables:
+    if answer:
+        print("\n".join(map(printable, answer)), end="\n\n")
+    for table in tables if everything or not answer else ():
         print(table.text(width), end="\n\n")
     print(path)

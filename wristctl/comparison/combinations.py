@@ -150,12 +150,12 @@ def _courses(
     for reference in chosen.references:
         for inverse in chosen.inverses:
             own = toward(reference, direction).model_copy(update={"inverse": inverse})
-            name, scenario = _course_name(reference, direction, chosen), scenario_of(reference, direction)
+            name, scenario = course_name(reference, direction, chosen), scenario_of(reference, direction)
             found.append(ReferenceCourse(name, inverse, scenario, motion(own, wrist, chosen.horizon, period, network)))
     return found
 
 
-def _course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
+def course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
     """The reference's name, with the direction where there are several."""
     return reference_name(reference) + (f", {direction}" if len(chosen.directions) > 1 else "")
 
@@ -163,7 +163,7 @@ def _course_name(reference: Reference, direction: DirectionName, chosen: Compare
 def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[ComparedRow]:
     """By loop, reference, direction, row of the study, inverse."""
     loops = list(chosen.loops)
-    references = [_course_name(r, direction, chosen) for r in chosen.references for direction in chosen.directions]
+    references = [course_name(r, direction, chosen) for r in chosen.references for direction in chosen.directions]
     rows = [(row.controller, row.gains_name) for row in chosen.rows]
     return sorted(
         results,

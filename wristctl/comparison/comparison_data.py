@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.paper import T2, verdict
+from wristctl.comparison.paper import T2, Printed, verdict
 from wristctl.comparison.statistics import spread
 
 if TYPE_CHECKING:
@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[np.float64]]:
     """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
 
+    Where loops are sampled at different rates each gives its samples nearest to those of the slowest.
     segment_theta (results, T, segments) is for drawing, hence in single precision; nan beyond a plant's segments.
     """
     courses = [result.simulation.trajectory for result in results]
+    kept = _kept([c.time for c in courses], every)
+    most = max(c.segment_theta.shape[1] for c in courses)
     columns = {
         "theta": [c.theta for c in courses],
         "tip_x": [c.tip[:, 0] for c in courses],
@@ -32,12 +35,25 @@ def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[
         "tension_minus": [c.tension[:, 1] for c in courses],
         "time": [c.time for c in courses],
     }
-    most = max(c.segment_theta.shape[1] for c in courses)
     columns["segment_theta"] = [
         np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
     ]
-    stacked = {name: np.stack([each[::every] for each in values]) for name, values in columns.items()}
+    stacked = {
+        name: np.stack([each[own] for each, own in zip(values, kept, strict=True)]) for name, values in columns.items()
+    }
     return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
+
+
+def _kept(times: Sequence[NDArray[np.float64]], every: int) -> list[NDArray[np.intp]]:
+    """Which samples of each course are kept: at instants that all have in common, as nearly as they can."""
+    steps = [float(time[1] - time[0]) for time in times]
+    apart = max(every * min(steps), max(steps))
+    end = min(float(time[-1]) for time in times)
+    instants = apart * np.arange(int(end / apart * (1.0 + 1e-9)) + 1)
+    return [
+        np.round(instants / step).astype(np.intp).clip(max=len(time) - 1)
+        for time, step in zip(times, steps, strict=True)
+    ]
 
 
 def metrics_of(result: ComparedRow) -> dict[str, float]:
@@ -48,8 +64,8 @@ def metrics_of(result: ComparedRow) -> dict[str, float]:
     return {name: spread(values).median for name, values in repeated.metrics.items()}
 
 
-def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
-    """Every metric of every result beside the paper's T2, one row each.
+def frame(results: Sequence[ComparedRow], cells: Container[tuple[str, str]]) -> pd.DataFrame:
+    """Every metric of every result, one row each, and the paper's T2 beside those of the `cells` (loop, reference).
 
     Where rows were repeated a metric is the median, `<metric>_low` and `<metric>_high` are the ends of its 95 %
     interval, `repetitions` says how many there were and `failed` whether any of them failed.
@@ -59,7 +75,8 @@ def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
     repeated = any(len(result.repeated.failed) > 1 for result in results)
     rows = []
     for result in results:
-        metrics, printed = metrics_of(result), T2.get(result.controller)
+        metrics, theirs = metrics_of(result), (result.loop, result.reference) in cells
+        printed = T2.get(result.controller) if theirs else None
         row: dict[str, Any] = _names(result) | {"failed": bool(result.repeated.failed.any())} | metrics
         if repeated:
             spreads = {name: spread(values) for name, values in result.repeated.metrics.items()}
@@ -70,7 +87,7 @@ def frame(results: Sequence[ComparedRow]) -> pd.DataFrame:
             "paper_rmse": printed.rmse if printed else np.nan,
             "paper_settling": printed.settling if printed else np.nan,
             "paper_steady_state": printed.steady_state if printed else np.nan,
-            "verdict": verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"]),
+            "verdict": verdict(result.controller, *(metrics[name] for name in Printed._fields)) if printed else "",
         }
         rows.append(row)
     return pd.DataFrame(rows)

@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import LEVEL, GeometricMean, Resampled, penalised
+from wristctl.comparison.geometric_means import FEWEST_WORLDS, LEVEL, GeometricMean, Resampled, penalised
 from wristctl.comparison.shares import Share, share
 from wristctl.seeds import Entropy
+
+ALIKE = 1.05
+"""Ratio of scores up to which rows are alike where there are too few worlds to tell."""
 
 
 class TieGroup(NamedTuple):
@@ -40,13 +43,19 @@ class Standing(NamedTuple):
 
 
 def standing(
-    scores: ArrayLike, swings: NDArray[np.bool_], failure: float, seed: int | Entropy, tolerated: float = 0.0
+    scores: ArrayLike,
+    swings: NDArray[np.bool_],
+    failure: float,
+    seed: int | Entropy,
+    tolerated: float = 0.0,
+    drawn: bool = True,
 ) -> Standing:
     """Order rows of positive scores (R, W) over the same worlds, less being better.
 
     A row fails where its score is inf or nan and is in a limit cycle where `swings` (R, W). One that does either in
     more than the `tolerated` share of the worlds is unreliable, however good its scores: it stands in no group. Where
-    it is tolerated, a failure counts as the score `failure`, and nothing as worse.
+    it is tolerated, a failure counts as the score `failure`, and nothing as worse. Worlds that are not `drawn` are all
+    there are: of too few for an interval a row is then behind where the best is ahead by more than ALIKE in every one.
     """
     given = np.asarray(scores, float)
     failed = ~np.isfinite(given)
@@ -56,7 +65,7 @@ def standing(
     sound = [row for row in np.argsort(known.mean(axis=1), kind="stable").tolist() if lost[row] <= tolerated]
     groups, rest = [], sound
     while rest:
-        groups.append(_group(known, rest, seed))
+        groups.append(_group(known, rest, seed, drawn))
         rest = [row for row in rest if row not in groups[-1].rows]
     return Standing(
         groups,
@@ -67,7 +76,7 @@ def standing(
     )
 
 
-def _group(known: Array, rows: list[int], seed: int | Entropy) -> TieGroup:
+def _group(known: Array, rows: list[int], seed: int | Entropy, drawn: bool) -> TieGroup:
     """Those of rows, the best first, that may be as good as the first.
 
     Holm's step down (Scand. J. Stat. 6 (1979) 65): of m comparisons the clearest is judged at the level 1 - 5 %/m, the
@@ -79,6 +88,10 @@ def _group(known: Array, rows: list[int], seed: int | Entropy) -> TieGroup:
     if not others:
         return TieGroup([best], [itself])
     compared = Resampled(known[others] - known[best], seed)
+    if known.shape[1] < FEWEST_WORLDS and not drawn:
+        others = [row for row in others if (known[row] - known[best]).min() <= np.log(ALIKE)]
+        every = dict(zip(rows[1:], compared.estimates(LEVEL), strict=True))
+        return TieGroup([best, *others], [itself, *(every[row] for row in others)])
     ratios: dict[int, GeometricMean] = {}
     level, tied = LEVEL, False
     for done, at in enumerate(np.argsort(-compared.evidence, kind="stable").tolist()):

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from wristctl.config.choices import CONTROLLERS, METRICS, OPTIMISERS
 from wristctl.config.families import TuningWorlds, Worlds
-from wristctl.config.loop import LOOPS, DirectionName, Loop, Loops, Reference, Scenario
+from wristctl.config.loop import LOOPS, DirectionName, InverseName, Loop, Loops, Reference, Scenario
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
 GainsChoice = str | dict[str, float]
@@ -118,8 +118,8 @@ class CompareSettings(Section):
         "references, each followed from rest",
         min_length=1,
     )
-    inverses: tuple[Literal["none", "exact", "network"], ...] = choice(
-        ("network", "exact"), "how tip targets become angles; overrides the references' own", min_length=1
+    inverses: tuple[InverseName, ...] = choice(
+        ("network", "closed-form"), "how tip targets become angles; overrides the references' own", min_length=1
     )
     directions: tuple[DirectionName, ...] = choice(
         ("ulnar",), "directions of bending, each by its own plane", min_length=1

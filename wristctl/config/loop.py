@@ -13,7 +13,12 @@ from wristctl.config.given_files import given_file, of_file
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
-InverseName = Literal["none", "exact", "network"]
+_WRITTEN = {"exact": "closed-form"}
+"""What older studies call it, when a loop had that name too."""
+InverseName = Annotated[
+    Literal["none", "closed-form", "network"],
+    BeforeValidator(lambda given: _WRITTEN.get(given, given) if isinstance(given, str) else given),
+]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 
@@ -75,7 +80,8 @@ class Reference(OpenSection):
     file: str | None = given_file("recording: a CSV with units in its header")
     column: str | None = of_file("recording: name of the angle's column, or tip; by default angle, bend, theta, tip")
     inverse: InverseName = choice(
-        "none", "how wanted tip positions become reference angles: network, exact inverse, or the angle given directly"
+        "none",
+        "how wanted tips become reference angles: a network, one arc's closed-form inverse, or the angle itself",
     )
 
     @property
@@ -106,7 +112,7 @@ class Reference(OpenSection):
         if self.angle_deg is not None and self.tip is not None:
             raise ValueError("give angle_deg or tip, not both")
         if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
-            raise ValueError("a tip target needs inverse: network or exact")
+            raise ValueError("a tip target needs inverse: network or closed-form")
         if (self.kind == "recording") != (self.file is not None):
             raise ValueError("kind: recording goes with its file, and no other kind does")
         return self

@@ -148,9 +148,9 @@ class LiveRun:
         """Keep an output outside the result hash because it holds wall times or the like."""
         self._volatile.add(name)
 
-    def summary(self, markdown: str) -> None:
-        """Add to the result in words and tables that README.md shows."""
-        self._summary.append(markdown)
+    def summary(self, markdown: str, first: bool = False) -> None:
+        """Add to the result in words and tables that README.md shows, or begin it."""
+        self._summary.insert(0 if first else len(self._summary), markdown)
 
     def end(self, state: EndState, exit_code: int = 0, error: Error | None = None) -> Manifest:
         """Seal the run: hashes of all outputs, README, report, manifest, SHA256SUMS last. Called by `start_run`."""

@@ -11,7 +11,7 @@ MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml
 SIGNATURE = "SHA256SUMS.sig"
 README, EVENTS, CONSOLE = "README.md", "events.jsonl", "console.log"
 SOURCES, PATCH, PACKAGES = "code.txt", "code.patch", "environment.txt"
-TABLES = "tables.json"
+TABLES, OVERVIEW = "tables.json", "overview.json"
 """What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
 KINDS = (

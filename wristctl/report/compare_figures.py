@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
@@ -18,44 +19,32 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.comparison_data import metrics_of
 from wristctl.comparison.paper import T2
 from wristctl.comparison.statistics import spread
-from wristctl.report.loop_figures import draw_desired, within_half_a_move
-from wristctl.report.style import GREY, WIDTH, PowersOfTen, colour, figure, line, logarithmic, title, undress
+from wristctl.report.style import (
+    BLACK,
+    GREY,
+    WIDTH,
+    PowersOfTen,
+    colour,
+    figure,
+    legend_under,
+    logarithmic,
+    title,
+    undress,
+)
 
 Across = Literal["reference", "loop"]
 """What the columns of a figure are."""
-
-_EVERY = 10
-"""Small panels show every tenth sample."""
 
 _FAILED = "///"
 """Hatch of what diverged."""
 
 
-def angle_grid(results: Sequence[ComparedRow], heading: str = "", across: Across = "reference") -> Figure:
-    """Desired and obtained angle [deg] over time [s]: rows of controllers and gains, columns as `across` says."""
-    rows, columns = _names(results, across)
-    size = {"width": max(WIDTH, 1.0 + 1.3 * len(columns)), "height": 1.0 + 1.05 * len(rows)}
-    made, axes = figure(len(rows), len(columns), sharex=True, sharey=True, **size)
-    for result in results:
-        panel = axes[rows.index(_row(results, result)), columns.index(getattr(result, across))]
-        course = result.simulation.trajectory
-        panel.plot(course.time[::_EVERY], np.degrees(course.theta[::_EVERY]), **line(course.label))
-        draw_desired(panel, [course])
-        if result.simulation.failed:
-            panel.text(0.98, 0.06, "diverged", transform=panel.transAxes, ha="right", fontsize=9.0)
-    within_half_a_move(panel, [result.simulation.trajectory for result in results])  # all share one scale
-    for panel, name in zip(axes[0], columns, strict=True):
-        title(panel, fill(name, 16))
-    for panel, name in zip(axes[:, -1], rows, strict=True):
-        panel.text(1.03, 0.5, name.replace("/", "/\n"), transform=panel.transAxes, va="center", fontsize=9.0)
-    made.suptitle(heading, fontsize=10.0)
-    made.supxlabel("time [s]", fontsize=10.0)
-    made.supylabel("bending angle [deg]", fontsize=10.0)
-    return made
+def rmse_map(
+    results: Sequence[ComparedRow], heading: str = "", across: Across = "reference", beside: bool = True
+) -> Figure:
+    """RMSE [rad] of each controller as number and colour (log); columns as `across` says.
 
-
-def rmse_map(results: Sequence[ComparedRow], heading: str = "", across: Across = "reference") -> Figure:
-    """RMSE [rad] of each controller as number and colour (log), beside the paper's T2; columns as `across` says.
+    `beside`: with the paper's T2 in a column of its own.
 
     Of repetitions it is the median, with its 95 % interval below and how many of them failed. What diverged is hatched
     and marked with an x.
@@ -70,52 +59,61 @@ def rmse_map(results: Sequence[ComparedRow], heading: str = "", across: Across =
         values[place] = metrics_of(result)["rmse"]
         if len(result.repeated.failed) > 1:
             below[place] = _below(result)
-        printed[at] = T2[result.controller].rmse if result.controller in T2 else np.nan
+        printed[at] = T2[result.controller].rmse if beside and result.controller in T2 else np.nan
     known = np.concatenate([values, printed], axis=1)
     positive = known[known > 0.0]
     norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
     widths = (len(columns), 1)
     size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
-    made, ((ours, paper),) = figure(1, 2, width_ratios=widths, sharey=True, **size)
+    beside = bool(np.isfinite(printed).any())
+    made, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
+    ours = axes[0, 0]
     image = _cells(ours, values, norm, below)
-    _cells(paper, printed, norm)
+    if beside:
+        _cells(axes[0, 1], printed, norm)
+        axes[0, 1].set_xticks([0], ["the paper's\nT2"])
     for row, column in np.argwhere(np.isnan(values)):
         ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
         ours.text(column, row, "x", ha="center", va="center", fontsize=11.0, fontweight="bold", backgroundcolor="w")
     ours.set_yticks(range(len(rows)), rows)
     ours.set_xticks(range(len(columns)), [fill(name, 10) for name in columns])
-    paper.set_xticks([0], ["the paper's\nT2"])
     title(ours, heading)
-    bar = made.colorbar(image, ax=[ours, paper], pad=0.02, label="RMSE [rad]", format=PowersOfTen())
+    bar = made.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
     bar.minorformatter = PowersOfTen()
     bar.ax.tick_params(labelsize=9.0)
     return made
 
 
-def chattering_bars(results: Sequence[ComparedRow], heading: str = "") -> Figure:
-    """Total variation of tension per second [N/s], log, of each controller: the bar is the median over the references.
+def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
+    """Total variation of tension per second [N/s], log, of each controller: a dot is a reference, a line their median.
 
-    Dots are the single references, of repetitions their medians with 95 % intervals; what diverged is hatched.
+    Of repetitions a dot is their median, with its 95 % interval; a row of which something failed is marked x.
     """
     rows, _ = _names(results, "reference")
-    made, ((axes,),) = figure(height=1.1 + 0.3 * len(rows))
+    made, ((axes,),) = figure(height=1.1 + 0.24 * len(rows))
     for at, name in enumerate(rows):
         own = [result for result in results if _row(results, result) == name]
         spreads = [spread(result.repeated.metrics["chattering"]) for result in own]
         values = np.array([each.median for each in spreads])
+        known = values[np.isfinite(values) & (values > 0.0)]
         failed = any(result.repeated.failed.any() for result in own)
-        hatch = {"hatch": _FAILED, "edgecolor": "w"} if failed else {}
-        axes.barh(at, np.median(values), height=0.6, color=colour(own[0].controller), **hatch)
-        axes.plot(values, np.full(len(values), at), "o", color="w", markeredgecolor="k", markersize=4.0)
+        shade = colour(own[0].controller)
+        axes.plot(known, np.full(len(known), at), "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8)
+        axes.plot([np.median(known)] * 2 if len(known) else [], [at - 0.3, at + 0.3] if len(known) else [], color=BLACK)
         for each in spreads:
             if each.interval is not None:
-                axes.plot(each.interval, [at, at], color="k", linewidth=1.0)
+                axes.plot(each.interval, [at, at], color=shade, linewidth=1.0)
     logarithmic(axes.xaxis)
     axes.set_yticks(range(len(rows)), rows)
     axes.invert_yaxis()
-    axes.grid(False, axis="y")
-    axes.set_xlabel("chattering: total variation of tension per second [N/s]")
+    axes.set_xlabel("total variation of tension per second [N/s]")
     title(axes, heading)
+    handles = [
+        Line2D([], [], linestyle="none", marker="o", color=GREY, label="a reference"),
+        Line2D([], [], linestyle="none", marker="x", color=GREY, label="a reference, row failed somewhere"),
+        Line2D([], [], color=BLACK, label="median over references"),
+    ]
+    legend_under(made, handles, 3)
     return made
 
 

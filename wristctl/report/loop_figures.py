@@ -89,14 +89,14 @@ def tensions(trajectory: Trajectory) -> Figure:
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
         for each, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
-            drawn = _envelope(time[part], tension[part])
+            drawn = envelope(time[part], tension[part])
             each.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
         for each, tension in zip(column, () if acting is None else acting.T, strict=False):
-            each.plot(*_envelope(time[part], tension[part]), label="acting", **THIN)
+            each.plot(*envelope(time[part], tension[part]), label="acting", **THIN)
         wanted = {"color": GREY, "label": "wanted by the law"}
         given = {"color": BLACK, "label": "of the commanded tensions"}
         for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
-            column[2].step(*_envelope(time[part], torque[part]), linewidth=1.0, where="post", **style)
+            column[2].step(*envelope(time[part], torque[part]), linewidth=1.0, where="post", **style)
     for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
         each.set_ylabel(name)
     for each in axes[:2, 0]:
@@ -113,7 +113,7 @@ def tensions(trajectory: Trajectory) -> Figure:
     return made
 
 
-def _envelope(time: Array, course: Array) -> tuple[Array, Array]:
+def envelope(time: Array, course: Array) -> tuple[Array, Array]:
     """What a picture can show of a course (T,) that jumps at every sample: each part's least and largest value."""
     each = len(time) // _COLUMNS
     if each < 4:
@@ -149,7 +149,7 @@ def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
 
 def within_half_a_move(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     """Let the axis of angles [deg] end half a move beyond what is desired, so that a diverging loop hides no other."""
-    wanted = np.degrees([course.theta_desired for course in trajectories])
+    wanted = np.degrees(np.concatenate([course.theta_desired for course in trajectories]))
     low, high = wanted.min(initial=0.0), wanted.max(initial=0.0)
     margin = max(5.0, 0.5 * (high - low))
     _at_most(axes, low - margin, high + margin)

@@ -6,6 +6,9 @@ Figures are made without pyplot, so drawing leaves no state behind and needs no 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import matplotlib as mpl
@@ -14,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
@@ -69,6 +74,44 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.4}
 
 
+_PAPER: ContextVar[float | None] = ContextVar("_PAPER", default=None)
+"""Width [in] that figures are drawn for now; None: their own."""
+_SMALLEST, _PRINTED = 0.72, 6.0
+"""How much smaller letters are in a column, and the width [in] below which that is one."""
+
+
+@contextmanager
+def for_paper(width: float | None) -> Iterator[None]:
+    """Within the block figures are laid out for this width [in], with letters as a journal prints them."""
+    token = _PAPER.set(width)
+    try:
+        yield
+    finally:
+        _PAPER.reset(token)
+
+
+def columns_within(wanted: int, each: float) -> int:
+    """How many of the wanted panels stand side by side, where each needs this width [in] beside 1.5 for names."""
+    return max(1, min(wanted, int(((_PAPER.get() or WIDTH) - 1.5) / each)))
+
+
+def fit(made: Figure) -> None:
+    """Give a figure that was laid out for a narrow column letters and marks of that size."""
+    width = _PAPER.get()
+    if width is None or width >= _PRINTED:
+        return
+    for text in made.findobj(Text):
+        text.set_fontsize(_SMALLEST * float(text.get_fontsize()))
+    for axes in made.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            for which in ("major", "minor"):
+                size = axis.get_tick_params(which).get("labelsize", 9.0)
+                axis.set_tick_params(which=which, labelsize=_SMALLEST * float(size))
+    for drawn in made.findobj(Line2D):
+        drawn.set_linewidth(_SMALLEST * drawn.get_linewidth())
+        drawn.set_markersize(_SMALLEST * drawn.get_markersize())
+
+
 def figure(
     rows: int = 1, cols: int = 1, *, width: float = WIDTH, height: float | None = None, **subplots: Any
 ) -> tuple[Figure, NDArray[np.object_]]:
@@ -77,7 +120,10 @@ def figure(
     `subplots` goes to Figure.subplots: sharex, sharey, width_ratios, height_ratios. Without a height every
     row gets 0.55 of its axes' width, at least 1.8 in.
     """
+    paper = _PAPER.get()
     tall = rows * max(1.8, 0.55 * width / cols) if height is None else height
+    if paper is not None:
+        tall, width = tall * max(_SMALLEST, min(1.0, paper / width)), paper
     made = Figure(figsize=(width, tall), layout="constrained")
     axes = made.subplots(rows, cols, squeeze=False, **subplots)
     for each in axes.flat:
@@ -131,9 +177,18 @@ def legend_below(figure: Figure, columns: int = 3) -> None:
     """One legend for all axes of a figure, below them, each label once."""
     found = [axes.get_legend_handles_labels() for axes in figure.axes]
     handles = {label: handle for pair in found for handle, label in zip(*pair, strict=True)}
-    if handles:
-        place = {"loc": "outside lower center", "ncols": min(columns, len(handles))}
-        figure.legend(list(handles.values()), list(handles), **_LEGEND | place)
+    legend_under(figure, list(handles.values()), columns, list(handles))
+
+
+def legend_under(figure: Figure, handles: Sequence[Any], columns: int, labels: Sequence[str] | None = None) -> None:
+    """A legend of these below a figure's axes, in as many columns as there is room for."""
+    if not handles:
+        return
+    names = list(labels) if labels else [str(each.get_label()) for each in handles]
+    letter = 0.075 * (_SMALLEST if _PAPER.get() is not None and figure.get_figwidth() < _PRINTED else 1.0)
+    room = int(figure.get_figwidth() / (letter * (max(map(len, names)) + 8)))
+    place = {"loc": "outside lower center", "ncols": max(1, min(columns, len(handles), room))}
+    figure.legend(list(handles), names, **_LEGEND | place)
 
 
 def colour(controller: str) -> str:

@@ -101,8 +101,8 @@ def motion(
 ) -> Motion:
     """Evaluate a reference on the grid of `period` [s] over the horizon [s].
 
-    Tip targets, or angles with inverse `network` or `exact`, become a tip path (an arc whose angle and length move
-    from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
+    Tip targets, or angles with inverse `network` or `closed-form`, become a tip path (an arc whose angle and length
+    move from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
     What needs no network is worked out once; the arrays are read-only.
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
@@ -205,7 +205,7 @@ def _tip_target(tip: tuple[float, float], where: str, wrist: WristParameters) ->
 
 
 def _inverse(reference: Reference, network: Inverse | None) -> Inverse:
-    if reference.inverse == "exact":
+    if reference.inverse == "closed-form":
         return exact_inverse
     if network is None:
         raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")

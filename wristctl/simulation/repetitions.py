@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.simulation.arrival import arrives
 from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, oscillation_frequency
 from wristctl.simulation.trajectory import Trajectory
 
@@ -58,28 +59,51 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: that it failed, swings, ripples or pulls harder than tendons can; else empty."""
+        """In words what became of it: failed, short, swinging, rippling, pulling harder than tendons can; else empty."""
         return "; ".join(each for each in (self._end, self._strain) if each)
 
     @property
-    def _strain(self) -> str:
-        """What no tendon bears; 1 % more is what a spool's steps and a swing of the wrist may add to the limit."""
+    def beyond(self) -> float:
+        """Largest tension, where it is above what a tendon bears, else 0 [N].
+
+        1 % more is what a spool's steps and a swing of the wrist may add to the limit.
+        """
         known = self.metrics.get("peak_tension", np.empty(0))
         most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
-        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 1.01 * self.bears else ""
+        return most if most > 1.01 * self.bears else 0.0
+
+    @property
+    def swing(self) -> float:
+        """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
+        return self._ripple if at_rest(self.first.trajectory) else 0.0
+
+    @property
+    def _ripple(self) -> float:
+        """The same also where the reference turns, and friction's kinks look like swings."""
+        known = self.metrics.get("oscillation", np.empty(0))
+        ripple = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        return ripple if ripple > LIMIT_CYCLE else 0.0
+
+    @property
+    def arrives(self) -> bool:
+        """Whether the first repetition ends where it was asked to."""
+        return not self.first.failed and arrives(self.first.trajectory)
+
+    @property
+    def _strain(self) -> str:
+        most = self.beyond
+        return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 0.0 else ""
 
     @property
     def _end(self) -> str:
         if self.failure:
             return f"FAILED: {self.failure}"
-        known = self.metrics.get("oscillation", np.empty(0))
-        swing = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
-        if swing <= LIMIT_CYCLE:
-            return ""
-        found = f"+-{np.degrees(swing):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
-        if at_rest(self.first.trajectory):
-            return f"LIMIT CYCLE: {found}"
-        return f"RIPPLE: {found} (a swing, or friction where the reference turns)"
+        short = [] if self.arrives else ["DOES NOT ARRIVE"]
+        if self._ripple > 0.0:
+            found = f"+-{np.degrees(self._ripple):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
+            turning = f"RIPPLE: {found} (a swing, or friction at the turns)"
+            short.append(f"LIMIT CYCLE: {found}" if self.swing > 0.0 else turning)
+        return "; ".join(short)
 
     def labelled(self, label: str) -> Repeated:
         """The same with this label on its trajectory."""

@@ -121,3 +121,9 @@ class Trajectory:
         import pandas as pd
 
         return pd.DataFrame(self.columns())
+
+
+def rests(trajectory: Trajectory) -> bool:
+    """Whether the reference comes to rest before the horizon: a periodic one never settles, and need not."""
+    late = max(2, len(trajectory.time) // 20)
+    return bool(np.ptp(trajectory.theta_ref[-late:]) == 0.0)

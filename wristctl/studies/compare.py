@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
-from wristctl.studies.compare_outputs import draw, loop_tables, step_table, units
+from wristctl.studies.compare_answer import answer_lines
+from wristctl.studies.compare_outputs import loop_tables, step_table, units
+from wristctl.studies.compare_pictures import draw
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
     check_inverses,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
+    from wristctl.comparison.class_standing import ClassStanding
     from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.step_cost import StepTime
     from wristctl.comparison.world_ranking import WorldRanking
@@ -50,6 +53,8 @@ class Compared(StudyResult):
     """of the controllers that were tuned here, by name"""
     step_times: dict[str, StepTime]
     """median and 99th percentile of a control step on this machine [us], by controller/gains"""
+    standings: list[ClassStanding]
+    """of the rows in each class of conditions, or over the worlds of a family"""
     ranking: WorldRanking | None = None
     """over the worlds of a family, where one is named; there are no `rows` then"""
 
@@ -61,12 +66,18 @@ class Compared(StudyResult):
         where = str(self.findings.run.path) if self.findings.run else ""
         return UserError("every row fails or swings in some world", where, "other gains, or milder worlds", exit_code=3)
 
+    @property
+    def summary(self) -> list[str]:
+        """Which row is best in each class of conditions, in words."""
+        return answer_lines(self.standings)
+
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
         from wristctl.comparison.comparison_data import frame
+        from wristctl.comparison.paper_cells import paper_cells
         from wristctl.comparison.world_ranking import ranking_frame
 
-        return frame(self.rows) if self.ranking is None else ranking_frame(self.ranking)
+        return frame(self.rows, paper_cells(self.study)) if self.ranking is None else ranking_frame(self.ranking)
 
     def series(self) -> dict[str, np.ndarray]:
         """Courses over time, one row per combination, every fifth sample; SI units."""
@@ -106,8 +117,10 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
+    from wristctl.comparison.class_standing import class_standings, of_ranking
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
+    from wristctl.comparison.paper_cells import paper_cells
     from wristctl.comparison.statistics import spread
     from wristctl.report.truth_table import truth_tables
     from wristctl.simulation.closed_loop import scenario_of
@@ -126,12 +139,13 @@ def compare(session: Session) -> Compared:
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
     if settings.worlds.family:
         ranking, table = ranked(session, study, network, tuned)
-        return Compared(study, findings, [table], [], searches, {}, ranking)
+        return Compared(study, findings, [table], [], searches, {}, [of_ranking(ranking)], ranking)
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
     scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
     findings.note_streams(Draws(study.seed).names(loops, scenarios))
-    findings.table("data/comparison.csv", frame(results), units=units())
+    cells = paper_cells(study)
+    findings.table("data/comparison.csv", frame(results, cells), units=units())
     findings.arrays("data/trajectories.npz", series(results))
     if any(len(result.repeated.failed) > 1 for result in results):
         findings.table("data/repetitions.csv", repetitions_frame(results), units=units())
@@ -139,12 +153,13 @@ def compare(session: Session) -> Compared:
         name = "_".join((result.loop, result.label, result.inverse, result.reference)).replace(" ", "-")
         found = spread(result.repeated.metrics["rmse"])
         findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
+    standings = class_standings(results, settings, study.wrist)
     times = _step_times(session, tuned)
     with session.progress("drawing"):
-        draw(findings, settings, results)
-    by_loop = [loop_tables(loop, [r for r in results if r.loop == loop]) for loop in settings.loops]
+        draw(findings, study, results, standings)
+    by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
     tables = [*chain.from_iterable(by_loop), step_table(times), *truth_tables(study.wrist, settings.loops)]
-    return Compared(study, findings, tables, results, searches, times)
+    return Compared(study, findings, tables, results, searches, times, standings)
 
 
 def _step_times(session: Session, tuned: Gains) -> dict[str, StepTime]:

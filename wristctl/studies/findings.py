@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.records import LiveRun, stream
+from wristctl.records.manifest import OVERVIEW
+from wristctl.records.overview import Overview
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,6 +57,8 @@ class Findings:
         self.metrics: dict[str, dict[str, Any]] = {}
         """value, unit, better, n, interval and meaning by name, as a run's metrics.json has them"""
         self.figures = Figures()
+        self.overview = Overview()
+        """What the run's page begins with, and in which order it shows the figures."""
         self._seed = seed
 
     def stream(self, name: str) -> tuple[int, int]:
@@ -82,12 +86,27 @@ class Findings:
         if self.run:
             self.run.metric(name, value, unit, better, n, interval, meaning)
 
-    def figure(self, name: str, draw: Callable[..., Figure], *of: Any, **how: Any) -> None:
-        """The figure that `draw(*of, **how)` gives: drawn now into a run, else when somebody asks for it."""
+    def figure(
+        self, name: str, draw: Callable[..., Figure], *of: Any, caption: str = "", later: bool = False, **how: Any
+    ) -> None:
+        """The figure that `draw(*of, **how)` gives: drawn now into a run, else when somebody asks for it.
+
+        The `caption` says what it shows; one for `later` is drawn when somebody asks for it in any case.
+        """
         drawer = partial(draw, *of, **how)
         self.figures.add(name, drawer)
-        if self.run:
+        self.overview.captions[name] = caption
+        if self.run and not later:
             self.run.figure(name, drawer())
+
+    def headline(self, *metrics: str) -> None:
+        """The metrics that head the run's page."""
+        self.overview.cards[:] = metrics
+
+    def keep_overview(self) -> None:
+        """Write down for the run's page what is known of it by now."""
+        if self.run:
+            self.run.file(OVERVIEW).write_text(self.overview.text(), encoding="utf-8")
 
     def table(
         self,

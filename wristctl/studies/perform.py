@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic
@@ -16,12 +16,14 @@ from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import TABLES, Manifest
+from wristctl.records.overview import Overview
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.given_motions import check_motions
 from wristctl.studies.inputs import Inputs, named_for_good, opened
 from wristctl.studies.procedure import Found, Procedure
 from wristctl.studies.session import Operator, Session, ShowProgress
+from wristctl.studies.study_result import StudyResult
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ def perform(
         return work(session)
     try:
         found = work(session)
+        findings.overview.answer[:] = found.summary
     except UserError as error:
         run.console(f"error: {error}")
         raise
@@ -81,15 +84,26 @@ def perform(
         run.console(traceback.format_exc())
         error.add_note(f"the traceback is in {run.path / 'console.log'}")
         raise
-    text = str(found)
-    if text:
-        run.console(text)
-        run.summary(f"```\n{text}\n```")
+    finally:
+        with suppress(OSError, UserError):  # what went wrong is told by another error
+            findings.keep_overview()
+    run.console(str(found))
+    run.summary(_summary(found, findings.overview), first=bool(found.summary))
     content = json.dumps(plain_tables(found.tables), indent=2, allow_nan=False)
     run.file(TABLES).write_text(content + "\n", encoding="utf-8")
     if found.fault is not None:
         run.exit_code = found.fault.exit_code
     return found
+
+
+def _summary(found: StudyResult, overview: Overview) -> str:
+    """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
+    tables = "\n\n".join(table.text() for table in found.tables)
+    if not overview.answer:
+        return f"```\n{tables}\n```" if tables else ""
+    picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""
+    lines = "\n".join(overview.answer)
+    return f"```\n{lines}\n```{picture}\n\n<details><summary>All tables</summary>\n\n```\n{tables}\n```\n\n</details>"
 
 
 def plain_tables(tables: Sequence[Table]) -> Any:

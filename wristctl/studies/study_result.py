@@ -45,6 +45,11 @@ class StudyResult(ABC):
         return None
 
     @property
+    def summary(self) -> Sequence[str]:
+        """What was found in a few lines of at most 100 columns; empty where the tables are the answer."""
+        return ()
+
+    @property
     def metrics(self) -> dict[str, float]:
         """Numbers by name, in the units that the run's metrics.json gives; nan where there is none."""
         known = {name: each["value"] for name, each in self.findings.metrics.items()}
@@ -61,7 +66,7 @@ class StudyResult(ABC):
         return Run(self.findings.run.path) if self.findings.run else None
 
     def __str__(self) -> str:
-        return "\n\n".join(table.text() for table in self.tables)
+        return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])
 
     def __repr__(self) -> str:
         where = str(self.findings.run.path) if self.findings.run else "in memory"

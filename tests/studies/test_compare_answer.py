@@ -1,0 +1,116 @@
+"""The answer in words: who is best where, who fails, what the paper's law ranks, within a terminal."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wristctl.comparison.class_standing import ClassStanding
+from wristctl.comparison.condition_classes import CLASSES
+from wristctl.comparison.geometric_means import geometric_mean
+from wristctl.comparison.tie_groups import standing
+from wristctl.studies.compare_answer import COLUMNS, LADDER, LINES, answer_lines, two, wrapped
+
+ROWS = ("mrac/default", "smc/exchanged", "smc/printed", "pid/printed", "gvsc/default", "nc/default")
+RUNGS = tuple(f"{name}/default" for name in LADDER)
+RMSE = dict(zip((*ROWS, *RUNGS), (1e-5, 4e-3, 0.3, 3e-3, 5e-3, 2e-3, 1e-1, 1e-3, 2e-4, 1e-4, 1e-4), strict=True))
+
+
+def stands(
+    name: str = "sampled",
+    rmse: dict[str, float] | None = None,
+    swings: tuple[str, ...] = (),
+    away: tuple[str, ...] = (),
+) -> ClassStanding:
+    """Rows on twelve motions, each its RMSE times what all share."""
+    errors = RMSE if rmse is None else rmse
+    rng = np.random.default_rng(5)
+    shared, own = rng.normal(0.0, 0.5, 12), 0.02 * rng.standard_normal((len(errors), 12))
+    scores = np.array(list(errors.values()))[:, None] * np.exp(shared + own)
+    labels = list(errors)
+    swing = np.array([0.05 if label in swings else 0.0 for label in labels])
+    return ClassStanding(
+        name, "12 motions", labels, ["a"], scores,
+        standing(scores, np.repeat(swing[:, None] > 0.0, 12, axis=1), 1.5, 0),
+        [geometric_mean(each, 0) for each in np.where(np.isfinite(scores), scores, 1.5)], swing,
+        np.array([12 if label in away else 0 for label in labels]), np.zeros(len(labels)),
+    )  # fmt: skip
+
+
+def test_the_best_stands_first_with_its_interval_and_what_it_buys() -> None:
+    lines = answer_lines([stands()])
+    assert lines[1].startswith("sampled (12)") and "1. mrac 0.000" in lines[1] and re.search(r"\[\S+, \S+\]", lines[1])
+    said = " ".join(" ".join(lines).split())
+    assert "mrac errs less: x10000 feedforward [" in said or "mrac errs less: x9900 feedforward [" in said
+    for rung in LADDER[1:]:
+        assert re.search(rf"x\S+ {rung}", said)
+    assert "smc/exchanged has place 8 of 11" in said
+
+
+def test_the_paper_is_answered_by_name() -> None:
+    said = " ".join(answer_lines([stands(away=("smc/printed",)), stands("pushed", swings=("pid/printed",))]))
+    assert "smc/printed never arrives in 1 of 2 classes" in said
+    assert "pid/printed fails or swings in 1 of 2 classes" in said
+    assert "the paper's order by RMSE, smc < mrac < pid < gvsc < nc, holds in 0 of 2 classes" in said
+    order = dict(
+        zip(("smc/tuned", "mrac/default", "pid/tuned", "gvsc/default", "nc/default"), (1, 2, 3, 4, 5), strict=True)
+    )
+    theirs = stands(rmse={label: 1e-3 * value for label, value in order.items()})
+    assert "holds in 1 of 2 classes (sampled)" in " ".join(answer_lines([theirs, stands("pushed")]))
+    both = {"smc/printed": 1e-3, "feedforward/default": 1e-2}
+    assert "smc/printed works in all of 1 classes" in " ".join(answer_lines([stands(rmse=both)]))
+
+
+def test_limit_cycles_failures_and_short_ends_are_named_with_how_often() -> None:
+    one = stands(swings=("pid/printed",), away=("smc/printed",))
+    scores = one.scores.copy()
+    scores[4, :5] = np.inf
+    half = replace(one, scores=scores, standing=standing(scores, np.zeros(scores.shape, bool), 1.5, 0))
+    lost = " ".join(answer_lines([one]))
+    assert "limit cycle: pid/printed +-2.9 deg; never arrives: smc/printed" in lost
+    assert "fails: gvsc in 5 of 12" in " ".join(answer_lines([half]))
+
+
+def test_rows_that_tie_are_joined() -> None:
+    alike = {"a/default": 1e-3, "b/default": 1e-3, "c/default": 5e-3}
+    (line,) = [each for each in answer_lines([stands(rmse=alike)]) if "1." in each]
+    assert re.search(r"1\. [ab] \S+ \[.*\] = [ab] \S+ 2\. c", line.replace(";", ""))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.integers(1, 5),
+    st.lists(st.text("abcdefgh-", min_size=1, max_size=30), min_size=1, max_size=18, unique=True),
+    st.integers(0, 1000),
+)
+def test_an_answer_fits_a_terminal_whatever_is_compared(classes: int, laws: list[str], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rmse = {f"{law}/g{k}": float(10.0 ** rng.uniform(-6, 0)) for k, law in enumerate(laws)}
+    swings, away = (tuple(label for label in rmse if rng.random() < 0.3) for _ in range(2))
+    lines = answer_lines([stands(name, rmse, swings, away) for name in CLASSES[:classes]])
+    assert len(lines) <= LINES and max(map(len, lines)) <= max(COLUMNS, 24 + 8 + 35)
+    assert all(any(line.startswith(name) for line in lines) for name in CLASSES[:classes])
+
+
+def test_no_comparison_has_no_answer() -> None:
+    assert answer_lines([]) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(0.0123, "0.012"), (3.14e-5, "3.1e-5"), (15234.0, "15000"), (3.2e7, "3.2e7"), (0.0, "0"), (12.3, "12")],
+)
+def test_a_number_is_as_short_as_two_digits_are(value: float, said: str) -> None:
+    assert two(value) == said
+
+
+def test_what_does_not_fit_ends_with_an_ellipsis_and_nothing_else_is_lost() -> None:
+    words = [f"w{k}" for k in range(40)]
+    assert " ".join(wrapped(words, 9, 60)).replace(";", "").split() == words
+    short = wrapped(words, 2, 30)
+    assert len(short) == 2 and short[-1].endswith(" ...") and max(map(len, short)) <= 30

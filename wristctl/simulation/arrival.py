@@ -1,0 +1,57 @@
+"""Does a loop get where it is asked to, and if not, why: told from its course, never from saturation alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wristctl.simulation.trajectory import Trajectory
+
+SHORT = 0.2
+"""Share of the move that may be missing at the end of what arrives."""
+_LATE = 10
+"""The last part of the horizon that is the end, as a divisor."""
+_STILL = 0.05
+"""Share of the move within which a wrist has hardly moved."""
+_BOTH_WAYS = 0.2
+"""Share of ticks at which a torque changes sides beyond which it is one that chatters."""
+
+
+def missing(course: Trajectory) -> float:
+    """What is missing at the end: mean |theta - theta_ref| over the last 10 % as a share of the largest reference.
+
+    0 where the reference stays at zero; inf where the wrist has failed.
+    """
+    late = max(1, len(course.time) // _LATE)
+    asked = float(np.max(np.abs(course.theta_ref)))
+    if not np.isfinite(course.theta[-late:]).all():
+        return np.inf
+    return float(np.mean(np.abs(course.error[-late:])) / asked) if asked > 0.0 else 0.0
+
+
+def arrives(course: Trajectory) -> bool:
+    """Whether at most a fifth of the move is missing at the end; of a periodic reference, of its amplitude."""
+    return missing(course) <= SHORT
+
+
+def why_not(course: Trajectory, limit: float) -> str:
+    """In words where a course ends that does not arrive, and what its torque does; `limit` is of the tension [N]."""
+    late = max(1, len(course.time) // _LATE)
+    ends, asked = (float(np.degrees(np.mean(each[-late:]))) for each in (course.theta, course.theta_ref))
+    moved = float(np.max(np.abs(course.theta))) > _STILL * float(np.max(np.abs(course.theta_ref)))
+    said = f"ends at {ends:.2g} of {asked:.3g} deg" if moved else f"hardly moves: {ends:.2g} of {asked:.3g} deg"
+    wanted, given = course.torque_wanted, course.torque
+    turns = float(np.mean(np.sign(wanted[1:]) * np.sign(wanted[:-1]) < 0.0))
+    cut = float(np.mean(np.abs(wanted - given) > 1e-6 * np.abs(wanted)))
+    if turns > _BOTH_WAYS and cut > 0.5:
+        return (
+            f"{said}; the law asks for {_largest(wanted):.3g} N m to one side and the other, turning at "
+            f"{100.0 * turns:.0f} % of samples, and tensions of {limit:g} N cut it off {100.0 * cut:.3g} % of the time"
+        )
+    if cut > 0.5:
+        most, asked_for = _largest(given), _largest(wanted)
+        return f"{said}; tensions of {limit:g} N give at most {most:.3g} N m of the {asked_for:.3g} that it asks for"
+    return f"{said}; the law asks for no more than {_largest(wanted[-late:]):.3g} N m there: its gains are too small"
+
+
+def _largest(torque: np.ndarray) -> float:
+    return float(np.max(np.abs(torque)))

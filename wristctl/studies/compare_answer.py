@@ -1,0 +1,181 @@
+"""The answer of a comparison in words: which law is best in which class of conditions, by how much, and who fails."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wristctl.comparison.class_standing import ClassStanding
+
+LINES, COLUMNS = 24, 100
+"""What an answer may take of a terminal."""
+LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
+"""What each more of a law buys: a term is worth what it adds to the rung below."""
+PAPERS, PRINTED = "smc", "printed"
+"""The paper's own law, and the gains that it prints."""
+_INDENT = 24
+_WHERE = "every row and metric: --all prints them, the run's report.html sorts and filters them"
+
+
+def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
+    """At most LINES lines of at most COLUMNS columns; empty where nothing was judged."""
+    if not found:
+        return []
+    names = _names(found)
+    cells = "motions" if found[0].loops else "worlds"
+    head = f"best first: RMSE [deg], geometric mean over {cells} [95 % interval]; = no worse (paired, Holm)"
+    end = [*wrapped([*_printed(found), *_papers_places(found, names)], 2), *wrapped(_papers_order(found), 1), _WHERE]
+    room = LINES - 1 - len(end)
+    rooms = [max(2, room // len(found)) + (at < room % len(found)) for at in range(len(found))]
+    blocks = [_block(each, names, own) for each, own in zip(found, rooms, strict=True)]
+    return [head, *[line for block in blocks for line in block][:room], *end]
+
+
+def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
+    """What each row is called: by its law alone where that has no other row, and by printed gains always."""
+    labels = dict.fromkeys(label for each in found for label in each.labels)
+    laws = Counter(label.split("/")[0] for label in labels)
+    alone = {label for label in labels if laws[label.split("/")[0]] == 1 and not label.endswith(f"/{PRINTED}")}
+    return {label: label.split("/")[0] if label in alone else label.removesuffix("/default") for label in labels}
+
+
+def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
+    """Groups in order, who cannot be relied on, and what the best one buys."""
+    columns = COLUMNS - _INDENT
+    most = max(1, (room - 2) // 2)
+    below = [*wrapped(_lost(each, names), most, columns), *wrapped(_buys(each, names), most, columns)][: room - 1]
+    lines = [*wrapped(_groups(each, names), max(1, room - len(below)), columns), *below]
+    name = f"{each.name} ({each.cells.split()[0]})"
+    return [f"{'' if at else name:<{_INDENT}}{line}" for at, line in enumerate(lines)]
+
+
+def _groups(each: ClassStanding, names: dict[str, str]) -> list[str]:
+    """Each group as a piece: its number, its best row with its mean, and what ties with it."""
+    if not each.standing.groups:
+        return ["nothing can be relied on: every row fails or swings somewhere"]
+    pieces = []
+    for number, group in enumerate(each.standing.groups, start=1):
+        first, *ties = group.rows
+        mean = each.means[first]
+        ends = f" [{deg(mean.low)}, {deg(mean.high)}]" if number == 1 and math.isfinite(mean.high) else ""
+        shown = f"{number}. {names[each.labels[first]]} {deg(mean.value)}{ends}"
+        pieces.append(" = ".join([shown, *(f"{names[each.labels[row]]} {deg(each.means[row].value)}" for row in ties)]))
+    return pieces
+
+
+def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
+    """Who fails, swings, does not arrive, or pulls harder than tendons bear; in how many cells where not in all."""
+    count = each.scores.shape[1]
+
+    def among(times: int) -> str:
+        return "" if times == count else f" in {times} of {count}"
+
+    fails, swings = each.standing.failures, each.standing.swings
+    kinds = {
+        "fails": [
+            f"{names[each.labels[row]]}{among(fails[row].times)}"
+            for row in each.standing.unreliable
+            if fails[row].times
+        ],
+        "limit cycle": [
+            f"{names[each.labels[row]]} +-{deg(each.swing[row])} deg{among(swings[row].times)}"
+            for row in each.standing.unreliable
+            if swings[row].times
+        ],
+        "never arrives": [names[each.labels[row]] for row in each.order if each.away[row] == count],
+        "no tendon bears it": [
+            f"{names[each.labels[row]]} {each.peak[row]:.2g} N" for row in each.order if each.peak[row] > 0.0
+        ],
+    }
+    return [f"{kind}: {', '.join(rows)}" for kind, rows in kinds.items() if rows]
+
+
+def _buys(each: ClassStanding, names: dict[str, str]) -> list[str]:
+    """How many times less the best row errs than feedforward and the rungs of the ladder."""
+    if not each.standing.groups:
+        return []
+    best = each.standing.groups[0].rows[0]
+    rungs = {name: row for name in LADDER if (row := each.best(name)) is not None and row != best}
+    ratios = {name: each.times_better(best, row) for name, row in rungs.items()}
+    bought = [f"x{two(ratio.value)} {name}" for name, ratio in ratios.items()]
+    if "feedforward" in ratios and math.isfinite(ratios["feedforward"].high):
+        ends = ratios["feedforward"]
+        bought[0] += f" [{two(ends.low)}, {two(ends.high)}]"
+    return [f"{names[each.labels[best]]} errs less: {', '.join(bought)}"] if bought else []
+
+
+def _printed(found: Sequence[ClassStanding]) -> list[str]:
+    """What becomes of the gains that the paper prints."""
+    said = []
+    for label in dict.fromkeys(label for each in found for label in each.labels if label.endswith(f"/{PRINTED}")):
+        own = [(each, each.labels.index(label)) for each in found if label in each.labels]
+        away = sum(each.away[row] == each.scores.shape[1] for each, row in own)
+        lost = sum(row in each.standing.unreliable for each, row in own)
+        kinds = [f"never arrives in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
+        said.append(f"{label} {' and '.join(kinds) or 'works in all'} of {len(own)} classes")
+    return said
+
+
+def _papers_places(found: Sequence[ClassStanding], names: dict[str, str]) -> list[str]:
+    """The places of the paper's law in each class."""
+    said = []
+    for label in names:
+        law, _, gains = label.partition("/")
+        if law != PAPERS or gains == PRINTED:
+            continue
+        places = []
+        for each in found:
+            row = each.labels.index(label) if label in each.labels else None
+            places.append("-" if row is None or each.group(row) is None else str(each.order.index(row) + 1))
+        said.append(f"{label} has place {', '.join(places)} of {len(found[0].labels)}")
+    return said
+
+
+def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
+    """Whether the order of the paper's five laws by RMSE is that of their best rows here."""
+    from wristctl.comparison.paper import T2
+
+    printed = sorted(T2, key=lambda name: T2[name].rmse)
+    rows = {each.name: [each.labels[row].split("/")[0] for row in each.order] for each in found}
+    known = {name: list(dict.fromkeys(law for law in laws if law in T2)) for name, laws in rows.items()}
+    ours = {name: laws for name, laws in known.items() if len(laws) == len(T2)}
+    if not ours:
+        return []
+    holds = [name for name, order in ours.items() if order == printed]
+    where = f" ({', '.join(holds)})" if holds else ""
+    return [f"the paper's order by RMSE, {' < '.join(printed)}, holds in {len(holds)} of {len(ours)} classes{where}"]
+
+
+def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS) -> list[str]:
+    """Pieces in lines, broken between words; where there is no room it ends with an ellipsis."""
+    given = [piece for piece in pieces if piece]
+    words = [word for at, piece in enumerate(given) for word in f"{piece}{';' * (at < len(given) - 1)}".split(" ")]
+    found = [""]
+    for at, word in enumerate(words):
+        last = len(found) == lines
+        tail = " ..." if last and at < len(words) - 1 else ""
+        if len(f"{found[-1]} {word}{tail}".strip()) <= columns:
+            found[-1] = f"{found[-1]} {word}".strip()
+        elif last:
+            found[-1] += " ..."
+            break
+        else:
+            found.append(word)
+    return [line for line in found if line]
+
+
+def deg(value: float) -> str:
+    """An angle [rad] in degrees, to two digits."""
+    return two(math.degrees(value))
+
+
+def two(value: float) -> str:
+    """A number to two digits, as short as it goes: 15000, 0.012, 3.1e-5."""
+    shown = f"{value:.2g}"
+    if "e+" in shown and abs(value) < 1e6:
+        return f"{float(shown):.0f}"
+    digits, _, power = shown.partition("e")
+    return f"{digits}e{int(power)}" if power else digits
