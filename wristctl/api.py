@@ -209,18 +209,20 @@ def identify(
 @in_python()
 def audit(
     study: Study, *, table1: Ref | Trained | None = None, selection: Ref | Trained | None = None,
-    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    hardware: Ref | None = None, out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Audited:  # fmt: skip
     """Every claim of the paper in the study's `audit` section (experiments/claims.yaml has all) with a verdict.
 
-    `table1` and `selection` are trainings by experiments/table1.yaml and experiments/model_selection.yaml; without them
-    the claims that they would decide stay open. The result has `.judgements` and `.comparisons`, by loop; `.frame()` is
-    a row per claim. Raises UserError without claims, and for a training that lacks what a claim asks for.
+    `table1` and `selection` are trainings by experiments/table1.yaml and experiments/model_selection.yaml, `hardware`
+    is a run of hw-run; without them the claims that they would decide stay open. The result has `.judgements` and
+    `.comparisons`, by loop; `.frame()` is a row per claim. Raises UserError without claims, and for a training that
+    lacks what a claim asks for.
 
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return carry_out(AUDIT, study, {"table1": table1, "selection": selection}, out, label, progress)
+    given = {"table1": table1, "selection": selection, "hardware": hardware}
+    return carry_out(AUDIT, study, given, out, label, progress)
 
 
 @in_python()

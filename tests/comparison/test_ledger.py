@@ -1,4 +1,4 @@
-"""Claims of the paper judged by hand-made evidence: where each verdict begins and ends."""
+"""Claims of the paper judged by hand-made evidence, loop by loop."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.comparison.ledger import Judgement, evidence_study, interval, judge, ledger_frame
+from wristctl.comparison.equations import EQUATIONS
+from wristctl.comparison.evidence import Grounds, TrialsDone, conditions_of, evidence_study, rows_of
+from wristctl.comparison.ledger import Judgement, interval, judge, ledger_frame
 from wristctl.config.audit import Claim
 from wristctl.config.load import load_study
+from wristctl.config.loop import LOOPS
 
-HAIR = 1e-9
+OPEN, BETTER, WORSE = "not specified enough", "better than the paper", "worse than the paper"
 
 
 def claim(value: float | None = 2.0, metric: str = "rmse", **more: Any) -> Claim:
@@ -20,7 +23,7 @@ def claim(value: float | None = 2.0, metric: str = "rmse", **more: Any) -> Claim
     return Claim.model_validate(given | {"value": value, "metric": metric} | more)
 
 
-def moves(one: float, other: float, metric: str = "rmse") -> pd.DataFrame:
+def moves(one: float, other: float, metric: str = "rmse", **more: Any) -> pd.DataFrame:
     """What compare found on one loop, beside a step, other gains and another controller that must not count."""
     rows = [
         ("smc", "printed", "minimum jerk 1 s 30 deg", one),
@@ -28,136 +31,185 @@ def moves(one: float, other: float, metric: str = "rmse") -> pd.DataFrame:
         ("smc", "printed", "step 30 deg", 2e3),
         ("smc", "exchanged", "minimum jerk 1 s 30 deg", 3e3),
         ("pid", "printed", "minimum jerk 1 s 30 deg", 1e-4),
+        ("pid", "printed", "minimum jerk 2 s 30 deg", 9.0),
     ]
-    return pd.DataFrame(rows, columns=["controller", "gains", "reference", metric])
+    return pd.DataFrame(rows, columns=["controller", "gains", "reference", metric]).assign(**more)
 
 
-def said(asked: Claim, one: float, other: float) -> str:
-    return judge(asked, {"exact": moves(one, other, str(asked.metric))}, {}).verdict
+def grounds(loops: dict[str, pd.DataFrame], **more: Any) -> Grounds:
+    return Grounds({(name, 1.0): table for name, table in loops.items()}, **more)
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "verdict"),
-    [
-        (1.0, 5.0, "reproduced"),  # the paper's 2 lies between the two moves
-        (5.0, 1.0, "reproduced"),  # whichever of them is the larger
-        (2.0, 9.0, "reproduced"),
-        (0.5, 2.0, "reproduced"),
-        (0.1, 2.0 / 1.5 * (1.0 + HAIR), "reproduced"),  # one of them is within a factor of 1.5
-        (0.1, 2.0 / 1.5 * (1.0 - HAIR), "not reproduced"),
-        (3.0 * (1.0 - HAIR), 99.0, "reproduced"),
-        (3.0 * (1.0 + HAIR), 99.0, "not reproduced"),
-        (0.1, 0.2, "not reproduced"),
-        (1.0, np.nan, "reproduced"),  # never is above everything
-        (3.1, np.nan, "not reproduced"),
-        (np.nan, np.nan, "not reproduced"),
-    ],
-)
-def test_a_number_is_reproduced_between_two_moves_or_within_a_factor_of_one(
-    one: float, other: float, verdict: str
-) -> None:
-    assert said(claim(2.0), one, other) == verdict
+def test_each_loop_has_its_own_verdict_and_where_they_differ_the_loop_decides() -> None:
+    holds, fails, precise = moves(1.5, 5.0), moves(10.0, np.nan), moves(1e-6, 1e-6)
+    both = judge(claim(reason="C5"), grounds({"exact": holds, "sampled": holds}))
+    assert both.verdict == "reproduced" and both.shown_by == ("exact", "sampled") and both.reason == "C5"
+    found = judge(claim(), grounds({"exact": holds, "sampled": fails, "default": precise}))
+    assert {loop: each.verdict for loop, each in found.found.items()} == {
+        "exact": "reproduced", "sampled": WORSE, "default": BETTER,
+    }  # fmt: skip
+    assert found.verdict == OPEN and found.reason == "the loop decides"
+    assert (found.found["sampled"].low, found.found["sampled"].high) == (10.0, 10.0)
 
 
-def test_a_steady_state_error_is_reproduced_where_neither_move_is_above_the_factor() -> None:
-    asked = claim(0.2, "steady_state")
-    assert said(asked, 0.0, 0.3 * (1.0 - HAIR)) == "reproduced"
-    assert said(asked, 0.1, 0.3 * (1.0 + HAIR)) == "not reproduced"
+def test_what_failed_has_no_numbers() -> None:
+    table = moves(2.0, 2.0).assign(failed=[True, True, False, False, False, False])
+    assert judge(claim(), grounds({"exact": table})).found["exact"].verdict == WORSE
+    table = table.assign(failed=[False, True, False, False, False, False])
+    assert judge(claim(), grounds({"exact": table})).found["exact"].verdict == OPEN
 
 
-def test_a_claim_of_nothing_is_reproduced_below_a_millionth() -> None:
-    for metric in ("rmse", "steady_state", "overshoot"):
-        assert said(claim(0.0, metric), 0.0, 0.99e-6) == "reproduced"
-        assert said(claim(0.0, metric), 0.0, 1e-6) == "not reproduced"
+def test_what_the_equations_as_they_stand_do_not_give_they_contradict() -> None:
+    """On the exact loop; where a loop is sampled or cut into segments, that is not the paper's."""
+    derived = claim(derived=True)
+    found = judge(derived, grounds({"exact": moves(9.0, 9.0), "sampled": moves(9.0, 9.0)})).found
+    assert (found["exact"].verdict, found["sampled"].verdict) == ("contradicted", WORSE)
+    assert judge(derived, grounds({"exact": moves(2.0, 2.0)})).verdict == "reproduced"
+    assert judge(claim(), grounds({"exact": moves(9.0, 9.0)})).verdict == WORSE
 
 
-def test_a_claim_must_hold_on_every_loop_and_the_reason_says_on_which_it_does() -> None:
-    holds, fails = moves(1.0, 5.0), moves(10.0, np.nan)
-    both = judge(claim(reason="C5"), {"exact": holds, "sampled": holds}, {})
-    assert (both.verdict, both.shown_by) == ("reproduced", ("exact", "sampled"))
-    assert both.reason == "C5; exact 1 to 5, sampled 1 to 5"
-    one = judge(claim(reason="C5"), {"sampled": fails, "exact": holds, "default": holds}, {})
-    assert one.verdict == "not reproduced" and (one.low, one.high) == (1.0, 5.0)
-    assert one.reason == "holds on exact and default only; C5; sampled 10 to never, exact 1 to 5, default 1 to 5"
-    none = judge(claim(), {"sampled": fails, "exact": moves(20.0, 30.0)}, {})
-    assert none.verdict == "not reproduced" and none.reason == "sampled 10 to never, exact 20 to 30"
-    assert (none.low, none.high) == (10.0, np.inf), "where none holds, the first loop's range is shown"
+def test_a_tension_beyond_the_wrists_stands_beside_the_verdict() -> None:
+    def found(peak: float) -> Any:
+        table = moves(2.0, 2.0).assign(peak_tension=[9.0, 9.0, peak, 1e6, 1e6, 1e6])
+        return judge(claim(), grounds({"exact": table}, tension_limit=60.0)).found["exact"]
+
+    assert (found(60.0).verdict, found(60.0).mark) == ("reproduced", "")
+    beyond = found(107e3)
+    assert (beyond.verdict, beyond.mark) == ("reproduced", "not physical")
+    assert beyond.reason == "1.07e+05 N on a step 30 deg"
+
+
+def test_what_the_paper_leaves_open_stays_open_with_ours_beside() -> None:
+    named = claim(unspecified="the law is only named")
+    for one, said in ((2.0, "reproduced"), (1e-9, BETTER), (9.0, WORSE)):
+        found = judge(named, grounds({"exact": moves(one, one)}))
+        assert found.verdict == OPEN and found.found["exact"].low == one
+        assert found.reason == f"the law is only named; exact: with ours {said}"
+    open_ = judge(claim(evidence="table1", unspecified="no scale"), grounds({}))
+    assert open_.verdict == "open", "without a run there is nothing to stand beside"
+
+
+def test_orderings_are_claims() -> None:
+    ordering = claim(None, evidence="ordering", than="pid/printed")
+    assert judge(ordering, grounds({"exact": moves(5e-5, 1.0)})).verdict == "reproduced"
+    assert judge(ordering, grounds({"exact": moves(5e-5, 90.0)})).verdict == OPEN
+    assert judge(ordering, grounds({"exact": moves(1.0, 90.0)})).verdict == WORSE
+    reversed_ = claim(None, evidence="ordering", than="pid/printed", derived=True)
+    assert judge(reversed_, grounds({"exact": moves(1.0, 90.0)})).verdict == "contradicted"
+    with pytest.raises(ValueError, match="than: is controller/gains, not pid"):
+        claim(None, evidence="ordering", than="pid")
+
+
+def test_settling_counts_from_the_end_of_each_motion() -> None:
+    asked = claim(1.2, "settling_after")
+    for one, other, verdict in ((0.0, 0.0, OPEN), (1.9, 1.9, WORSE), (np.nan, np.nan, WORSE)):
+        assert judge(asked, grounds({"exact": moves(one, other, "settling_after")})).verdict == verdict
+
+
+def test_soft_springs_are_judged_by_what_they_add() -> None:
+    """An error that is there with stiff springs too is none of theirs."""
+    asked = claim(0.157, stiffness_scale=0.7)
+    loops = {("default", 1.0): moves(0.11, 0.11), ("default", 0.7): moves(0.12, 0.12)}
+    assert judge(asked, Grounds(loops)).found["default"].verdict == BETTER
+    loops[("default", 0.7)] = moves(0.11 + 0.157, 0.11 + 0.157)
+    assert judge(asked, Grounds(loops)).found["default"].verdict == "reproduced"
+    loops[("default", 0.7)] = moves(0.1, 0.1)
+    assert judge(asked, Grounds(loops)).found["default"].high == 0.0
 
 
 def test_what_was_not_run_is_open() -> None:
-    stranger = judge(claim(controller="lqr"), {"exact": moves(1.0, 2.0)}, {})
+    stranger = judge(claim(controller="lqr"), grounds({"exact": moves(1.0, 2.0)}))
     assert stranger.verdict == "open" and stranger.reason == "no controller 'lqr' to run" and stranger.shown_by == ()
-    assert stranger.claim.controller == "lqr" and np.isnan([stranger.low, stranger.high]).all()
-    some = judge(claim(), {"exact": moves(1.0, 2.0), "other": moves(1.0, 2.0).iloc[2:]}, {})
+    some = judge(claim(), grounds({"exact": moves(2.0, 2.0), "other": moves(1.0, 2.0).iloc[2:]}))
     assert (some.verdict, some.shown_by) == ("reproduced", ("exact",)), "a loop without the row says nothing"
     for evidence, experiment in (("table1", "table1"), ("selection", "model_selection")):
-        missing = judge(claim(evidence=evidence), {"exact": moves(2.0, 2.0)}, {})
-        assert missing.verdict == "open" and np.isnan([missing.low, missing.high]).all()
+        missing = judge(claim(evidence=evidence), grounds({"exact": moves(2.0, 2.0)}))
+        assert missing.verdict == "open" and missing.shown_by == ()
         assert f"needs --{evidence} " in missing.reason and f"experiments/{experiment}.yaml" in missing.reason
 
 
-def test_texts_settings_and_hardware_are_judged_by_what_they_are() -> None:
-    for evidence, verdict in (("text", "contradictory"), ("settings", "taken over"), ("hardware", "open")):
-        found = judge(claim(evidence=evidence, reason="why", verdict="contradictory"), {"exact": moves(2.0, 2.0)}, {})
-        assert (found.verdict, found.reason, found.shown_by) == (verdict, "why", ())
-        assert np.isnan([found.low, found.high]).all()
+def test_settings_have_no_verdict_and_words_have_the_readers() -> None:
+    taken = judge(claim(evidence="settings", reason="why"), grounds({}))
+    assert taken.verdict is None and not taken.found
+    said = judge(claim(evidence="text", reason="why", verdict="contradicted"), grounds({}))
+    assert (said.verdict, said.reason, said.shown_by) == ("contradicted", "why", ())
+
+
+def test_equations_decide_by_what_they_come_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = claim(1.2, "settling_by_units", evidence="equation", sense="at most")
+    found = judge(asked, grounds({}))
+    assert found.verdict == "reproduced" and found.found[""].low == pytest.approx(np.log(50) * 0.105 / 0.615)
+    monkeypatch.setitem(EQUATIONS, "settling_by_units", lambda: 1.3)
+    assert judge(asked, grounds({})).verdict == "contradicted"
 
 
 def trained(asked: Claim, **found: Any) -> Judgement:
-    return judge(asked, {}, {"table1": {"rmse": {"value": 1.0} | found, "accuracy": {"value": 7.0}}})
+    return judge(asked, grounds({}, trainings={"table1": {"rmse": {"value": 2.0} | found, "accuracy": {"value": 7.0}}}))
 
 
-def test_a_training_reproduces_what_lies_within_a_factor_of_its_interval() -> None:
-    for value, verdict in (
-        (1.0, "reproduced"),
-        (6.0, "reproduced"),
-        (0.99, "not reproduced"),
-        (6.01, "not reproduced"),
-    ):
-        found = trained(claim(value, evidence="table1"), value=2.0, interval=[1.5, 4.0], n=10)
-        assert found.verdict == verdict and (found.low, found.high) == (1.5, 4.0)
-        assert found.reason == "rmse is 2 (n = 10)" and found.shown_by == ("table1",)
-    alone = trained(claim(1.5, evidence="table1", reason="C8"), value=1.0, interval=None)
-    assert alone.verdict == "reproduced" and (alone.low, alone.high) == (1.0, 1.0)
-    assert alone.reason == "C8; rmse is 1"
+def test_a_training_is_judged_by_its_median_and_the_interval_of_that() -> None:
+    found = trained(claim(3.0, evidence="table1", reason="C8"), interval=[1.5, 4.0], n=10)
+    assert found.verdict == "reproduced" and (found.found[""].low, found.found[""].high) == (1.5, 4.0)
+    assert found.reason == "C8; rmse is 2 (n = 10)" and found.shown_by == ("table1",)
+    assert trained(claim(9.0, evidence="table1")).verdict == BETTER
+    assert trained(claim(1.0, evidence="table1"), value=None).verdict == WORSE
 
 
-def test_an_exact_claim_is_reproduced_by_its_own_value_only() -> None:
-    for value, verdict in ((1.5, "reproduced"), (4.0, "reproduced"), (1.4, "not reproduced"), (4.1, "not reproduced")):
-        assert trained(claim(value, evidence="table1", exact=True), interval=[1.5, 4.0]).verdict == verdict
+def trials(rmse: float, **more: Any) -> pd.DataFrame:
+    row = {"controller": "smc", "gains": "stepper", "outcome": "ok", "push": 0.0, "direction": "radial", "rmse": rmse}
+    return pd.DataFrame([row | more])
 
 
-def test_a_training_without_the_number_does_not_reproduce_it() -> None:
-    found = trained(claim(1.0, evidence="table1"), value=None)
-    assert found.verdict == "not reproduced" and np.isnan(found.low)
+def test_trials_of_the_papers_law_judge_the_experiment_and_an_emulated_rig_says_so() -> None:
+    asked = claim(2.0, evidence="hardware")
+    assert judge(asked, grounds({})).verdict == "open"
+
+    def found(table: pd.DataFrame, emulated: bool = False, asked: Claim = asked) -> Judgement:
+        return judge(asked, grounds({}, hardware=TrialsDone(table, 1.0, emulated)))
+
+    real, emulated = found(trials(2.0)), found(trials(2.0), True)
+    assert real.verdict == emulated.verdict == "reproduced" and real.shown_by == ("hardware",)
+    assert (real.found[""].mark, emulated.found[""].mark) == ("", "emulated") and "emulated rig" in emulated.reason
+    assert found(trials(9.0)).verdict == WORSE
+    both = pd.concat([trials(1.0), trials(3.0), trials(99.0, controller="mrac"), trials(99.0, push=5.0)])
+    assert found(both).found[""].low == 2.0, "the mean of the paper's law without a push"
+    assert found(trials(2.0, controller="mrac")).verdict == "open" == found(trials(2.0, outcome="lost")).verdict
+    pushed = claim(2.0, evidence="hardware", pushed=True, direction="flexion")
+    assert found(trials(2.0), asked=pushed).verdict == "open" == found(trials(2.0, push=5.0), asked=pushed).verdict
+    assert found(trials(2.0, push=5.0, direction="flexion"), asked=pushed).verdict == "reproduced"
 
 
 def test_a_range_is_told_in_two_digits_and_never_in_words() -> None:
     assert interval(0.12345, 0.56789) == "0.12 to 0.57" and interval(0.1231, 0.1229) == "0.12"
-    assert interval(1.0, np.inf) == "1 to never" and interval(np.inf, np.inf) == "never"
+    assert interval(np.nan, np.nan) == "never"
 
 
-def test_the_evidence_is_what_the_claims_need_on_one_loop_and_no_more() -> None:
+def test_the_evidence_is_what_the_claims_need_under_one_condition_and_no_more() -> None:
     study = load_study([], ["horizon=3.5"], "audit")
-    claims = [claim(), claim(metric="settling"), claim(controller="pid"), claim(gains="exchanged")]
-    claims.append(claim(evidence="table1", controller="mrac"))
-    asked = evidence_study(study, claims, "sampled").compare
-    assert [row.label for row in asked.rows] == ["smc/printed", "pid/printed", "smc/exchanged"]
-    assert list(asked.loops) == ["sampled"] and asked.loops["sampled"] == study.compare.loops["sampled"]
-    assert asked.horizon == 3.5 and asked.inverses == ("none",)
+    claims = [claim(), claim(metric="settling_after"), claim(controller="pid"), claim(gains="exchanged")]
+    claims += [claim(evidence="table1", controller="mrac"), claim(None, evidence="ordering", than="nc/default")]
+    assert conditions_of(claims) == [(name, 1.0) for name in LOOPS]
+    asked = evidence_study(study, claims, ("sampled", 1.0)).compare
+    assert [row.label for row in asked.rows] == ["smc/printed", "pid/printed", "smc/exchanged", "nc/default"]
+    assert asked.loops == {"sampled": LOOPS["sampled"]} and asked.horizon == 3.5 and asked.inverses == ("none",)
     assert [(each.kind, each.duration) for each in asked.references[1:]] == [
-        ("minimum-jerk", 1.0),
-        ("minimum-jerk", 2.0),
+        ("minimum-jerk", 1.0), ("minimum-jerk", 2.0),
+    ]  # fmt: skip
+    soft = [*claims, claim(controller="pid-ff", gains="default", stiffness_scale=0.7)]
+    assert conditions_of(soft)[3:] == [(name, 0.7) for name in LOOPS]
+    assert [row.label for row in rows_of(soft, 0.7)] == ["pid-ff/default"]
+    assert "pid-ff/default" in [row.label for row in rows_of(soft, 1.0)], "what they add is over the same, stiff"
+    loops = evidence_study(study, soft, ("default", 0.7)).compare.loops
+    assert loops["default"].plant.stiffness_scale == 0.7
+    assert conditions_of([claim(evidence="table1")]) == []
+
+
+def test_the_frame_has_a_column_for_each_loop() -> None:
+    judged = [
+        judge(claim(), grounds({"exact": moves(2.0, 2.0), "sampled": moves(9.0, 9.0)})),
+        judge(claim(id="S", evidence="settings"), grounds({})),
     ]
-    assert asked.references[0].kind == "step"
-
-
-def test_the_ledgers_table_has_a_line_a_claim_with_both_numbers() -> None:
-    judged = [judge(claim(), {"exact": moves(1.0, 5.0), "sampled": moves(1.0, 4.0)}, {})]
-    judged.append(judge(claim(None, evidence="text", verdict="open", reason="why"), {}, {}))
-    one, other = ledger_frame(judged).to_dict("records")
-    assert one == {
-        "claim": "T", "says": "so", "paper": 2.0, "ours_low": 1.0, "ours_high": 5.0, "unit": "rad",
-        "verdict": "reproduced", "shown_by": "exact, sampled", "reason": "exact 1 to 5, sampled 1 to 4",
-    }  # fmt: skip
-    assert np.isnan(other["paper"]) and other["verdict"] == "open" and other["shown_by"] == ""
+    frame = ledger_frame(judged).set_index("claim")
+    assert frame.loc["T", "exact_verdict"] == "reproduced" and frame.loc["T", "sampled_verdict"] == WORSE
+    assert frame.loc["T", "sampled_low"] == 9.0 and frame.loc["T", "verdict"] == OPEN
+    assert frame.loc["S", "verdict"] == "" and frame["exact_low"].isna().tolist() == [False, True]

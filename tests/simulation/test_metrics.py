@@ -30,6 +30,16 @@ def test_first_order_response_has_its_closed_form_metrics() -> None:
     assert found["rmse_move"] == found["rmse"]
 
 
+def test_settling_after_the_motion_is_what_the_motion_leaves() -> None:
+    tau, final = 0.2, 0.5
+    late = final * (1 - np.exp(-TIME / tau))
+    for rest, left in ((0.0, tau * math.log(50)), (0.5, tau * math.log(50) - 0.5), (1.0, 0.0)):
+        found = metrics_of(PERIOD, late, np.full_like(TIME, final), STILL, final, rest)
+        assert found["settling_after"] == pytest.approx(left, abs=2 * PERIOD), "a perfect follower has none left"
+    never = metrics_of(PERIOD, 0.9 * late, np.full_like(TIME, final), STILL, final, 1.0)
+    assert math.isnan(never["settling_after"])
+
+
 def test_underdamped_response_has_its_closed_form_overshoot() -> None:
     zeta, w = 0.3, 8.0
     wd = w * math.sqrt(1 - zeta**2)

@@ -29,7 +29,7 @@ SMALL = (
     "rows: [{controller: smc, gains: tuned}, {controller: feedforward}]}",
     "simulate={horizon: 0.3, gains: tuned, loop: {plant_segments: 1}, reference: {duration: 0.2, inverse: network}}",
     "hysteresis={ranges_deg: [[0.0, 10.0]], frequencies: [2.0, 5.0], sheaths: [1.0], angles_deg: [5.0], ramp: 0.2}",
-    "audit={horizon: 0.1, claims: [{id: C2, says: a sign, evidence: text, verdict: contradictory, reason: by hand}, "
+    "audit={horizon: 0.1, claims: [{id: C2, says: a sign, evidence: text, verdict: contradicted, reason: by hand}, "
     "{id: T1, says: R2, evidence: table1, value: 0.9, metric: r2}]}",
 )  # fmt: skip
 

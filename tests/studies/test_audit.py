@@ -21,14 +21,14 @@ from wristctl.studies.inputs import Inputs
 
 CLAIMS = (
     "audit={horizon: 1.5, claims: ["
-    "{id: T, says: a sign is wrong, evidence: text, verdict: contradictory, reason: by hand}, "
+    "{id: T, says: a sign is wrong, evidence: text, verdict: contradicted, reason: by hand}, "
     "{id: S, says: a period, evidence: settings, value: 0.005, unit: s, reason: set}, "
-    "{id: H, says: a push, evidence: hardware, value: 2.5, reason: needs a rig}, "
+    "{id: H, says: a push, evidence: hardware, value: 2.5, metric: rmse, reason: needs a rig}, "
     "{id: C, says: an error, evidence: comparison, controller: smc, gains: printed, metric: rmse, value: 0.5}, "
     "{id: U, says: another, evidence: comparison, controller: lqg, gains: printed, metric: rmse, value: 0.5}, "
     "{id: R, says: a fit, evidence: table1, metric: r2, value: 0.5, unit: '1'}]}"
 )  # fmt: skip
-PLAIN = "audit.claims=[{id: T, says: a sign, evidence: text, verdict: contradictory, reason: by hand}]"
+PLAIN = "audit.claims=[{id: T, says: a sign, evidence: text, verdict: contradicted, reason: by hand}]"
 
 
 class Comparison:
@@ -57,6 +57,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return found
 
 
+def trials(tmp_path: Path) -> Run:
+    """One trial of the paper's law on the emulated rig."""
+    row = {"controller": "smc", "gains": "stepper", "outcome": "ok", "push": 0.0, "rmse": 2.5}
+    with start_run("hw-run", wristctl.load_study(None), "", tmp_path) as live:
+        live.table("data/trials.csv", pd.DataFrame([row]))
+    return Run(live.path)
+
+
 def training(tmp_path: Path, **metrics: float) -> Run:
     with start_run("train", wristctl.load_study(None), "", tmp_path) as live:
         for name, value in metrics.items():
@@ -71,32 +79,44 @@ def audit(*settings: str, run: Any = None, **inputs: Any) -> Audited:
 def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: Path, asked: list[Any]) -> None:
     table1 = training(tmp_path, r2=0.5)
     done = audit(CLAIMS, table1=table1)
-    claims, why, still, verdicts, evidence = done.tables
-    assert claims.columns == ("claim", "the paper says", "paper", "ours", "unit", "verdict", "shown by")
-    loops = ", ".join(LOOPS)
-    assert claims.rows == [
-        ("T", "a sign is wrong", "", "", "", "contradictory", ""),
-        ("S", "a period", "0.005", "", "s", "taken over", ""),
+    rolled, others, why, still, verdicts, evidence = done.tables
+    parts = [part for loop in LOOPS for part in (f"ours, {loop}", f"verdict, {loop}")]
+    assert rolled.columns == ("claim", "the paper says", "paper", "unit", *parts)
+    assert rolled.rows == [("C", "an error", "0.5", "", *(["0.4 to 0.6", "reproduced"] * len(LOOPS)))]
+    assert others.columns == ("claim", "the paper says", "paper", "unit", "ours", "verdict", "shown by")
+    assert others.rows == [
+        ("T", "a sign is wrong", "", "", "", "contradicted", ""),
+        ("S", "a period", "0.005", "s", "", "(a setting)", ""),
         ("H", "a push", "2.5", "", "", "open", ""),
-        ("C", "an error", "0.5", "0.4 to 0.6", "", "reproduced", loops),
         ("U", "another", "0.5", "", "", "open", ""),
-        ("R", "a fit", "0.5", "0.38 to 0.62", "1", "reproduced", "table1"),
+        ("R", "a fit", "0.5", "1", "0.38 to 0.62", "reproduced", "table1"),
     ]
     assert (why.title, why.columns) == ("Why", ("claim", "verdict", "reason"))
-    assert [row[:2] for row in why.rows] == [("T", "contradictory"), ("C", "reproduced"), ("R", "reproduced")]
+    assert [row[:2] for row in why.rows] == [("T", "contradicted"), ("R", "reproduced")]
     assert why.rows[0][2] == "by hand"
     assert (still.title, still.columns) == ("Still open", ("claim", "what would decide it"))
-    assert still.rows == [("H", "needs a rig"), ("U", "no controller 'lqg' to run")]
+    assert still.rows == [
+        ("H", "needs a rig; needs --hardware with a run of `wristctl hw-run`"), ("U", "no controller 'lqg' to run"),
+    ]  # fmt: skip
     assert (verdicts.title, verdicts.columns) == ("Verdicts", ("verdict", "claims"))
-    assert verdicts.rows == [("contradictory", 1), ("open", 2), ("reproduced", 2), ("taken over", 1)]
+    assert verdicts.rows == [("(a setting)", 1), ("contradicted", 1), ("open", 2), ("reproduced", 2)]
     assert (evidence.title, evidence.columns) == ("Runs that show it", ("shown by", "run"))
     assert evidence.rows == [*((loop, "in memory") for loop in LOOPS), ("table1", table1.id)]
-    assert list(done.metrics.items()) == [("contradictory", 1), ("open", 2), ("reproduced", 2), ("taken_over", 1)]
-    assert known_of(done.findings, "taken_over") == [("", "", 6)]
-    assert done.findings.metrics["taken_over"]["meaning"] == "claims that are taken over"
+    assert list(done.metrics.items()) == [("contradicted", 1), ("open", 2), ("reproduced", 2)]
+    assert known_of(done.findings, "reproduced") == [("", "", 5)], "a setting is no claim"
+    assert done.findings.metrics["reproduced"]["meaning"] == "claims whose verdict is: reproduced"
     assert list(done.comparisons) == list(LOOPS)
     frame = done.frame().set_index("claim")
-    assert (frame.loc["C", "ours_low"], frame.loc["C", "ours_high"]) == (0.4, 0.6)
+    assert (frame.loc["C", "exact_low"], frame.loc["C", "exact_high"]) == (0.4, 0.6)
+    assert done.answer[0] == ("5 claims of the paper: 2 reproduced, 1 contradicted, 2 open. (1 setting taken over.)")
+    assert done.answer[1] == "On exact 1 of 1 reproduced: C."
+
+
+def test_trials_judge_the_experiment_and_say_that_the_rig_was_emulated(tmp_path: Path, asked: list[Any]) -> None:
+    done = audit(CLAIMS, hardware=trials(tmp_path))
+    (found,) = [j for j in done.judgements if j.claim.id == "H"]
+    assert found.verdict == "reproduced" and found.found[""].mark == "emulated"
+    assert found.reason == "needs a rig; mean of 1 trials of smc/stepper on an emulated rig"
 
 
 def test_each_loop_is_compared_once_with_what_claims_ask_for(asked: list[Any]) -> None:
@@ -113,7 +133,7 @@ def test_each_loop_is_compared_once_with_what_claims_ask_for(asked: list[Any]) -
 
 def test_where_no_claim_asks_for_a_comparison_none_is_made(asked: list[Any]) -> None:
     done = audit(PLAIN)
-    assert not asked and done.comparisons == {} and math.isnan(done.frame()["ours_low"][0])
+    assert not asked and done.comparisons == {} and math.isnan(done.frame()["low"][0])
 
 
 def test_comparisons_of_a_recorded_audit_are_runs_beside_it(tmp_path: Path, asked: list[Any]) -> None:
@@ -128,13 +148,12 @@ def test_comparisons_of_a_recorded_audit_are_runs_beside_it(tmp_path: Path, aske
     assert len(shown) == len(LOOPS)
     hashed = {each.path: each.volatile for each in run.manifest.outputs}
     assert hashed["evidence.json"] and not hashed["data/claims.csv"]
-    assert columns_of(run, "data/claims.csv")["ours_high"] == ("", "largest of ours")
-    assert columns_of(run, "data/claims.csv")["ours_low"][1] == "least of ours"
+    assert columns_of(run, "data/claims.csv")["paper"] == ("", "the paper's value")
 
 
 def test_a_plan_says_which_trainings_are_there(tmp_path: Path) -> None:
     study = wristctl.load_study(None, CLAIMS)
-    begin = f"6 claims; one comparison on each of the loops {', '.join(LOOPS)}"
+    begin = "6 claims; 3 comparisons on the built-in loops\nhardware: open, for want of a run"
     assert AUDIT.plan(study, Inputs()) == f"{begin}\ntable1: open, for want of a run"
     run = training(tmp_path, r2=0.5)
     assert AUDIT.plan(study, Inputs({"table1": run})) == f"{begin}\ntable1: {run.id}"
@@ -147,5 +166,5 @@ def test_a_plan_says_which_trainings_are_there(tmp_path: Path) -> None:
     assert caught.value.where == str(lacking.path)
     assert caught.value.fix == "give --table1 a run of `wristctl train experiments/table1.yaml`"
     assert [(need.leaf, need.kind, need.optional) for need in AUDIT.needs] == [
-        ("table1", "train", True), ("selection", "train", True),
+        ("table1", "train", True), ("selection", "train", True), ("hardware", "hw-run", True),
     ]  # fmt: skip

@@ -189,7 +189,7 @@ def test_domain_objects_are_what_they_are_called(in_memory: Results) -> None:
     assert [row.label for row in found["compare"].rows] == ["smc/tuned", "feedforward/default"]
     assert found["simulate"].failed is False
     pd.testing.assert_frame_equal(found["simulate"].frame(), found["simulate"].trajectory.frame())
-    assert found["audit"].judgements[0].verdict == "contradictory"
+    assert found["audit"].judgements[0].verdict == "contradicted"
 
 
 def test_a_figure_is_drawn_when_it_is_asked_for_and_once(in_memory: Results, tmp_path: Path) -> None:

@@ -1,150 +1,227 @@
-"""The paper's claims, one by one, judged by what was measured."""
+"""The paper's claims, one by one, judged by what was measured, on each loop by itself."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wristctl.comparison.paper import FACTOR
+from wristctl.comparison.evidence import NOMINAL, TRAININGS, Grounds, Metrics, TrialsDone
+from wristctl.comparison.verdicts import Finding, of_numbers, of_ordering, of_sample, of_settling
 from wristctl.config.audit import Claim, VerdictName
-from wristctl.config.control import CompareSettings, Row
-from wristctl.config.loop import LOOPS, Reference
-from wristctl.config.study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TRAININGS = {"table1": "experiments/table1.yaml", "selection": "experiments/model_selection.yaml"}
-"""Evidence that a train run gives, and the experiment it is a run of."""
-
-Metrics = Mapping[str, Mapping[str, Any]]
-"""value, interval and n of a training's metrics, by name"""
+DERIVED_ON = "exact"
+"""The loop on which the paper's equations are solved as they stand: exact model, continuous time, no limits."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim with what was found: the range of our values, the verdict, the reason, and what shows it."""
+    """A claim with what was found on each loop; under "" where no loop is asked for."""
 
     claim: Claim
-    low: float
-    high: float
-    verdict: VerdictName
-    reason: str
+    found: Mapping[str, Finding]
+    """Empty for a setting that is taken over, which has no verdict."""
     shown_by: tuple[str, ...] = ()
-    """loops of a comparison, or a key of TRAININGS"""
+
+    @property
+    def verdict(self) -> VerdictName | None:
+        """The one of all loops; where these differ, the loop decides, which the paper does not give."""
+        verdicts = {each.verdict for each in self.found.values()}
+        if not verdicts:
+            return None
+        return verdicts.pop() if len(verdicts) == 1 else "not specified enough"
+
+    @property
+    def reason(self) -> str:
+        """Why, over all loops."""
+        by_loop = [
+            f"{name}: {each.reason}" if name else each.reason for name, each in self.found.items() if each.reason
+        ]
+        differ = len({each.verdict for each in self.found.values()}) > 1
+        parts = ("the loop decides" if differ else "", self.claim.unspecified, self.claim.reason, *by_loop)
+        return "; ".join(part for part in parts if part)
 
 
-def evidence_study(study: Study, claims: Sequence[Claim], loop: str) -> Study:
-    """The comparison on one loop that the claims ask for: their controllers and gains on both minimum-jerk moves."""
-    wanted = dict.fromkeys((c.controller, c.gains) for c in claims if c.evidence == "comparison")
-    rows = tuple(Row(controller=name, gains=gains) for name, gains in wanted if name and gains)
-    compared = CompareSettings(
-        rows=rows,
-        loops={loop: LOOPS[loop]},
-        references=(Reference(kind="step"), Reference(duration=1.0), Reference(duration=2.0)),
-        inverses=("none",),
-        horizon=study.audit.horizon,
-    )
-    return study.model_copy(update={"compare": compared})
-
-
-def judge(claim: Claim, found: Mapping[str, pd.DataFrame], trainings: Mapping[str, Metrics]) -> Judgement:
-    """Judge one claim by the comparisons of each loop and by the trainings there are, by keys of TRAININGS."""
+def judge(claim: Claim, shown: Grounds) -> Judgement:
+    """Judge one claim by what is shown; what nothing shows is open."""
+    if claim.evidence == "settings":
+        return Judgement(claim, {})
     if claim.evidence == "text":
         assert claim.verdict is not None
-        return Judgement(claim, np.nan, np.nan, claim.verdict, claim.reason)
-    if claim.evidence == "settings":
-        return Judgement(claim, np.nan, np.nan, "taken over", claim.reason)
+        return Judgement(claim, {"": Finding(claim.verdict)})
+    if claim.evidence == "equation":
+        return Judgement(claim, {"": _by_equation(claim)}, ("equation",))
     if claim.evidence == "hardware":
-        return Judgement(claim, np.nan, np.nan, "open", claim.reason)
+        return _judgement(claim, {"": _by_trials(claim, shown.hardware)}, "hardware")
     if claim.evidence in TRAININGS:
-        metrics = trainings.get(claim.evidence)
-        return _untrained(claim) if metrics is None else _by_training(claim, metrics)
-    ranges = {loop: _range(claim, table) for loop, table in found.items()}
-    known = {loop: values for loop, values in ranges.items() if values is not None}
-    return _by_loops(claim, known)
+        return _judgement(claim, {"": _by_training(claim, shown.trainings.get(claim.evidence))}, claim.evidence)
+    loops = [loop for loop, scale in shown.loops if scale == claim.stiffness_scale]
+    found = {loop: _on_loop(claim, loop, shown) for loop in loops}
+    known = {loop: each for loop, each in found.items() if each is not None}
+    if not known:
+        return Judgement(claim, {"": Finding("open", reason=f"no controller '{claim.controller}' to run")})
+    return _judgement(claim, known, *known)
 
 
-def _range(claim: Claim, table: pd.DataFrame) -> tuple[float, float] | None:
-    """Least and largest value over the minimum-jerk moves; inf where it diverges or never settles."""
-    own = (table["controller"] == claim.controller) & (table["gains"] == claim.gains)
-    moves = table[own & ~table["reference"].str.startswith("step")]
-    if moves.empty:
+def _judgement(claim: Claim, found: Mapping[str, Finding], *shown_by: str) -> Judgement:
+    """What the paper leaves open stays so, with ours beside it."""
+    if all(each.verdict == "open" and np.isnan(each.low) for each in found.values()):
+        return Judgement(claim, found)
+    if claim.unspecified:
+        found = {
+            name: each._replace(
+                verdict="not specified enough",
+                reason="; ".join(part for part in (f"with ours {each.verdict}", each.reason) if part),
+            )
+            for name, each in found.items()
+        }
+    return Judgement(claim, found, shown_by)
+
+
+def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
+    """None where the loop's table has no row of it."""
+    table = shown.loops[loop, claim.stiffness_scale]
+    moves, metric = _moves(table, claim.label), str(claim.metric)
+    others = _moves(table, claim.than) if claim.than else moves
+    if moves.empty or others.empty:
         return None
-    values = moves[str(claim.metric)].fillna(np.inf)
-    return float(values.min()), float(values.max())
+    ours = moves[metric].to_numpy(float)
+    if claim.than is not None:
+        found = of_ordering(ours, others[metric].to_numpy(float))
+    elif claim.stiffness_scale != NOMINAL:
+        before = _moves(shown.loops[loop, NOMINAL], claim.label)[metric].to_numpy(float)
+        found = of_numbers(_value(claim), np.maximum(ours - before, 0.0), claim.sense)
+    elif metric == "settling_after":
+        found = of_settling(_value(claim), ours, _durations(moves))
+    else:
+        found = of_numbers(_value(claim), ours, claim.sense)
+    if claim.derived and loop == DERIVED_ON and found.verdict == "worse than the paper":
+        found = found._replace(verdict="contradicted")
+    strongest = _unphysical(table, (claim.label, claim.than), shown.tension_limit)
+    if not strongest:
+        return found
+    return found._replace(mark="not physical", reason="; ".join(part for part in (found.reason, strongest) if part))
 
 
-def _untrained(claim: Claim) -> Judgement:
-    how = f"needs --{claim.evidence} with a run of `wristctl train {TRAININGS[claim.evidence]}`"
-    return Judgement(claim, np.nan, np.nan, "open", how)
+def _unphysical(table: pd.DataFrame, labels: Sequence[str | None], limit: float) -> str:
+    """What passes the wrist's tension limit, on whichever motion; empty where nothing does."""
+    if "peak_tension" not in table:
+        return ""
+    own = table[(table["controller"] + "/" + table["gains"]).isin(labels)]
+    peaks = own["peak_tension"].to_numpy(float)
+    at = int(peaks.argmax())
+    return "" if peaks[at] <= limit * (1.0 + 1e-9) else f"{peaks[at]:.3g} N on a {own['reference'].iloc[at]}"
 
 
-def _by_training(claim: Claim, metrics: Metrics) -> Judgement:
-    """Whether the paper's value lies in the 95 % interval over the seeds, or within FACTOR of it."""
+def _moves(table: pd.DataFrame, label: str) -> pd.DataFrame:
+    """A row's smooth motions; what has failed has no numbers."""
+    name, gains = label.split("/")
+    own = table[(table["controller"] == name) & (table["gains"] == gains)]
+    moves = own[~own["reference"].str.startswith("step")]
+    if "failed" not in moves:
+        return moves
+    metrics = [each for each in moves.columns if each in _of_error()]
+    return moves.assign(**{each: moves[each].mask(moves["failed"]) for each in metrics})
+
+
+def _of_error() -> set[str]:
+    from wristctl.simulation.metrics import METRICS
+
+    return {name for name, metric in METRICS.items() if metric.of_error}
+
+
+def _durations(moves: pd.DataFrame) -> list[float]:
+    """Of minimum-jerk motions, by their names [s]."""
+    return [float(each.split()[2]) for each in moves["reference"]]
+
+
+def _value(claim: Claim) -> float:
     assert claim.value is not None
-    found = metrics[str(claim.metric)]
-    ours = np.nan if found["value"] is None else float(found["value"])
-    low, high = found.get("interval") or (ours, ours)
-    slack = 1.0 if claim.exact else FACTOR
-    verdict: VerdictName = "reproduced" if low / slack <= claim.value <= high * slack else "not reproduced"
-    said = f"{claim.metric} is {ours:.3g}" + (f" (n = {found['n']})" if found.get("n") else "")
-    reason = "; ".join(part for part in (claim.reason, said) if part)
-    return Judgement(claim, low, high, verdict, reason, (claim.evidence,))
+    return claim.value
 
 
-def _by_loops(claim: Claim, ranges: Mapping[str, tuple[float, float]]) -> Judgement:
-    assert claim.value is not None
-    if not ranges:
-        return Judgement(claim, np.nan, np.nan, "open", f"no controller '{claim.controller}' to run")
-    holding = [loop for loop, values in ranges.items() if _holds(claim, *values)]
-    shown = ", ".join(f"{loop} {interval(*values)}" for loop, values in ranges.items())
-    verdict: VerdictName = "reproduced" if len(holding) == len(ranges) else "not reproduced"
-    where = f"holds on {' and '.join(holding)} only" if holding and verdict == "not reproduced" else ""
-    best = holding[0] if holding else next(iter(ranges))
-    reason = "; ".join(part for part in (where, claim.reason, shown) if part)
-    return Judgement(claim, *ranges[best], verdict, reason, tuple(ranges))
+def _by_equation(claim: Claim) -> Finding:
+    from wristctl.comparison.equations import EQUATIONS
+
+    ours = EQUATIONS[str(claim.metric)]()
+    found = of_numbers(_value(claim), [ours], claim.sense)
+    verdict: VerdictName = "reproduced" if found.verdict == "reproduced" else "contradicted"
+    return found._replace(verdict=verdict)
 
 
-def _holds(claim: Claim, low: float, high: float) -> bool:
-    """The paper's value lies between our two moves or within FACTOR of one.
+def _by_training(claim: Claim, metrics: Metrics | None) -> Finding:
+    if metrics is None:
+        how = f"needs --{claim.evidence} with a run of `wristctl train {TRAININGS[claim.evidence]}`"
+        return Finding("open", reason=how)
+    own = metrics[str(claim.metric)]
+    middle = np.nan if own["value"] is None else float(own["value"])
+    ends = own.get("interval")
+    found = of_sample(_value(claim), middle, tuple(ends) if ends else None, claim.sense)
+    said = f"{claim.metric} is {middle:.3g}" + (f" (n = {own['n']})" if own.get("n") else "")
+    return found._replace(reason="; ".join(part for part in (found.reason, said) if part))
 
-    A steady-state error holds where ours is not above FACTOR times the paper's; a claim of 0 means below 1e-6.
-    """
-    value = claim.value or 0.0
-    if value == 0.0:
-        return high < 1e-6
-    if claim.metric == "steady_state":
-        return high <= FACTOR * value
-    return low <= value <= high or any(value / FACTOR <= ours <= value * FACTOR for ours in (low, high))
+
+def _by_trials(claim: Claim, done: TrialsDone | None) -> Finding:
+    if done is None:
+        return Finding("open", reason="needs --hardware with a run of `wristctl hw-run`")
+    trials = done.trials
+    own = trials[
+        (trials["controller"] == "smc") & (trials["outcome"] == "ok") & ((trials["push"] != 0.0) == claim.pushed)
+    ]
+    if claim.direction is not None:
+        own = own[own["direction"] == claim.direction]
+    if own.empty:
+        where = (
+            f" {'pushed ' * claim.pushed}toward {claim.direction}" if claim.direction else " with a push" * claim.pushed
+        )
+        return Finding("open", reason=f"no trial of the paper's law{where} in this run")
+    values = own[str(claim.metric)].to_numpy(float)
+    if claim.metric == "settling_after":
+        found = of_settling(_value(claim), [float(np.mean(values))], [done.motion])
+    else:
+        found = of_numbers(_value(claim), [float(np.mean(values))])
+    rig = "an emulated rig" if done.emulated else "a rig"
+    gains = ", ".join(f"smc/{each}" for each in dict.fromkeys(own["gains"]))
+    said = f"mean of {len(own)} trials of {gains} on {rig}"
+    return found._replace(
+        reason="; ".join(part for part in (said, found.reason) if part), mark="emulated" * done.emulated
+    )
 
 
 def interval(low: float, high: float) -> str:
-    """A range as text; what never settles or diverges is inf."""
-    first, second = ("never" if np.isinf(v) else f"{v:.2g}" for v in (low, high))
+    """A range as text."""
+    if np.isnan(low):
+        return "never"
+    first, second = (f"{v:.2g}" for v in (low, high))
     return first if first == second else f"{first} to {second}"
 
 
 def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
-    """Every claim with the paper's value, ours, verdict and reason."""
+    """Every claim with the paper's value, verdict and reason; on each loop our range, verdict and mark."""
     import pandas as pd
 
-    return pd.DataFrame(
-        [
-            {
-                "claim": j.claim.id,
-                "says": j.claim.says,
-                "paper": np.nan if j.claim.value is None else j.claim.value,
-                "ours_low": j.low,
-                "ours_high": j.high,
-                "unit": j.claim.unit,
-                "verdict": j.verdict,
-                "shown_by": ", ".join(j.shown_by),
-                "reason": j.reason,
+    loops = list(dict.fromkeys(name for j in judged for name in j.found if name))
+    rows = []
+    for j in judged:
+        row: dict[str, object] = {
+            "claim": j.claim.id,
+            "says": j.claim.says,
+            "paper": np.nan if j.claim.value is None else j.claim.value,
+            "unit": j.claim.unit,
+            "verdict": j.verdict or "",
+        }
+        for name in loops or [""]:
+            each = j.found.get(name) or j.found.get("")
+            row |= {
+                f"{name}_verdict".strip("_"): each.verdict if each else "",
+                "_".join(part for part in (name, "low") if part): each.low if each else np.nan,
+                "_".join(part for part in (name, "high") if part): each.high if each else np.nan,
+                "_".join(part for part in (name, "mark") if part): each.mark if each else "",
             }
-            for j in judged
-        ]
-    )
+        rows.append(row | {"shown_by": ", ".join(j.shown_by), "reason": j.reason})
+    return pd.DataFrame(rows)

@@ -7,14 +7,21 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
 
-VerdictName = Literal["reproduced", "not reproduced", "contradictory", "not specified enough", "open", "taken over"]
+VerdictName = Literal[
+    "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
+]
+SenseName = Literal["about", "exactly", "at least", "at most"]
 
 _NEEDED = {
     "comparison": ("value", "controller", "gains", "metric"),
+    "ordering": ("controller", "gains", "than", "metric"),
     "table1": ("value", "metric"),
     "selection": ("value", "metric"),
+    "hardware": ("value", "metric"),
+    "equation": ("value", "metric"),
     "text": ("verdict",),
 }
 
@@ -24,30 +31,57 @@ class Claim(Section):
 
     id: str
     says: str
-    evidence: Literal["comparison", "table1", "selection", "settings", "text", "hardware"]
+    evidence: Literal["comparison", "ordering", "table1", "selection", "hardware", "equation", "text", "settings"]
     value: float | None = None
-    exact: bool = False
+    sense: SenseName = "about"
+    """How `value` is meant: within a factor, as it is, or as a bound."""
     unit: str = ""
     controller: str | None = None
     gains: str | None = None
+    than: str | None = None
+    """Of an ordering: controller/gains whose metric is the larger one, as the paper has it."""
     metric: str | None = None
+    """Of a loop or a run; of an equation its name in wristctl.comparison.equations."""
+    direction: DirectionName | None = None
+    """Of hardware: trials in this direction only."""
+    pushed: bool = False
+    """Of hardware: trials with a push, else those without."""
+    stiffness_scale: float = 1.0
+    """Of a comparison: springs' stiffness over what the controller knows."""
+    derived: bool = False
+    """The paper derives it from its equations, which contradict it where, solved as they stand, they do not give it."""
+    unspecified: str = ""
+    """What the paper leaves open, so that no number of ours can decide: ours then stands beside."""
     verdict: VerdictName | None = None
     reason: str = ""
+
+    @property
+    def label(self) -> str:
+        """controller/gains"""
+        return f"{self.controller}/{self.gains}"
 
     @model_validator(mode="after")
     def _can_be_judged(self) -> Self:
         missing = [name for name in _NEEDED.get(self.evidence, ()) if getattr(self, name) is None]
         if missing:
             raise ValueError(f"claim {self.id} by {self.evidence} needs {' and '.join(missing)}")
+        if self.than is not None and self.than.count("/") != 1:
+            raise ValueError(f"claim {self.id}: than: is controller/gains, not {self.than}")
+        if self.sense == "about" and self.value is not None and self.value <= 0.0 and self.evidence not in _AS_IT_IS:
+            raise ValueError(f"claim {self.id}: no factor leads to {self.value:g}; give sense: at most, or exactly")
         return self
 
 
+_AS_IT_IS = ("settings", "text")
+
+
 class AuditSettings(Section):
-    """Which claims, the trainings that show some of them, and over which horizon the rollouts for others go."""
+    """Which claims, the runs that show some of them, and over which horizon the rollouts for others go."""
 
     claims: tuple[Claim, ...] = choice((), "the ledger: claims with what decides them; experiments/claims.yaml has all")
     table1: str | None = choice(None, "train run of experiments/table1.yaml: path, id or latest:train")
     selection: str | None = choice(None, "train run of experiments/model_selection.yaml: path, id or latest:train")
+    hardware: str | None = choice(None, "hw-run run that judges the experiment's claims: path, id or latest:hw-run")
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
 
     @model_validator(mode="after")

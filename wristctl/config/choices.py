@@ -60,6 +60,7 @@ CONTROLLERS: Choices[Any] = Choices(
     {
         "smc": "wristctl.control.smc:SMC",
         "pid": "wristctl.control.pid:PID",
+        "pid-angle": "wristctl.control.pid_angle:PID_ANGLE",
         "mrac": "wristctl.control.mrac:MRAC",
         "gvsc": "wristctl.control.gvsc:GVSC",
         "nc": "wristctl.control.nc:NC",
@@ -126,6 +127,7 @@ METRICS: Choices[Any] = Choices(
         "rmse_settled": "wristctl.simulation.metrics:RMSE_SETTLED",
         "settling": "wristctl.simulation.metrics:SETTLING",
         "settling_5": "wristctl.simulation.metrics:SETTLING_5",
+        "settling_after": "wristctl.simulation.settling_after:SETTLING_AFTER",
         "steady_state": "wristctl.simulation.metrics:STEADY_STATE",
         "overshoot": "wristctl.simulation.metrics:OVERSHOOT",
         "iae": "wristctl.simulation.metrics:IAE",

@@ -26,7 +26,7 @@ PID = Controller(
     gains={
         "Kp": Gain("N m/rad", "proportional gain", 1e-2, 1e4),
         "Ki": Gain("N m/(rad s)", "integral gain", 1e-2, 1e4),
-        "Kd": Gain("N m s/rad", "derivative gain", 1e-4, 1e2),
+        "Kd": Gain("N m s/rad", "derivative gain", 1e-2, 1e4),
     },
     presets={"printed": {"Kp": 1e4, "Ki": 5e3, "Kd": 2e3}},
     memory=1,

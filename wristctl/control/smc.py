@@ -26,7 +26,7 @@ SMC = Controller(
     law=law,
     source="the paper, E12-E21",
     gains={
-        "P1": Gain("1/rad", "weight of the error in sigma", 1e-1, 1e5),
+        "P1": Gain("1/rad", "weight of the error in sigma", 1e-3, 1e3),
         "P2": Gain("s/rad", "weight of the rate in sigma", 1e-3, 1e3),
         "P3": Gain("1/s", "reaching gain", 1e-1, 1e5),
     },

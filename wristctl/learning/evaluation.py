@@ -27,6 +27,7 @@ MEASURES: dict[str, tuple[str, str]] = {
     "gradient_norm": ("", "norm of the training loss's gradient at the kept weights (of the scaled angle)"),
     "train_loss": ("rad^2", "mean squared error over the last epoch's batches"),
     "validation_loss": ("rad^2", "mean squared error on the validation samples"),
+    "validation_over_train": ("1", "validation loss over training loss"),
     "epochs": ("1", "epochs done"),
 }
 """Unit and meaning of what `measures` gives."""
@@ -93,5 +94,6 @@ def measures(trial: TrainingResult, where: Sequence[Place]) -> dict[str, float]:
         "gradient_norm": trial.gradient_norm,
         "train_loss": trial.epochs[-1].train_loss,
         "validation_loss": trial.validation_loss,
+        "validation_over_train": trial.validation_loss / trial.epochs[-1].train_loss,
         "epochs": float(len(trial.epochs)),
     }

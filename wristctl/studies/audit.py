@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wristctl.config.audit import Claim
-from wristctl.config.errors import UserError
+from wristctl.config.errors import UserError, meant
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call
 from wristctl.records import LiveRun, Run, start_run
@@ -22,8 +22,10 @@ from wristctl.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
-    from wristctl.comparison.ledger import Judgement, Metrics
+    from wristctl.comparison.evidence import Metrics, TrialsDone
+    from wristctl.comparison.ledger import Judgement
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -36,56 +38,102 @@ class Audited(StudyResult):
     comparisons: dict[str, Compared]
     """by loop"""
 
+    @property
+    def answer(self) -> list[str]:
+        """What of the paper holds, in a few lines."""
+        from wristctl.studies.audit_answer import answer_of
+
+        return answer_of(self.judgements)
+
     def frame(self) -> pd.DataFrame:
-        """One row per claim: the paper's value, the range of ours, verdict and reason."""
+        """One row per claim: the paper's value, verdict and reason, and on each loop our range, verdict and mark."""
         from wristctl.comparison.ledger import ledger_frame
 
         return ledger_frame(self.judgements)
 
 
+class _Undrawn(Findings):
+    """Findings whose figures are drawn when somebody asks for them, and none of them before."""
+
+    def figure(self, name: str, draw: Callable[..., Figure], *of: Any, **how: Any) -> None:
+        """One more that could be drawn."""
+        run, self.run = self.run, None
+        try:
+            super().figure(name, draw, *of, **how)
+        finally:
+            self.run = run
+
+
 def plan(study: Study, inputs: Inputs) -> str:
     """What will be run; no claims, or a train run that cannot show them, are errors here."""
-    from wristctl.comparison.ledger import TRAININGS
-    from wristctl.config.loop import LOOPS
+    from wristctl.comparison.evidence import TRAININGS, conditions_of
 
     claims = study.audit.claims
     if not claims:
         raise UserError("no claims to audit", "audit.claims", Call("audit", "experiments/claims.yaml"))
+    _check_claims(claims)
     _check_trainings(claims, inputs)
-    asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in TRAININGS)
+    asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in (*TRAININGS, "hardware"))
     shown = [f"{name}: {_name(inputs[name]) if name in inputs else 'open, for want of a run'}" for name in asked]
-    return "\n".join([f"{len(claims)} claims; one comparison on each of the loops {', '.join(LOOPS)}", *shown])
+    rollouts = f"{len(conditions_of(claims))} comparisons on the built-in loops"
+    return "\n".join([f"{len(claims)} claims; {rollouts}", *shown])
 
 
 def audit(session: Session) -> Audited:
     """Judge every claim of the paper by rollouts, its own words, or what is still open."""
-    from wristctl.comparison.ledger import evidence_study, judge, ledger_frame
-    from wristctl.config.loop import LOOPS
+    from wristctl.comparison.evidence import TRAININGS, Grounds, conditions_of, evidence_study
+    from wristctl.comparison.ledger import judge, ledger_frame
     from wristctl.control.table import CONTROLLERS
+    from wristctl.studies.audit_tables import ledger_tables
 
-    findings, inputs, claims = session.findings, session.inputs, session.study.audit.claims
+    findings, inputs, study = session.findings, session.inputs, session.study
+    claims = study.audit.claims
     known = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
     compared = {}
-    for loop in LOOPS if any(claim.evidence == "comparison" for claim in claims) else ():
-        compared[loop] = _evidence(session, evidence_study(session.study, known, loop), f"audit-{loop}")
-    tables = {loop: each.frame() for loop, each in compared.items()}
-    trainings = {role: found for role in inputs if (found := inputs.read(role, _metrics)) is not None}
-    judged = [judge(claim, tables, trainings) for claim in claims]
+    for loop, scale in conditions_of(known):
+        name = loop if scale == 1.0 else f"{loop}-stiffness-{scale:g}"
+        compared[name] = _evidence(session, evidence_study(study, known, (loop, scale)), f"audit-{name}")
+    grounds = Grounds(
+        dict(zip(conditions_of(known), (each.frame() for each in compared.values()), strict=True)),
+        {role: found for role in TRAININGS if (found := inputs.read(role, _metrics)) is not None},
+        inputs.read("hardware", _trials),
+        study.wrist.tension_limit,
+    )
+    judged = [judge(claim, grounds) for claim in claims]
     shown_by = {name: _name(each) for name, each in (*compared.items(), *inputs.items())}
 
-    units = {"paper": "", "ours_low": "", "ours_high": ""}
-    meaning = {"paper": "the paper's value", "ours_low": "least of ours", "ours_high": "largest of ours"}
+    units = {"paper": "", "low": "", "high": ""}
+    meaning = {
+        "paper": "the paper's value",
+        "verdict": "where all loops agree, or not specified enough; none: a setting",
+    }
     findings.table("data/claims.csv", ledger_frame(judged), units, meaning)
     findings.plain("evidence.json", shown_by, volatile=True)
-    for verdict, count in sorted(Counter(j.verdict for j in judged).items()):
-        findings.metric(verdict.replace(" ", "_"), count, n=len(judged), meaning=f"claims that are {verdict}")
+    counted = [j.verdict for j in judged if j.verdict is not None]
+    for verdict, count in sorted(Counter(counted).items()):
+        findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=f"claims whose verdict is: {verdict}")
     evidence = Table("Runs that show it", ("shown by", "run"), list(shown_by.items()))
-    return Audited(session.study, findings, [*_tables(judged), evidence], judged, compared)
+    return Audited(study, findings, [*ledger_tables(judged), evidence], judged, compared)
+
+
+def _check_claims(claims: Sequence[Claim]) -> None:
+    """UserError for a claim that names a metric or an equation that there is not."""
+    from wristctl.comparison.equations import EQUATIONS
+    from wristctl.simulation.metrics import METRICS
+
+    loops: Iterable[str] = METRICS
+    tables = {"equation": set(EQUATIONS)} | dict.fromkeys(("comparison", "ordering", "hardware"), set(loops))
+    for claim in claims:
+        known = tables.get(claim.evidence)
+        if known is not None and claim.metric not in known:
+            kind = "equation" if claim.evidence == "equation" else "metric"
+            what = f"claim {claim.id} asks for the {kind} '{claim.metric}', which there is not"
+            raise UserError(what, "audit.claims", meant(str(claim.metric), known))
 
 
 def _check_trainings(claims: Sequence[Claim], inputs: Inputs) -> None:
     """UserError where a training lacks a metric that a claim asks for."""
-    from wristctl.comparison.ledger import TRAININGS
+    from wristctl.comparison.evidence import TRAININGS
 
     for claim in claims:
         metrics = inputs.read(claim.evidence, _metrics)
@@ -103,7 +151,7 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
     """The comparison of a study, in a run directory of its own beside that of the audit."""
 
     def compared(run: LiveRun | None) -> Compared:
-        return compare(replace(session, study=study, inputs=Inputs(), findings=Findings(study.seed, run)))
+        return compare(replace(session, study=study, inputs=Inputs(), findings=_Undrawn(study.seed, run)))
 
     if session.findings.run is None:
         return compared(None)
@@ -115,46 +163,30 @@ def _metrics(given: Given) -> Metrics:
     return given.metrics if isinstance(given, Run) else given.findings.metrics
 
 
+def _trials(given: Given) -> TrialsDone:
+    from wristctl.comparison.evidence import TrialsDone
+    from wristctl.simulation.batch import sample_period
+    from wristctl.simulation.reference import motion
+
+    study = given.config if isinstance(given, Run) else given.study
+    table = given.data("trials") if isinstance(given, Run) else given.frame()
+    own = study.hw_run
+    moving = motion(own.reference, study.wrist, own.horizon, sample_period(own.control_period))
+    return TrialsDone(table, min(moving.rest, own.horizon), own.port is None)
+
+
 def _name(given: Given) -> str:
     run = given if isinstance(given, Run) else given.run
     return run.id if run else "in memory"
-
-
-def _tables(judged: Sequence[Judgement]) -> list[Table]:
-    """The claims, then why each verdict that is not a setting taken over, then how many there are of each."""
-    claims = [
-        (j.claim.id, j.claim.says, _number(j.claim.value), _ours(j.low, j.high), j.claim.unit, j.verdict, *_shown(j))
-        for j in judged
-    ]
-    why = [(j.claim.id, j.verdict, j.reason) for j in judged if j.verdict not in ("taken over", "open")]
-    open_ = [(j.claim.id, j.reason) for j in judged if j.verdict == "open"]
-    counts = sorted(Counter(j.verdict for j in judged).items())
-    heads = ("claim", "the paper says", "paper", "ours", "unit", "verdict", "shown by")
-    return [
-        Table("The paper's claims", heads, claims),
-        Table("Why", ("claim", "verdict", "reason"), why),
-        Table("Still open", ("claim", "what would decide it"), open_),
-        Table("Verdicts", ("verdict", "claims"), counts),
-    ]
-
-
-def _shown(judgement: Judgement) -> tuple[str]:
-    return (", ".join(judgement.shown_by),)
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:g}"
-
-
-def _ours(low: float, high: float) -> str:
-    from wristctl.comparison.ledger import interval
-
-    return "" if low != low else interval(low, high)
 
 
 AUDIT = Procedure(
     "audit",
     plan,
     audit,
-    (EarlierRun("table1", kind="train", optional=True), EarlierRun("selection", kind="train", optional=True)),
+    (
+        EarlierRun("table1", kind="train", optional=True),
+        EarlierRun("selection", kind="train", optional=True),
+        EarlierRun("hardware", kind="hw-run", optional=True),
+    ),
 )

@@ -34,6 +34,7 @@ def ranking_tables(
     findings: Findings, settings: TrainSettings, trials: dict[str, list[TrainingResult]], table: pd.DataFrame
 ) -> list[Table]:
     """Mean and 95 % interval of every measure over the seeds of each network, and what ranking they support."""
+    from wristctl.comparison.statistics import spread
     from wristctl.learning.evaluation import MEASURES
     from wristctl.learning.ranking import mean_interval, trained_alike
 
@@ -50,9 +51,10 @@ def ranking_tables(
             says = f"{name}: {text}; mean over the seeds with its 95 % interval"
             ends = (low, high) if len(own) > 1 else None
             findings.metric(f"{name}_mean_{measure}", mean, unit, n=len(own), interval=ends, meaning=says)
-            middle = float(own[measure].median())
-            findings.metric(f"{name}_median_{measure}", middle, unit, n=len(own), meaning=f"{name}: {text}; median")
-            rows.append((name, measure, unit, mean, low, high, middle, _printed(settings, str(name), measure)))
+            middle = spread(own[measure].to_numpy())
+            says = f"{name}: {text}; median over the seeds with its 95 % interval by order statistics"
+            findings.metric(f"{name}_median_{measure}", middle.median, unit, "", middle.n, middle.interval, says)
+            rows.append((name, measure, unit, mean, low, high, middle.median, _printed(settings, str(name), measure)))
     heads = ("network", "measure", "unit", "mean", "95 % low", "95 % high", "median", "paper's T1")
     title = f"Over {count} seed{'s' * (count > 1)} (initial weights and order of samples; one split)"
     tables = [Table(title, heads, rows)]
