@@ -59,7 +59,7 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: failed, short, swinging, rippling, pulling harder than tendons can; else empty."""
+        """In words what became of it: failed, short, swings, ripples, pulls harder than tendons can; else empty."""
         return "; ".join(each for each in (self._end, self._strain) if each)
 
     @property

@@ -122,7 +122,7 @@ def _check_claims(claims: Sequence[Claim]) -> None:
     from wristctl.simulation.metrics import METRICS
 
     loops: Iterable[str] = METRICS
-    tables = {"equation": set(EQUATIONS)} | dict.fromkeys(("comparison", "ordering", "hardware"), set(loops))
+    tables = {"equation": set(EQUATIONS)} | {each: set(loops) for each in ("comparison", "ordering", "hardware")}
     for claim in claims:
         known = tables.get(claim.evidence)
         if known is not None and claim.metric not in known:
