@@ -186,10 +186,11 @@ def main(folder: Path) -> None:
     true = measured[["true_x", "true_y"]].to_numpy()
     scatter = 1e3 * (measured[["tip_x", "tip_y"]].to_numpy() - true).std(axis=0)
     turning = float(np.degrees((measured["theta"] - measured["true_theta"]).std()))
+    counted = f"{len(measured)} frames of {measured['trial'].nunique()} trials"
     told = (
-        f"Measured: {len(measured)} frames of {measured['trial'].nunique()} trials; the tip scatters by "
-        f"{scatter[0]:.3f} mm along and {scatter[1]:.3f} mm across, the angle by {turning:.3f} deg. RMSE [deg] of the angle from the tip "
-        f"alone, mean over {SPLITS} ways to part the trials with its 95 % interval:"
+        f"Measured: {counted}; the tip scatters by {scatter[0]:.3f} mm along and {scatter[1]:.3f} mm across, the angle "
+        f"by {turning:.3f} deg. RMSE [deg] of the angle from the tip alone, mean over {SPLITS} ways to part the trials "
+        "with its 95 % interval:"
     )
     ends = "A tip is asked for in trials of both directions; where the true tip ends, away from it [mm]:"
     text = "\n\n".join([told, table(heads, rows), ends, table(["tip", "inverse", "ulnar", "radial"], closed)])
