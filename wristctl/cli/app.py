@@ -42,6 +42,7 @@ COMMANDS = {
     "identify": ("wristctl.cli.identify", _HARDWARE, "Find a real wrist's parameters from logged trials."),
     "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."),
     "track": ("wristctl.cli.track", _HARDWARE, "Find the wrist's angle in a recorded video."),
+    "export-model": ("wristctl.cli.export_model", _RESULTS, "Write the wrist of a run for MuJoCo or MATLAB."),
     "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""

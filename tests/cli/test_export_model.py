@@ -1,0 +1,65 @@
+"""`wristctl export-model` as it is typed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.cli.conftest import Call
+from wristctl.config.load import load_study
+from wristctl.config.wrist import WristParameters
+from wristctl.records import Run, list_runs, start_run
+
+IDENTIFIED = "wrist: {stiffness: 0.5, flexion_ratio: 2.0, damping: 0.1, tendon_radius: 0.02}\n"
+LOOP = "simulate: {loop: {actuator: {level: tendon}, sensor: {level: camera}}}\n"
+
+
+@pytest.fixture
+def identified(tmp_path: Path) -> Run:
+    with start_run("identify", load_study([], ["wrist.stiffness=0.7"]), "", tmp_path / "results") as live:
+        live.file("data/identified.yaml").write_text(IDENTIFIED + LOOP)
+    return Run(live.path)
+
+
+def stiffnesses(file: Path) -> list[float]:
+    return [float(each.get("stiffness", "")) for each in ElementTree.parse(file).iter("joint") if each.get("stiffness")]
+
+
+def test_the_identified_wrist_is_written_for_each_program(call: Call, identified: Run) -> None:
+    code, out, err = call("export-model", "latest:identify", "--to", "mujoco")
+    assert code == 0 and out.strip() == "wrist.xml", err
+    assert stiffnesses(Path("wrist.xml")) == [2.0] * 4 and identified.id in Path("wrist.xml").read_text()
+    code, out, err = call("export-model", identified.id, "--to", "matlab", "--direction", "flexion", "--segments", "2")
+    assert code == 0 and out.strip() == "wrist_chain.m", err
+    text = Path("wrist_chain.m").read_text()
+    assert "stiffness = 4.0;" in text and "alike = 2;" in text and re.search(f"run {identified.id} identified", text)
+
+
+def test_a_run_that_took_over_an_identification_gives_that_wrist(call: Call, identified: Run) -> None:
+    code, _, err = call("simulate", "--set", "horizon=0.1", "--from-identified", identified.id)
+    assert code == 0, err
+    assert call("export-model", "latest:simulate", "--to", "mujoco", "--file", "a.xml")[0] == 0
+    assert stiffnesses(Path("a.xml")) == [2.0] * 4
+    assert call("simulate", "--set", "horizon=0.1", "--label", "own")[0] == 0
+    (own,) = [run.id for run in list_runs(Path("results")) if run.manifest.label == "own"]
+    assert call("export-model", own, "--to", "mujoco", "--file", "b.xml", "--segments", "1")[0] == 0
+    assert stiffnesses(Path("b.xml")) == pytest.approx([4.0 * WristParameters().stiffness] * 4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (("latest:identify", "--to", "mujoco"), "a file is in the way - wrist.xml"),
+        (("latest:identify", "--to", "matlab", "--file", "other.m"), "a function by its file's name"),
+        (("latest:train", "--to", "mujoco"), "no train run that ended ok"),
+        (("latest:identify", "--to", "adams"), "'adams' is not one of"),
+        (("latest:identify", "--to", "mujoco", "--file", "gone/wrist.xml"), "cannot write"),
+    ],
+)
+def test_what_cannot_be_written_is_said(call: Call, identified: Run, arguments: tuple[str, ...], what: str) -> None:
+    Path("wrist.xml").write_text("mine")
+    code, _, err = call("export-model", *arguments)
+    assert code == 2 and what in err and Path("wrist.xml").read_text() == "mine"

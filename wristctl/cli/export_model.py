@@ -1,0 +1,42 @@
+"""`wristctl export-model`: the wrist of a run for another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from wristctl.cli.options import Debug, Out
+from wristctl.cli.runs.run_options import RESULTS, Ref
+from wristctl.cli.say import say
+
+app = typer.Typer(add_completion=False)
+
+_EPILOG = "Examples:\n\nwristctl export-model latest:identify --to mujoco\n\nwristctl export-model RUN --to matlab"
+
+
+@app.command("export-model", epilog=_EPILOG)
+def export_model(
+    ref: Ref,
+    to: Annotated[Literal["mujoco", "matlab"], typer.Option("--to", help="The program that is to read it.")],
+    segments: Annotated[int, typer.Option("--segments", min=1, max=8, help="Segments that bend by themselves.")] = 4,
+    direction: Annotated[
+        Literal["ulnar", "radial", "flexion", "extension"],
+        typer.Option("--direction", help="Whose bending plane: stiffness and gravity differ."),
+    ] = "ulnar",
+    file: Annotated[
+        Path | None, typer.Option("--file", help="Where to write it; by default wrist.xml or wrist_chain.m here.")
+    ] = None,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Write the wrist of a run, identified or as its controller knew it, as a chain of rigid links.
+
+    For MuJoCo a model with tendons, whose two actuators take tensions; for MATLAB (or Octave) a function with the
+    equations of motion. docs/models.md says how far they are from the wrist here.
+    """
+    from wristctl.records import require
+    from wristctl.studies.exported_model import export_wrist
+
+    say(export_wrist(require(ref, None, out), to, file, segments, direction))
