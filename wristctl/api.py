@@ -83,7 +83,7 @@ def train(
 @in_python()
 def tune(
     study: Study, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
-    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Tuned:  # fmt: skip
     """Gains by search, by the study's `tune` section: the same budget and objective for every controller.
 
@@ -92,16 +92,20 @@ def tune(
     `.searches`; `.frame()` is a row per candidate. Raises UserError for an unknown controller, one without gains, or a
     network that is missing.
 
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes.
+
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return carry_out(TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress)
+    return carry_out(
+        TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress, executor
+    )
 
 
 @in_python()
 def compare(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
 
@@ -112,10 +116,12 @@ def compare(
     settling [s], tensions [N], ... Raises UserError for unknown controllers or gains, inputs that are missing, or
     controllers that would be judged on what they were tuned on.
 
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes.
+
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
-    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
+    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress, executor)
 
 
 @in_python()
@@ -139,8 +145,8 @@ def study(
 @in_python()
 def simulate(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
+    from_identified: Ref | Identified | None = None, executor: str = "serial",
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Simulated:  # fmt: skip
     """One closed loop, by the study's `simulate` section.
 
@@ -149,11 +155,13 @@ def simulate(
     table, SI units) and `.failed`, whether the wrist left its range. Raises UserError for unknown controllers
     or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes.
+
     With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
     figures)` is called as it goes on.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return carry_out(SIMULATE, study, given, out, label, progress)
+    return carry_out(SIMULATE, study, given, out, label, progress, executor)
 
 
 @in_python()

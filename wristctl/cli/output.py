@@ -28,6 +28,16 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> 
         print(f"# {line}")
 
 
+def print_job(profile: str, plan: str) -> None:
+    """The script of the Slurm jobs that would do the work, and what that is."""
+    from wristctl.work.slurm import SlurmProfile
+
+    known = SlurmProfile.read(Path(profile))
+    print(known.job_script(), end="")
+    for line in [*plan.splitlines(), f"{known.jobs} such jobs would be submitted; nothing is submitted now"]:
+        print(f"# {line}")
+
+
 def print_result(path: Path, tables: Sequence[Table], as_json: bool) -> None:
     """The tables as wide as the terminal, then the run directory; or all of the result as one JSON object."""
     if as_json:

@@ -66,7 +66,7 @@ def _floor(found: WorldRanking) -> str:
 def _fate(found: WorldRanking, at: int) -> str:
     failures, swings = found.standing.failures[at], found.standing.swings[at]
     told = [
-        f"{what} in {100.0 * each.value:.2g} % [{100.0 * each.low:.2g}, {100.0 * each.high:.2g}] of worlds"
+        f"{what} in {_percent(each.value)} [{_percent(each.low)}, {_percent(each.high)}] % of worlds"
         for what, each in (("fails", failures), ("swings", swings))
         if each.times
     ]
@@ -88,6 +88,10 @@ def _shift(shift: OrderShift) -> str:
 
 def _times(gain: GeometricMean) -> str:
     return f"{gain.value:.3g} [{gain.low:.3g}, {gain.high:.3g}]"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f}" if share >= 0.1 else f"{100.0 * share:.2g}"
 
 
 def _deg(value: float) -> str:

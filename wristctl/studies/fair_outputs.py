@@ -207,7 +207,7 @@ def _ranking_table(found: WorldRanking, times: Mapping[str, StepTime]) -> Table:
     for at in found.order:
         mean, gain, group = found.means[at], found.gains[at], found.group(at)
         failures, swings = found.standing.failures[at], found.standing.swings[at]
-        lost = [f"{100 * each.value:.2g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
+        lost = [f"{100 * each.value:.3g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
         tick = times.get(found.rows[at].label.split("/")[0])
         ends = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
         rows.append((

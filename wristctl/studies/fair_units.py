@@ -69,8 +69,9 @@ def judge_all(study: Study, gains: Mapping[Place, Mapping[str, float]]) -> dict[
     for family in families_of(study):
         for row in study.study.presets:
             law = controller(row.controller)
-            values = dict(zip(law.gains, gains_of(law, row.gains), strict=True))
-            chosen[Place(BASE, family, row.label, law.name)] = values
+            chosen[Place(BASE, family, row.label, law.name)] = dict(
+                zip(law.gains, gains_of(law, row.gains), strict=True)
+            )
         chosen.setdefault(Place(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
     for place, values in chosen.items():
         noises = budget.noises if place.variant == BASE else 1
@@ -90,7 +91,7 @@ def golden_of(study: Study) -> Golden:
     return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
 
 
-def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden) -> UnitsDone:
+def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden | None) -> UnitsDone:
     """Compute units with the session's workers, into the run where there is one, and show how far they have come."""
     from wristctl.work.executors import Workers
     from wristctl.work.fan_out import perform_units
@@ -101,8 +102,8 @@ def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden
     folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
     if folder is not None:
         folder.mkdir(exist_ok=True)
-    count = 0
-    with session.progress(what, total=sum(each.size for each in units), unit="rollouts") as done:
+    count, counted = 0, "rollouts" if golden else "points"
+    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
 
         def told(unit: Unit, computed: Computed | None) -> None:
             nonlocal count
