@@ -18,7 +18,6 @@ from wristctl.config.section import Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument
-from wristctl.seeds import stream
 
 MOST_POINTS = 1_000_000
 _EXAMPLE = "KEY=1,2,3 or KEY=0.05..0.12:20, KEY=8e3..4e4 log:20, KEY=~0..3:100, KEY=~normal(0.6, 0.05):100"
@@ -173,6 +172,8 @@ def _values(text: str, given: str, key: str, seed: int) -> tuple[Any, ...]:
     drawn, source, many = bool(found[1]), found[2], int(found[3])
     shares: Any
     import numpy as np
+
+    from wristctl.seeds import stream
 
     rng = np.random.default_rng(stream(seed, f"sweep {key}"))
     if drawn and (normal := _NORMAL.fullmatch(source)):

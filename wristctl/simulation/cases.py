@@ -18,8 +18,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
+from wristctl.simulation.energy import energy
 from wristctl.simulation.kernel import RECORDED
-from wristctl.simulation.metrics import METRICS, energy
+from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.rollout import Outcome, rollout, structure

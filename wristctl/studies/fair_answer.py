@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from wristctl.comparison.geometric_means import GeometricMean
     from wristctl.comparison.order_shifts import OrderShift
@@ -29,6 +27,8 @@ def answer(rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue], shi
 
 def quietest(found: WorldRanking, rows: Sequence[int]) -> int:
     """Of these rows the one that moves the tensions of its tendons least."""
+    import numpy as np
+
     return min(rows, key=lambda at: float(np.nanmedian(found.rows[at].measured.metrics["chattering"])))
 
 

@@ -20,7 +20,7 @@ BASE = ""
 """The study's own way to tune, among its variants."""
 
 
-class Place(NamedTuple):
+class StudyPlace(NamedTuple):
     """What a search or a judgement is of."""
 
     variant: str
@@ -43,36 +43,36 @@ def families_of(study: Study) -> tuple[str, ...]:
     return study.study.families or tuple(study.families)
 
 
-def search_units(study: Study) -> dict[Place, Unit]:
+def search_units(study: Study) -> dict[StudyPlace, Unit]:
     """A search for every law on every family, and for every variant on one."""
     from wristctl.tuning.search_unit import search_unit
 
-    settings, found = study.study, dict[Place, "Unit"]()
+    settings, found = study.study, dict[StudyPlace, "Unit"]()
     varied = settings.varied or families_of(study)[0]
     ways = [(BASE, family, StudyVariant()) for family in families_of(study)]
     ways += [(name, varied, variant) for name, variant in settings.variants.items()]
     for name, family, variant in ways:
         tuned = study.model_copy(update={"tune": _tune_settings(study, family, variant)})
         for law in settings.laws:
-            found[Place(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
+            found[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
     return found
 
 
-def judge_all(study: Study, gains: Mapping[Place, Mapping[str, float]]) -> dict[Place, list[Unit]]:
+def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> dict[StudyPlace, list[Unit]]:
     """All gains that were found, and the presets, on the held-out worlds; a variant's with the first noise only."""
     from wristctl.comparison.judge_unit import judge_units
     from wristctl.control.table import controller, gains_of
     from wristctl.tuning.objective import YARDSTICK
 
-    budget, found = budget_of(study.study), dict[Place, list["Unit"]]()
-    chosen: dict[Place, Mapping[str, float]] = dict(gains)
+    budget, found = budget_of(study.study), dict[StudyPlace, list["Unit"]]()
+    chosen: dict[StudyPlace, Mapping[str, float]] = dict(gains)
     for family in families_of(study):
         for row in study.study.presets:
             law = controller(row.controller)
-            chosen[Place(BASE, family, row.label, law.name)] = dict(
+            chosen[StudyPlace(BASE, family, row.label, law.name)] = dict(
                 zip(law.gains, gains_of(law, row.gains), strict=True)
             )
-        chosen.setdefault(Place(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
+        chosen.setdefault(StudyPlace(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
     for place, values in chosen.items():
         noises = budget.noises if place.variant == BASE else 1
         found[place] = judge_units(study, place.family, place.law, values, budget.worlds, noises)
