@@ -56,8 +56,7 @@ def gen_data(
     `run` (simulate or compare) holds the courses to take them from where `source` is `run`. The result has `.samples`;
     `.frame()` is a row per sample. Raises UserError for a run without courses, or with too few samples.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """
     return carry_out(GEN_DATA, study, {"run": run}, out, label, progress)
 
@@ -74,8 +73,7 @@ def train(
     and, of a search, `.choice`; `.frame()` is a row per network and seed. Raises UserError where the split leaves too
     few samples to judge by, or every training diverged.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """
     return carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress)
 
@@ -83,7 +81,7 @@ def train(
 @in_python()
 def tune(
     study: Study, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
-    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Tuned:  # fmt: skip
     """Gains by search, by the study's `tune` section: the same budget and objective for every controller.
 
@@ -92,16 +90,17 @@ def tune(
     `.searches`; `.frame()` is a row per candidate. Raises UserError for an unknown controller, one without gains, or a
     network that is missing.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
+    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
     """
-    return carry_out(TUNE, study, {"network": network, "from_identified": from_identified}, out, label, progress)
+    given = {"network": network, "from_identified": from_identified}
+    return carry_out(TUNE, study, given, out, label, progress, executor)
 
 
 @in_python()
 def compare(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
 
@@ -112,10 +111,10 @@ def compare(
     settling [s], tensions [N], ... Raises UserError for unknown controllers or gains, inputs that are missing, or
     controllers that would be judged on what they were tuned on.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
+    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
     """
-    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress)
+    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress, executor)
 
 
 @in_python()
@@ -125,13 +124,11 @@ def study(
 ) -> Studied:  # fmt: skip
     """Every law tuned and judged at equal budget on families of worlds, by the study's `study` section.
 
-    `resume` is a study run that was stopped, whose units of work are taken over. `executor` does the work: serial,
-    processes[:N], dask://host:port or module:factory. The result has `.rankings` by family, `.terms`, `.shifts` and
-    `.searches`; `.frame()` is a row per family and law, best first. Raises UserError for unknown laws or families, and
-    for workers that compute other numbers or are gone.
-
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    `resume` is a study run that was stopped, whose units of work are taken over; `executor` (serial, processes[:N],
+    dask://host:port, module:factory) does them. The result has `.rankings` by family, `.terms`, `.shifts`, `.searches`;
+    `.frame()` is a row per family and law. With a folder `out` it is also a sealed run directory there, `label` part of
+    its name; `progress(what, count, total, figures)` is called. Raises UserError for unknown laws or families, and for
+    workers that compute other numbers or are gone.
     """
     return carry_out(FAIR_STUDY, study, {"resume": resume}, out, label, progress, executor)
 
@@ -139,8 +136,8 @@ def study(
 @in_python()
 def simulate(
     study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
+    from_identified: Ref | Identified | None = None, executor: str = "serial",
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Simulated:  # fmt: skip
     """One closed loop, by the study's `simulate` section.
 
@@ -149,11 +146,11 @@ def simulate(
     table, SI units) and `.failed`, whether the wrist left its range. Raises UserError for unknown controllers
     or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
+    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return carry_out(SIMULATE, study, given, out, label, progress)
+    return carry_out(SIMULATE, study, given, out, label, progress, executor)
 
 
 @in_python()
@@ -183,8 +180,7 @@ def hysteresis(
     intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
     and for a measured file that is none, with its line.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """
     return carry_out(HYSTERESIS, study, {}, out, label, progress)
 
@@ -200,8 +196,7 @@ def identify(
     was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and
     where these do not tell every parameter: it says what to add.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """
     return carry_out(IDENTIFY, study, {"runs": runs}, out, label, progress)
 
@@ -218,8 +213,7 @@ def audit(
     `.comparisons`, by loop; `.frame()` is a row per claim. Raises UserError without claims, and for a training that
     lacks what a claim asks for.
 
-    With a folder `out` it is also a sealed run directory there, `label` part of its name; `progress(what, count, total,
-    figures)` is called as it goes on.
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """
     given = {"table1": table1, "selection": selection, "hardware": hardware}
     return carry_out(AUDIT, study, given, out, label, progress)
@@ -242,8 +236,8 @@ def runs(
 
     from wristctl.records.query import entries, in_order, select
 
-    conditions = [where] if isinstance(where, str) else list(where)
-    found = in_order(select(entries(Path(out)), kind, label, state, tag, conditions, newer, older), sort)
+    asked = [where] if isinstance(where, str) else list(where)
+    found = in_order(select(entries(Path(out)), kind, label, state, tag, asked, newer, older), sort)
     own = ["id", "kind", "label", "state", "started", "wall_s", "note", "tags"]
     rows = [{name: getattr(each, name) for name in own} | each.metrics for each in found]
     return pd.DataFrame(rows[::-1] if reverse else rows, columns=None if rows else own)
@@ -253,7 +247,6 @@ def runs(
 def open_run(ref: str | Path, out: Folder = RESULTS) -> Run:
     """The run directory that `ref` names: a path, an id in `out` or its beginning, or latest:<kind> (that ended ok).
 
-    `.data(name)` is one of its tables, `.metrics`, `.config` (the study it ran) and `.file(name)` what they say. Raises
-    UserError where there is none, more than one, or what is there is not a run.
+    Its `.data(name)`, `.metrics`, `.config`, `.file(name)`. Raises UserError where there is none, or more than one.
     """
     return _open_run(ref, Path(out))

@@ -140,6 +140,8 @@ def _all_mappings() -> dict[str, tuple[Mapped, KeyPath, Mapped]]:
         for command in COMMANDS:
             data |= parse_yaml(resolved_yaml(study, command), command).data
         for path, mapping in _mappings(data):
+            if not mapping:
+                continue
             names = ["*" if before == "loops" else key for before, key in zip(("", *path), path, strict=False)]
             place = ".".join(str(name) for name in names if not isinstance(name, int))
             found.setdefault(place, (data, path, mapping))
@@ -174,8 +176,10 @@ def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_
     error = _refusal(file)
     names = (0 if isinstance(key, int) else key for key in (*path, misspelt))
     assert error.where == f"{file}:{line}: {'.'.join(map(str, names))}"
-    if path[-1:] in (("loops",), ("families",)):  # a loop may have any name, but a number is none
+    if path[-1:] in (("loops",), ("families",), ("budgets",), ("variants",)):  # any name will do, but a number is none
         assert error.what == "1.0 should be a group of keys and values"
+    elif path[-1:] == ("terms",):
+        assert error.what == "1.0 should be a valid list"
     elif path[-1:] == ("draw",):
         assert error.what == "1.0 should be a valid string"
     else:

@@ -81,8 +81,9 @@ def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
         "seed",
         "wrist",
         command.replace("-", "_"),
-        {"train": "gen_data", "analyse": "simulate", "tune": "families", "compare": "families"}.get(command),
+        {"train": "gen_data", "analyse": "simulate", "simulate": "sweep"}.get(command),
     }
+    own |= {"tune": {"families", "sweep"}, "compare": {"families", "sweep"}, "study": {"families"}}.get(command, set())
     base = config_hash(Study(), command)
     for path, study in _changed(Study()):
         assert isinstance(study, Study)

@@ -121,6 +121,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         tension=np.zeros((1000, 2)), outside=0.25, **still,
     )  # fmt: skip
     assert of_trajectory(course) == {
+        "energy": 0.0,
         "rmse_desired": pytest.approx(0.02),
         "tip_rmse_mm": pytest.approx(math.sqrt(0.9 * 9.0 + 0.1 * 25.0)),
         "tip_steady_mm": pytest.approx(5.0),

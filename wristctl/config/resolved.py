@@ -21,7 +21,8 @@ _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 Entry = tuple[str, Any, str]
 
 _SHARED = ("seed", "wrist")
-_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "tune": ("families",), "compare": ("families",)}
+_SWEPT = ("families", "sweep")
+_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "tune": _SWEPT, "compare": _SWEPT, "simulate": ("sweep",)}
 _READ["study"] = ("families",)
 _READ |= {command: (subject,) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""

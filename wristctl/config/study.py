@@ -28,6 +28,9 @@ class Study(Section):
         description="families of worlds, by name, that tune and compare draw from",
         json_schema_extra={"unsaid": True},
     )
+    sweep: tuple[str, ...] = Field(
+        (), description="leaves at many values, as KEY=1,2,3 or KEY=0..3:20", json_schema_extra={"unsaid": True}
+    )
     gen_data: DataSettings = Field(DataSettings(), alias="gen-data")
     train: TrainSettings = TrainSettings()
     tune: TuneSettings = TuneSettings()

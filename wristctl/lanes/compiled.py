@@ -22,6 +22,8 @@ from typing import Any, NoReturn, TypeVar, cast
 import numba
 from numba.core.registry import CPUDispatcher
 
+from wristctl.lanes.kernel_folder import kernels_folder
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 TRIED = "0.68"
@@ -85,7 +87,7 @@ def cache_folder(file: Path, *others: Path) -> Path | None:
 
 @cache
 def _kernels() -> Path:
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
+    base = kernels_folder()
     if base.is_dir():
         for folder in base.iterdir():
             if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:

@@ -8,12 +8,25 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.comparison.term_values import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
-from wristctl.report.style import BLACK, BLUE, GREY, SILVER, VERMILLION, colour, figure, logarithmic, title, undress
+from wristctl.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    SILVER,
+    VERMILLION,
+    colour,
+    figure,
+    legend_below,
+    logarithmic,
+    title,
+    undress,
+)
 
 _COLOURS = "RdYlBu"
 _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on the wrist [J]"))
@@ -45,7 +58,8 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
             place = labels.index(row.label), column
             times[place] = found.gains[at].value
             group = found.group(at)
-            marks[place] = f"{times[place]:.3g}  ({group})" if group else f"{times[place]:.3g}  -"
+            shown = f"{times[place]:.0f}" if times[place] >= 1000.0 else f"{times[place]:.3g}"
+            marks[place] = f"{shown}  ({group})" if group else f"{shown}  -"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
     made, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
     undress(axes)
@@ -65,48 +79,57 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
 
 
 def terms_by_rig(values: Sequence[TermValue]) -> Figure:
-    """How many times less error each term makes, with its interval, by family; grey where 1 lies within."""
-    made, ((axes,),) = figure(height=1.0 + 0.24 * len(values))
-    for place, each in enumerate(values):
-        times = each.times
+    """How many times less error each term makes, with its interval, a panel for each family; grey where 1 is within."""
+    families, terms = (list(dict.fromkeys(getattr(each, name) for each in values)) for name in ("family", "term"))
+    made, axes = figure(1, len(families), height=1.1 + 0.27 * len(terms), sharey=True)
+    for each in values:
+        panel, place, times = axes[0, families.index(each.family)], terms.index(each.term), each.times
         own = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
         if np.isfinite(times.high):
-            axes.plot([times.low, times.high], [place, place], color=own, linewidth=3.0)
-        axes.plot(times.value, place, "o", color=own, markeredgecolor=BLACK, markersize=5.0)
-    axes.axvline(1.0, color=BLACK, linewidth=0.8)
-    axes.set_yticks(range(len(values)), [f"{each.term}, {each.family}" for each in values])
-    axes.invert_yaxis()
-    logarithmic(axes.xaxis)
-    axes.set_xlabel("times less RMSE, with 95 % interval; grey: cannot be told")
+            panel.plot([times.low, times.high], [place, place], color=own, linewidth=3.0)
+        panel.plot(times.value, place, "o", color=own, markeredgecolor=BLACK, markersize=5.0)
+    for panel, family in zip(axes[0], families, strict=True):
+        panel.axvline(1.0, color=BLACK, linewidth=0.8)
+        logarithmic(panel.xaxis)
+        panel.xaxis.set_major_locator(LogLocator(numticks=4))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        title(panel, family)
+    axes[0, 0].set_yticks(range(len(terms)), terms)
+    axes[0, 0].invert_yaxis()
+    made.supxlabel("times less RMSE, with 95 % interval; grey: cannot be told", fontsize=10.0)
     return made
 
 
 def pareto(found: WorldRanking) -> Figure:
-    """RMSE beside what it costs in tension and in work: rows that no other row beats in both are joined."""
-    made, ((left, right),) = figure(1, 2, height=3.6, sharey=True)
+    """RMSE beside what it costs in tension and in work: a line joins the rows that no other beats in both.
+
+    Rows that fail or swing too often, hollow, are left out where they lie far off.
+    """
+    made, ((left, right),) = figure(1, 2, height=4.6, sharey=True)
     rmse = np.degrees([each.value for each in found.means])
     for axes, (metric, label) in zip((left, right), _AXES, strict=True):
         _front(axes, medians(found, metric), rmse, found)
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
     made.suptitle(f"{found.name}: error and its price; hollow rows fail or swing", fontsize=10.0)
+    legend_below(made, 4)
     return made
 
 
 def _front(axes: Axes, cost: Array, rmse: Array, found: WorldRanking) -> None:
     sound = np.array([found.group(at) is not None for at in range(len(rmse))])
-    front = undominated(np.column_stack([cost, rmse])[sound])
-    best = np.flatnonzero(sound)[front]
+    best = np.flatnonzero(sound)[undominated(np.column_stack([cost, rmse])[sound])]
     best = best[np.argsort(cost[best])]
     axes.plot(cost[best], rmse[best], color=GREY, linewidth=1.0, zorder=1)
-    for at, row in enumerate(found.rows):
-        own = colour(row.label.split("/")[0])
-        axes.plot(cost[at], rmse[at], "o", color=own, markersize=5.0, markerfacecolor=own if sound[at] else "none")
-    for number, at in enumerate(best):
-        axes.annotate(found.rows[at].label.removesuffix("/tuned"), (cost[at], rmse[at]), fontsize=7.5,
-                      xytext=(4, 4 if number % 2 else -9), textcoords="offset points")  # fmt: skip
+    for at in found.order:
+        own = colour(found.rows[at].label.split("/")[0])
+        axes.plot(cost[at], rmse[at], "o", color=own, markersize=6.0, markerfacecolor=own if sound[at] else "none",
+                  linestyle="none", label=found.rows[at].label)  # fmt: skip
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
+    if sound.any():
+        axes.set_xlim(cost[sound].min() / 1.5, cost[sound].max() * 1.5)
+        axes.set_ylim(rmse[sound].min() / 1.3, rmse[sound].max() * 1.3)
 
 
 def world_map(found: WorldRanking) -> Figure:

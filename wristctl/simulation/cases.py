@@ -18,8 +18,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
+from wristctl.simulation.energy import energy
 from wristctl.simulation.kernel import RECORDED
-from wristctl.simulation.metrics import METRICS, energy
+from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.rollout import Outcome, rollout, structure
@@ -29,7 +30,7 @@ _RECORDED_AT_ONCE = 12_000_000
 """Numbers that are kept of rollouts whose samples are wanted."""
 
 
-_AT_ONCE = ("oscillation", "energy")
+AT_ONCE = ("oscillation", "energy")
 """Metrics of courses that are taken of many rollouts without a trajectory for each."""
 
 
@@ -114,11 +115,29 @@ def _pieces(rows: int, own: Sequence[int], like: Case, recorded: bool) -> list[t
     """Rows and cases that are run at once: all, or as many as can be kept in memory."""
     if not recorded:
         return [(range(rows), own)]
-    columns = len(RECORDED) + like.loop.plant_segments
-    most = max(1, _RECORDED_AT_ONCE // (columns * len(like.motion.time)))
-    parts = [own[at : at + most] for at in range(0, len(own), most)]
-    each = max(1, most // min(most, len(own)))
+    parts = pieces(own, like.loop, like.motion)
+    each = max(1, len(pieces(range(rows * len(own)), like.loop, like.motion)[0]) // len(parts[0]))
     return [(range(first, min(first + each, rows)), part) for part in parts for first in range(0, rows, each)]
+
+
+def pieces(own: Sequence[int], loop: Loop, followed: Motion) -> list[Sequence[int]]:
+    """Rollouts of such a loop in pieces whose samples can be kept in memory."""
+    most = max(1, _RECORDED_AT_ONCE // ((len(RECORDED) + loop.plant_segments) * len(followed.time)))
+    return [own[at : at + most] for at in range(0, len(own), most)]
+
+
+def at_once(
+    metrics: Sequence[str], outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.int64]
+) -> dict[str, Array]:
+    """Those of the metrics that are taken of the samples of many rollouts without a trajectory for each."""
+    found, step = dict[str, Array](), float(motions[0].time[1])
+    if "oscillation" in metrics:
+        found["oscillation"] = _oscillation(outcome, motions, which, step)
+    if "energy" in metrics:
+        assert outcome.samples is not None
+        torque, rate = (outcome.samples[:, :, RECORDED.index(each)] for each in ("torque", "rate"))
+        found["energy"] = energy(torque, rate, step)
+    return found
 
 
 def _measured(
@@ -136,13 +155,8 @@ def _measured(
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics),
     )  # fmt: skip
     found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
-    slow, step = [name for name in metrics if name not in found and name not in _AT_ONCE], motions[0].time[1]
-    if "oscillation" in metrics:
-        found["oscillation"] = _oscillation(outcome, motions, which, step)
-    if "energy" in metrics:
-        assert outcome.samples is not None
-        torque, rate = (outcome.samples[:, :, RECORDED.index(each)] for each in ("torque", "rate"))
-        found["energy"] = energy(torque, rate, step)
+    slow = [name for name in metrics if name not in found and name not in AT_ONCE]
+    found |= at_once(metrics, outcome, motions, which)
     if slow:
         plants = [plant_of(wrist, case.loop.plant) for case in cases]
         courses = [

@@ -123,7 +123,8 @@ def scenario_of(reference: Reference, direction: DirectionName) -> str:
     return f"{reference_name(reference)}, {direction}"
 
 
-def _equilibrium(loop: Loop) -> Start:
+def equilibrium(loop: Loop) -> Start:
+    """Where a plant of this loop rests at pretension."""
     model, n = PLANTS[loop.plant.model], loop.plant_segments
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
@@ -146,7 +147,7 @@ def simulate(
     gains = np.array([gains_of(law, chosen.gains, tuned)])
     reference = toward(chosen.reference, chosen.direction)
     followed = motion(reference, wrist, chosen.horizon, sample_period(loop.control_period), network)
-    start = _equilibrium(loop) if chosen.start == "equilibrium" else None
+    start = equilibrium(loop) if chosen.start == "equilibrium" else None
     scenario = scenario_of(chosen.reference, chosen.direction)
     which = np.zeros(1, np.int64)
     (done,) = repeat(

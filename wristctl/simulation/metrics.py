@@ -16,6 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.simulation.energy import course_energy
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
 
@@ -97,11 +98,6 @@ def metrics_of(
     sums = sums_of(period, np.column_stack([theta, theta_ref, tension, flags]), goals)
     totals = Totals(dict(zip(SUMS, sums[:, None], strict=True)), dict(zip(GOALS, goals[:, None], strict=True)), period)
     return {name: float(value[0]) for name, value in summary(totals).items()}
-
-
-def energy(torque: Array, rate: Array, step: float) -> Any:
-    """Integral of |torque * rate| [J] over torques [N m] and rates [rad/s] (..., T) sampled every `step` [s]."""
-    return np.abs(torque * rate).sum(axis=-1) * step
 
 
 def _rests(of: Totals) -> Any:
@@ -209,12 +205,7 @@ SLACK = Metric(
     of_error=False,
     floor=0.001,
 )
-ENERGY = Metric(
-    "J",
-    "integral of |torque * rate|: the work that tendons do on the wrist, and the wrist on them",
-    of_trajectory=lambda course: energy(course.torque, course.rate, float(course.time[1] - course.time[0])),
-    of_error=False,
-)
+ENERGY = Metric("J", "integral of |torque * rate|: work on the wrist", of_trajectory=course_energy, of_error=False)
 RMSE_DESIRED = Metric(
     "rad",
     "RMSE against the true wanted angle",

@@ -27,6 +27,7 @@ from wristctl.studies.procedure import Procedure
 from wristctl.studies.rank import ranked
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult
+from wristctl.studies.sweep import sweepable
 from wristctl.studies.tune import planned_search, search_all
 
 if TYPE_CHECKING:
@@ -176,9 +177,11 @@ def _step_times(session: Session, tuned: Gains) -> dict[str, StepTime]:
     return times
 
 
-COMPARE = Procedure(
-    "compare",
-    plan,
-    compare,
-    (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
+COMPARE = sweepable(
+    Procedure(
+        "compare",
+        plan,
+        compare,
+        (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
+    )
 )

@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from wristctl.comparison.geometric_means import GeometricMean
     from wristctl.comparison.order_shifts import OrderShift
@@ -29,6 +27,8 @@ def answer(rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue], shi
 
 def quietest(found: WorldRanking, rows: Sequence[int]) -> int:
     """Of these rows the one that moves the tensions of its tendons least."""
+    import numpy as np
+
     return min(rows, key=lambda at: float(np.nanmedian(found.rows[at].measured.metrics["chattering"])))
 
 
@@ -66,7 +66,7 @@ def _floor(found: WorldRanking) -> str:
 def _fate(found: WorldRanking, at: int) -> str:
     failures, swings = found.standing.failures[at], found.standing.swings[at]
     told = [
-        f"{what} in {100.0 * each.value:.2g} % [{100.0 * each.low:.2g}, {100.0 * each.high:.2g}] of worlds"
+        f"{what} in {_percent(each.value)} [{_percent(each.low)}, {_percent(each.high)}] % of worlds"
         for what, each in (("fails", failures), ("swings", swings))
         if each.times
     ]
@@ -88,6 +88,10 @@ def _shift(shift: OrderShift) -> str:
 
 def _times(gain: GeometricMean) -> str:
     return f"{gain.value:.3g} [{gain.low:.3g}, {gain.high:.3g}]"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f}" if share >= 0.1 else f"{100.0 * share:.2g}"
 
 
 def _deg(value: float) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.fair_answer import answer
-from wristctl.studies.fair_units import BASE, Place, families_of
+from wristctl.studies.fair_units import BASE, StudyPlace, families_of
 from wristctl.studies.session import Session
 from wristctl.studies.studied import Studied
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
 
-Pieces = Mapping[Place, Sequence[Mapping[str, "np.ndarray"]]]
+Pieces = Mapping[StudyPlace, Sequence[Mapping[str, "np.ndarray"]]]
 
 
-def written(session: Session, judged: Pieces, searches: dict[Place, Search], poisoned: list[Poisoned]) -> Studied:
+def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search], poisoned: list[Poisoned]) -> Studied:
     """Rank what was judged, and write all of it down."""
     from wristctl.comparison.term_values import term_values
 
@@ -100,7 +100,7 @@ def _tables(
     rankings: Mapping[str, WorldRanking],
     terms: Sequence[TermValue],
     shifts: Sequence[OrderShift],
-    searches: Mapping[Place, Search],
+    searches: Mapping[StudyPlace, Search],
 ) -> None:
     """Tables and numbers for programs."""
     import pandas as pd
@@ -141,7 +141,7 @@ def _tables(
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
 
 
-def _step_times(session: Session, searches: Mapping[Place, Search]) -> dict[str, StepTime]:
+def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
     """What a control tick of each law costs here; gains make no difference to it."""
     from wristctl.comparison.step_cost import step_time
     from wristctl.control.table import controller
@@ -207,7 +207,7 @@ def _ranking_table(found: WorldRanking, times: Mapping[str, StepTime]) -> Table:
     for at in found.order:
         mean, gain, group = found.means[at], found.gains[at], found.group(at)
         failures, swings = found.standing.failures[at], found.standing.swings[at]
-        lost = [f"{100 * each.value:.2g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
+        lost = [f"{100 * each.value:.3g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
         tick = times.get(found.rows[at].label.split("/")[0])
         ends = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
         rows.append((

@@ -17,7 +17,7 @@ from wristctl.studies.studied import Studied
 if TYPE_CHECKING:
     import numpy as np
 
-    from wristctl.studies.fair_units import Place
+    from wristctl.studies.fair_units import StudyPlace
     from wristctl.work.unit import Unit
 
 
@@ -93,8 +93,8 @@ def fair_study(session: Session) -> Studied:
 
 
 def _whole(
-    wanted: Mapping[Place, Sequence[Unit]], arrays: Sequence[dict[str, np.ndarray] | None]
-) -> dict[Place, list[dict[str, np.ndarray]]]:
+    wanted: Mapping[StudyPlace, Sequence[Unit]], arrays: Sequence[dict[str, np.ndarray] | None]
+) -> dict[StudyPlace, list[dict[str, np.ndarray]]]:
     """What was judged whole, in its ranges of worlds."""
     found, given = {}, iter(arrays)
     for place, units in wanted.items():

@@ -20,7 +20,7 @@ BASE = ""
 """The study's own way to tune, among its variants."""
 
 
-class Place(NamedTuple):
+class StudyPlace(NamedTuple):
     """What a search or a judgement is of."""
 
     variant: str
@@ -43,35 +43,36 @@ def families_of(study: Study) -> tuple[str, ...]:
     return study.study.families or tuple(study.families)
 
 
-def search_units(study: Study) -> dict[Place, Unit]:
+def search_units(study: Study) -> dict[StudyPlace, Unit]:
     """A search for every law on every family, and for every variant on one."""
     from wristctl.tuning.search_unit import search_unit
 
-    settings, found = study.study, dict[Place, "Unit"]()
+    settings, found = study.study, dict[StudyPlace, "Unit"]()
     varied = settings.varied or families_of(study)[0]
     ways = [(BASE, family, StudyVariant()) for family in families_of(study)]
     ways += [(name, varied, variant) for name, variant in settings.variants.items()]
     for name, family, variant in ways:
         tuned = study.model_copy(update={"tune": _tune_settings(study, family, variant)})
         for law in settings.laws:
-            found[Place(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
+            found[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
     return found
 
 
-def judge_all(study: Study, gains: Mapping[Place, Mapping[str, float]]) -> dict[Place, list[Unit]]:
+def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> dict[StudyPlace, list[Unit]]:
     """All gains that were found, and the presets, on the held-out worlds; a variant's with the first noise only."""
     from wristctl.comparison.judge_unit import judge_units
     from wristctl.control.table import controller, gains_of
     from wristctl.tuning.objective import YARDSTICK
 
-    budget, found = budget_of(study.study), dict[Place, list["Unit"]]()
-    chosen: dict[Place, Mapping[str, float]] = dict(gains)
+    budget, found = budget_of(study.study), dict[StudyPlace, list["Unit"]]()
+    chosen: dict[StudyPlace, Mapping[str, float]] = dict(gains)
     for family in families_of(study):
         for row in study.study.presets:
             law = controller(row.controller)
-            values = dict(zip(law.gains, gains_of(law, row.gains), strict=True))
-            chosen[Place(BASE, family, row.label, law.name)] = values
-        chosen.setdefault(Place(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
+            chosen[StudyPlace(BASE, family, row.label, law.name)] = dict(
+                zip(law.gains, gains_of(law, row.gains), strict=True)
+            )
+        chosen.setdefault(StudyPlace(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
     for place, values in chosen.items():
         noises = budget.noises if place.variant == BASE else 1
         found[place] = judge_units(study, place.family, place.law, values, budget.worlds, noises)
@@ -90,7 +91,7 @@ def golden_of(study: Study) -> Golden:
     return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
 
 
-def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden) -> UnitsDone:
+def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden | None) -> UnitsDone:
     """Compute units with the session's workers, into the run where there is one, and show how far they have come."""
     from wristctl.work.executors import Workers
     from wristctl.work.fan_out import perform_units
@@ -101,8 +102,8 @@ def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden
     folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
     if folder is not None:
         folder.mkdir(exist_ok=True)
-    count = 0
-    with session.progress(what, total=sum(each.size for each in units), unit="rollouts") as done:
+    count, counted = 0, "rollouts" if golden else "points"
+    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
 
         def told(unit: Unit, computed: Computed | None) -> None:
             nonlocal count

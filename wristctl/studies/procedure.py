@@ -28,6 +28,8 @@ class Procedure(Generic[Found]):
     needs: tuple[EarlierRun, ...] = ()
     in_units: bool = False
     """Whether it works in units, which other processes and machines may do."""
+    sweeps: bool = False
+    """Whether it can be done at many values of its settings."""
 
     def section(self, study: Study) -> Any:
         """The section of a study that names what it reads."""

@@ -15,6 +15,7 @@ from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, w
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult
+from wristctl.studies.sweep import sweepable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,13 +139,15 @@ def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
     return Table(f"{title}, {len(every)} repetitions", heads, rows)
 
 
-SIMULATE = Procedure(
-    "simulate",
-    plan,
-    simulate,
-    (
-        EarlierRun("network", kind="train", optional=True),
-        EarlierRun("tuned", kind="tune", optional=True),
-        EarlierRun("from_identified", kind="identify", optional=True),
-    ),
+SIMULATE = sweepable(
+    Procedure(
+        "simulate",
+        plan,
+        simulate,
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("tuned", kind="tune", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+        ),
+    )
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.config.errors import UserError
-from wristctl.studies.fair_units import Place
+from wristctl.studies.fair_units import StudyPlace
 from wristctl.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class Studied(StudyResult):
 
     rankings: dict[str, WorldRanking]
     """By family."""
-    searches: dict[Place, Search]
+    searches: dict[StudyPlace, Search]
     terms: list[TermValue]
     shifts: list[OrderShift]
     poisoned: list[Poisoned]

@@ -26,6 +26,7 @@ from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
 from wristctl.studies.study_result import StudyResult
+from wristctl.studies.sweep import sweepable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -209,13 +210,15 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
     findings.figure("convergence", convergence, list(found.values()))
 
 
-TUNE = Procedure(
-    "tune",
-    plan,
-    tune,
-    (
-        EarlierRun("network", kind="train", optional=True),
-        EarlierRun("from_identified", kind="identify", optional=True),
-        EarlierRun("resume", kind="tune", optional=True, unfinished=True),
-    ),
+TUNE = sweepable(
+    Procedure(
+        "tune",
+        plan,
+        tune,
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
+        ),
+    )
 )

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import platform
+import tempfile
 import threading
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from wristctl.records.lock import locked
 from wristctl.version import __version__
 from wristctl.work.unit import code_digest, function_at
 
@@ -53,8 +57,9 @@ class WorkerDiffers(Exception):
 def compute(does: str, spec: Mapping[str, Any], golden: Golden | None) -> Computed:
     """Compute a unit. Raises WorkerDiffers before, where this worker is not of the same code or numbers."""
     host = platform.node()
-    if golden is not None:
-        _check(golden, host)
+    if golden is not None and (golden.expected, golden.code) not in _passed:
+        with _ONE, locked(_turn()):
+            _check(golden, host)
     start, processor = time.perf_counter(), time.process_time()
     try:
         arrays = function_at(does)(spec)
@@ -65,15 +70,21 @@ def compute(does: str, spec: Mapping[str, Any], golden: Golden | None) -> Comput
 
 
 def _check(golden: Golden, host: str) -> None:
-    """Compare once in a process what it is and what it computes."""
-    with _ONE:
-        if (golden.expected, golden.code) in _passed:
-            return
-        if (golden.version, golden.code) != (__version__, code_digest()):
-            same = "of the same number and other files" if golden.version == __version__ else f"{golden.version} here"
-            raise WorkerDiffers(f"the worker on {host} runs wristctl {__version__}, {same}")
+    """Compare what this process is and what it computes; it is not asked again."""
+    if (golden.version, golden.code) != (__version__, code_digest()):
+        same = "of the same number and other files" if golden.version == __version__ else f"{golden.version} here"
+        raise WorkerDiffers(f"the worker on {host} runs wristctl {__version__}, {same}")
+    try:
         found = str(function_at(golden.does)(golden.spec))
-        if found != golden.expected:
-            numbers = f"its golden rollout is {found[:12]} and not {golden.expected[:12]}"
-            raise WorkerDiffers(f"the worker on {host} ({platform.machine()}) computes other numbers: {numbers}")
-        _passed.add((golden.expected, golden.code))
+    except Exception as error:  # a full disk, say: whatever it did would fail, and be blamed on the units
+        what = f"the worker on {host} cannot compute the golden rollout: {type(error).__name__}: {error}"
+        raise WorkerDiffers(what) from error
+    if found != golden.expected:
+        numbers = f"its golden rollout is {found[:12]} and not {golden.expected[:12]}"
+        raise WorkerDiffers(f"the worker on {host} ({platform.machine()}) computes other numbers: {numbers}")
+    _passed.add((golden.expected, golden.code))
+
+
+def _turn() -> Path:
+    """A file whose lock the workers of one machine take in turn, so that the first compiles for all."""
+    return Path(tempfile.gettempdir()) / f"wristctl-golden-{os.getuid()}.lock"

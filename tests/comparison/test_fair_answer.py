@@ -1,0 +1,108 @@
+"""What a study says: it can come out either way, and says what it cannot tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wristctl.arrays import Array
+from wristctl.comparison.order_shifts import order_shift
+from wristctl.comparison.term_values import term_values
+from wristctl.comparison.world_ranking import RANKED, RankedRow, WorldRanking, ranking
+from wristctl.config.families import Family
+from wristctl.report.fair_figures import undominated
+from wristctl.simulation.cases import Measured
+from wristctl.studies.fair_answer import answer
+
+WORLDS = 40
+HARD = np.exp(np.random.default_rng(1).normal(-5.0, 0.4, WORLDS))
+"""How hard each world is."""
+
+
+def row(
+    label: str, factor: float, spread: float = 0.02, swings: int = 0, failed: int = 0, quiet: float = 1.0
+) -> RankedRow:
+    """A row that is so many times worse than another in every world, give or take."""
+    noise = np.random.default_rng(len(label)).normal(0.0, spread, WORLDS)
+    rmse = HARD * factor * np.exp(noise - noise.mean())
+    rmse[:failed] = np.inf
+    metrics = {name: np.full((1, WORLDS), quiet) for name in RANKED} | {"rmse": rmse[None]}
+    ones = np.ones((1, WORLDS))
+    measured = Measured(metrics, np.isinf(rmse)[None], ones, np.ones(WORLDS, bool))
+    return RankedRow(label, rmse, np.arange(WORLDS) < swings, measured)
+
+
+def ranked(*rows: RankedRow, tolerated: float = 0.0) -> WorldRanking:
+    every = [row("feedforward/default", 4.0), *rows]
+    return ranking("bench", Family(about="a bench"), every, 0, tolerated)
+
+
+def said(*rows: RankedRow, tolerated: float = 0.0) -> str:
+    return answer({"bench": ranked(*rows, tolerated=tolerated)}, [], [])[0]
+
+
+def test_the_better_law_is_named_whichever_it_is() -> None:
+    assert "run a/tuned: RMSE" in said(row("a/tuned", 1.0), row("bb/tuned", 1.5))
+    assert "run bb/tuned: RMSE" in said(row("a/tuned", 1.5), row("bb/tuned", 1.0))
+
+
+def test_laws_that_cannot_be_told_apart_are_said_to_be_as_good_and_which_is_quieter() -> None:
+    text = said(row("a/tuned", 1.0, 0.3, quiet=5.0), row("bb/tuned", 1.0, 0.3, quiet=2.0))
+    assert "As good by what could be told" in text and "bb/tuned moves the tendons least" in text
+
+
+def test_where_no_law_beats_feedforward_that_is_said() -> None:
+    assert "run feedforward: no law is better" in said(row("a/tuned", 4.0, 0.3), row("bb/tuned", 4.4))
+
+
+def test_a_law_that_swings_is_not_recommended_unless_so_little_is_tolerated() -> None:
+    text = said(row("a/tuned", 1.0, swings=1), row("bb/tuned", 1.5))
+    assert "run bb/tuned" in text and "Not to be relied on: a/tuned (swings in 2.5 [" in text
+    assert "run a/tuned" in said(row("a/tuned", 1.0, swings=1), row("bb/tuned", 1.5), tolerated=0.05)
+
+
+def test_where_all_fail_none_is_recommended() -> None:
+    found = ranking("bench", Family(about="a bench"), [row("feedforward/default", 4.0, failed=3)], 0)
+    assert "run none of these" in answer({"bench": found}, [], [])[0]
+
+
+@pytest.mark.parametrize(
+    "factor, told", [(0.5, "2 times less error"), (2.0, "2 times more error"), (1.0, "nothing that")]
+)
+def test_a_term_buys_the_ratio_of_the_errors_with_and_without_it(factor: float, told: str) -> None:
+    found = ranked(row("a/tuned", 1.0, 0.0), row("bb/tuned", factor, 0.0, swings=3, failed=1))
+    (value,) = term_values(found, {"a term": ("a/tuned", "bb/tuned"), "another": ("a/tuned", "missing")})
+    sound = ranked(row("a/tuned", 1.0, 0.0), row("bb/tuned", factor, 0.0))
+    (exact,) = term_values(sound, {"a term": ("a/tuned", "bb/tuned")})
+    assert exact.times.value == pytest.approx(1.0 / factor) and exact.told.startswith(told)
+    assert value.swings == (0, 3), "worlds, each once"
+
+
+def test_an_order_that_stays_and_one_that_turns_round() -> None:
+    before = [row("a/tuned", 1.0), row("bb/tuned", 1.5), row("ccc/tuned", 2.0)]
+    same = order_shift(
+        "the same", before, [row(each.label, 2.0 * f) for each, f in zip(before, (1.0, 1.5, 2.0), strict=True)]
+    )
+    assert (same.tau, same.resolved, same.reversed) == (1.0, 3, 0) and same.ratio == pytest.approx(2.0)
+    turned = order_shift(
+        "turned", before, [row(each.label, f) for each, f in zip(before, (2.0, 1.5, 1.0), strict=True)]
+    )
+    assert (turned.tau, turned.resolved, turned.reversed) == (-1.0, 3, 3)
+    assert turned.best == ("a/tuned", "ccc/tuned")
+    tied = order_shift("tied", before, [row(each.label, 1.0, 0.5) for each in before])
+    assert tied.resolved == 0 and tied.reversed == 0
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=9))
+def test_what_is_undominated_is_beaten_by_nobody_in_all(costs: list[tuple[int, int]]) -> None:
+    found = undominated(np.array(costs, float))
+    for own, each in zip(found, costs, strict=True):
+        beaten = any(a <= each[0] and b <= each[1] and (a, b) != each for a, b in costs)
+        assert own == (not beaten)
+
+
+def test_what_has_no_cost_is_not_on_the_front() -> None:
+    costs: Array = np.array([[1.0, np.nan], [2.0, 2.0]])
+    assert undominated(costs).tolist() == [False, True]

@@ -1,0 +1,113 @@
+"""Closed loops that differ in any of their numbers, run beside each other as lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
+from wristctl.control.table import controller, gains_of
+from wristctl.seeds import Entropy
+from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.cases import AT_ONCE, at_once, pieces
+from wristctl.simulation.closed_loop import equilibrium, scenario_of
+from wristctl.simulation.draws import Draws, is_random
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.reference import Motion, motion, toward
+from wristctl.simulation.rollout import rollout, structure
+from wristctl.simulation.worlds import loop_facing, loops_of
+
+
+class SweptLoop(NamedTuple):
+    """A rollout of a study's `simulate` section."""
+
+    law: Controller
+    gains: tuple[float, ...]
+    loop: Loop
+    wrist: WristParameters
+    """As it is known."""
+    motion: Motion
+    stream: Entropy
+    at_rest: bool
+    """Begins in equilibrium, and not straight."""
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What loops that run as lanes of one batch have in common."""
+        return self.law.name, *structure(self.loop), len(self.motion.time), self.at_rest
+
+
+class SweptMetrics(NamedTuple):
+    """Of rollouts, (count,) each."""
+
+    metrics: dict[str, Array]
+    failed: NDArray[np.bool_]
+    until: Array
+    """When each was last within its range [s]."""
+
+
+def swept_loops(study: Study) -> list[SweptLoop]:
+    """The rollouts of the study's `simulate` section, one for each of its repetitions; gains are a preset's or values.
+
+    Each is the very rollout of `simulate`, with its noise and its plant.
+    """
+    chosen, draws = study.simulate, Draws(study.seed)
+    wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction)
+    law = controller(chosen.controller)
+    followed = motion(
+        toward(chosen.reference, chosen.direction), wrist, chosen.horizon, sample_period(loop.control_period)
+    )
+    times = chosen.repetitions if is_random(loop) else 1
+    scenario = scenario_of(chosen.reference, chosen.direction)
+    loops = loops_of(loop, [draws.plant(each) for each in range(times)])
+    at_rest, gains = chosen.start == "equilibrium", gains_of(law, chosen.gains)
+    return [
+        SweptLoop(law, gains, own, wrist, followed, draws.camera(scenario, k), at_rest) for k, own in enumerate(loops)
+    ]
+
+
+def swept_metrics() -> list[str]:
+    """The metrics that are taken of many loops at once."""
+    return [name for name, metric in METRICS.items() if metric.of_totals is not None or name in AT_ONCE]
+
+
+def run_swept(loops: Sequence[SweptLoop], progress: Callable[[float], None] | None = None) -> SweptMetrics:
+    """Run all loops, those that differ in numbers alone side by side."""
+    names, count = swept_metrics(), len(loops)
+    found = SweptMetrics({name: np.empty(count) for name in names}, np.empty(count, bool), np.empty(count))
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for number, each in enumerate(loops):
+        groups.setdefault(each.kind, []).append(number)
+    done = 0
+    for group in groups.values():
+        for own in pieces(group, loops[group[0]].loop, loops[group[0]].motion):
+            _run(loops, own, names, found)
+            done += len(own)
+            if progress is not None:
+                progress(done / count)
+    return found
+
+
+def _run(loops: Sequence[SweptLoop], own: Sequence[int], names: Sequence[str], found: SweptMetrics) -> None:
+    chosen = [loops[each] for each in own]
+    first = chosen[0]
+    motions = list({id(each.motion): each.motion for each in chosen}.values())
+    numbers = {id(each): number for number, each in enumerate(motions)}
+    which = np.array([numbers[id(each.motion)] for each in chosen])
+    start: Start | None = equilibrium(first.loop) if first.at_rest else None
+    outcome = rollout(
+        first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
+        [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
+        record=True,
+    )  # fmt: skip
+    known = outcome.metrics | at_once(names, outcome, motions, which)
+    for name in names:
+        found.metrics[name][own] = known[name]
+    found.failed[own], found.until[own] = outcome.failed, outcome.until

@@ -1,0 +1,218 @@
+"""A command at many values of its settings, in one run directory with one long table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.config.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
+from wristctl.config.wording import Argument
+from wristctl.report.printed_table import Table, number
+from wristctl.studies.inputs import Inputs
+from wristctl.studies.loop_inputs import identified, tuned_gains
+from wristctl.studies.procedure import Procedure
+from wristctl.studies.session import Session
+from wristctl.studies.study_result import StudyResult
+from wristctl.studies.sweep_unit import sweep_units
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.work.fan_out import Poisoned
+
+Found = TypeVar("Found", bound=StudyResult)
+_FIRST = ("rmse", "steady_state", "oscillation", "chattering")
+_SHOWN, _SAID = 20, 4
+"""Rows and metrics that are printed and drawn of a sweep."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Swept(StudyResult):
+    """A command at every point of a sweep."""
+
+    kind = "sweep"
+
+    table: pd.DataFrame
+    poisoned: list[Poisoned]
+
+    def frame(self) -> pd.DataFrame:
+        """A row for each point and repetition: what was set, and every metric."""
+        return self.table
+
+    @property
+    def fault(self) -> UserError | None:
+        """That points were given up."""
+        if not self.poisoned:
+            return None
+        first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
+        what = f"{len(self.poisoned)} of the sweep's points failed: {first.unit.name}: {first.why}"
+        return UserError(what, where, "leave those values out, or mend them", exit_code=3)
+
+
+def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
+    """The procedure, which does what it does at every point where the study has a sweep."""
+
+    def plan(study: Study, inputs: Inputs) -> str:
+        if not study.sweep:
+            return procedure.plan(study, inputs)
+        base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
+        points = points_of(axes)
+        for each in _corners(axes):
+            said = procedure.plan(study_at(base, axes, each), Inputs())
+        return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {said}"
+
+    @wraps(procedure.perform)
+    def perform(session: Session) -> Found | Swept:
+        return _swept(session, procedure.kind) if session.study.sweep else procedure.perform(session)
+
+    found: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True, sweeps=True)
+    return cast(Procedure[Found], found)
+
+
+def _base(study: Study, command: str, inputs: Inputs) -> Study:
+    """The study without its sweep, and with what it takes from earlier runs written into it."""
+    from wristctl.control.table import controller, gains_of
+
+    if "network" in inputs:
+        fix = "leave it out: inverse: exact follows tips without one"
+        raise UserError("a sweep runs without a network", Argument("network"), fix)
+    by_gain = any(".gains." in f".{each}" for each in study.sweep)
+    study, tuned = study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
+    if command in ("simulate", "tune"):
+        study = identified(study, command, inputs)
+    if command == "simulate":
+        law = controller(study.simulate.controller)
+        values = dict(zip(law.gains, gains_of(law, study.simulate.gains, tuned), strict=True))
+        asked: dict[str, Any] = {"tuned": None, "from_identified": None}
+        if study.simulate.gains == "tuned" or by_gain:
+            asked |= {"gains": values}
+        study = study.model_copy(update={"simulate": study.simulate.model_copy(update=asked)})
+    if command == "compare" and tuned:
+        rows = tuple(
+            row.model_copy(update={"gains": dict(tuned[row.controller])}) if row.gains == "tuned" else row
+            for row in study.compare.rows
+        )
+        study = study.model_copy(update={"compare": study.compare.model_copy(update={"rows": rows, "tuned": None})})
+    return study
+
+
+def _corners(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
+    """The first point, and each axis at its every value that may be unlike the others: names, and both ends."""
+    first = tuple(each.values[0] for each in axes)
+    found = [first]
+    for at, axis in enumerate(axes):
+        names = [each for each in axis.values if isinstance(each, str)]
+        numbers = [each for each in axis.values if not isinstance(each, str)]
+        ends = [min(numbers), max(numbers)] if numbers else []
+        found += [(*first[:at], each, *first[at + 1 :]) for each in [*names[:100], *ends]]
+    return found
+
+
+def _swept(session: Session, command: str) -> Swept:
+    import pandas as pd
+
+    from wristctl.report.sweep_figures import over_key
+    from wristctl.studies.fair_units import performed
+    from wristctl.work.worker import Golden
+
+    study, findings = session.study, session.findings
+    base, axes = _base(study, command, session.inputs), axes_of(study, command)
+    points = points_of(axes)
+    units = sweep_units(base, command, axes, points)
+    golden = None if session.executor == "serial" else _golden(base, command)
+    assert golden is None or isinstance(golden, Golden)
+    done = performed(session, f"{command} at {len(points)} points", units, golden)
+    parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
+    for unit, arrays in zip(units, done.arrays, strict=True):
+        if arrays is not None:
+            known_units |= {name[5:]: str(each[0]) for name, each in arrays.items() if name.startswith("unit ")}
+            rows = {name.removeprefix("metric "): each for name, each in arrays.items() if not name.startswith("unit ")}
+            parts.append(pd.DataFrame(rows | {"point": rows["point"] + first}))
+        first += unit.size
+    if not parts:
+        raise UserError("no point of the sweep could be computed", Argument("sweep"), done.poisoned[0].why, exit_code=3)
+    table = pd.concat(parts, ignore_index=True)
+    keys = {axis.key: [points[at][number] for at in table["point"]] for number, axis in enumerate(axes)}
+    table = pd.concat([pd.DataFrame(keys), table], axis=1)
+    metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until"}]
+    findings.table(
+        "data/sweep.csv", table, {axis.key: unit_at(base, axis) for axis in axes} | _units(metrics, known_units)
+    )
+    known = [name for name in metrics if table[name].notna().any()]
+    said = [*(name for name in _FIRST if name in known), *(name for name in known if name not in _FIRST)][:_SAID]
+    _note(session, table, said, known_units)
+    with session.progress("drawing"):
+        for axis in axes:
+            others = [each.key for each in axes if each is not axis]
+            figure_units = {axis.key: unit_at(base, axis)} | _units(said, known_units)
+            findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, said, figure_units)
+    title = _answer(command, table, axes, said, _units(said, known_units))
+    findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
+    heads = [*keys, *(["failed"] if "failed" in table else []), *said]
+    lines = [tuple(each) for each in table[heads].head(_SHOWN).itertuples(index=False)]
+    more = f" The first {_SHOWN} of {len(table)} rows; data/sweep.csv has all." if len(table) > _SHOWN else ""
+    return Swept(study, findings, [Table(title + more, heads, lines)], table, done.poisoned)
+
+
+def _golden(study: Study, command: str) -> Any:
+    """Of the loop of simulate, else of the built-in one: workers show by it that they compute the same."""
+    from wristctl.config.loop import LOOPS
+    from wristctl.simulation.golden import GOLDEN, golden_spec
+    from wristctl.work.worker import Golden
+
+    law, loop = ("feedforward", LOOPS["sampled"])
+    if command == "simulate":
+        law, loop = study.simulate.controller, study.simulate.loop
+    return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist))
+
+
+def _units(metrics: Sequence[str], known: dict[str, str]) -> dict[str, str]:
+    from wristctl.simulation.metrics import METRICS
+
+    of_table = {name: METRICS[name].unit or "1" for name in metrics if name in METRICS}
+    return (
+        {"point": "1", "repetition": "1", "failed": "1", "until": "s"}
+        | of_table
+        | {k: v or "1" for k, v in known.items()}
+    )
+
+
+def _note(session: Session, table: pd.DataFrame, said: Sequence[str], known: dict[str, str]) -> None:
+    """What `runs ls` can choose by."""
+    findings, units = session.findings, _units(said, known)
+    findings.metric("points", int(table["point"].nunique()), meaning="of the sweep")
+    if "failed" in table:
+        findings.metric(
+            "failed", float(table["failed"].mean()), better="lower", n=len(table), meaning="share that left its range"
+        )
+    for name in said:
+        values = table[name].dropna()
+        findings.metric(f"{name}_least", float(values.min()), units[name], "lower", len(values))
+        findings.metric(f"{name}_most", float(values.max()), units[name], "lower", len(values))
+
+
+def _answer(
+    command: str, table: pd.DataFrame, axes: Sequence[SweepAxis], said: Sequence[str], units: dict[str, str]
+) -> str:
+    """Where the first metric is least and most, and how often the wrist fails."""
+    text = f"{command} at {table['point'].nunique()} points"
+    if said:
+        sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
+        unit = "" if units[said[0]] == "1" else f" {units[said[0]]}"
+        least, most = (sound.loc[getattr(sound[said[0]], each)()] for each in ("idxmin", "idxmax"))
+        ends = [
+            f"{number(float(row[said[0]]))}{unit} at {', '.join(f'{a.key} = {_told(row[a.key])}' for a in axes)}"
+            for row in (least, most)
+        ]
+        text += f": {said[0]} is least, {ends[0]}, and most, {ends[1]}"
+    if "failed" in table and table["failed"].any():
+        text += f"; {int(table['failed'].sum())} of {len(table)} rollouts left their range"
+    return f"{text}."
+
+
+def _told(value: Any) -> str:
+    return number(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
