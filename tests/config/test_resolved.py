@@ -82,6 +82,7 @@ def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
         "wrist",
         command.replace("-", "_"),
         {"train": "gen_data", "analyse": "simulate", "tune": "families", "compare": "families"}.get(command),
+        "laws" if command in ("tune", "compare", "simulate", "analyse", "hw-run") else None,
     }
     base = config_hash(Study(), command)
     for path, study in _changed(Study()):

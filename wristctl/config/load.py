@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
+from wristctl.config.foreign import placed
 from wristctl.config.former import leave_out_former
 from wristctl.config.keys import home_of, keys_of, section_keys
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
@@ -34,10 +35,10 @@ def read_study(
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
     for file in files:
-        _merge(data, _read(file), str(file), origins)
+        _merge(data, _whole(_read(file), file), str(file), origins)
     leave_out_former(data, origins)
     for override in overrides:
-        _merge(data, _override(override, command), Setting(override), origins)
+        _merge(data, _whole(_override(override, command), None), Setting(override), origins)
     try:
         return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
@@ -57,6 +58,11 @@ def _read(file: Path) -> Document:
             f"one of {', '.join(keys_of(Study))} at the top",
         )
     return document
+
+
+def _whole(document: Document, file: Path | None) -> Document:
+    """With the code that it names by its whole path, which counts from the file."""
+    return Document(placed(document.data, file), document.lines)
 
 
 def _override(text: str, command: str | None) -> Document:

@@ -27,6 +27,11 @@ class Study(Section):
         description="families of worlds, by name, that tune and compare draw from",
         json_schema_extra={"unsaid": True},
     )
+    laws: dict[str, dict[str, float]] = Field(
+        {},
+        description="settings of laws from elsewhere that have some, by the law's name",
+        json_schema_extra={"unsaid": True},
+    )
     gen_data: DataSettings = Field(DataSettings(), alias="gen-data")
     train: TrainSettings = TrainSettings()
     tune: TuneSettings = TuneSettings()

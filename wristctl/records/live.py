@@ -61,7 +61,8 @@ class LiveRun:
     def __init__(self, path: Path, manifest: Manifest, page: Page | None = None) -> None:
         self.path, self.id, self._page = path, manifest.id, page
         self._home = path.stat()
-        self._provenance = {name: sha256_of(path / name) for name in _PROVENANCE if (path / name).is_file()}
+        kept = (*_PROVENANCE, *manifest.code.foreign)
+        self._provenance = {name: sha256_of(path / name) for name in kept if (path / name).is_file()}
         self._handed: set[str] = set()
         with (path / RESERVE).open("wb") as file:
             file.write(bytes(_RESERVED))
@@ -160,7 +161,8 @@ class LiveRun:
             write_text(self.path / METRICS, json.dumps(self._metrics, indent=2, allow_nan=False) + "\n")
         manifest = self._manifest
         manifest.state, manifest.exit_code, manifest.error = state, exit_code, error
-        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in _RECORDS]
+        recorded = _RECORDS | set(manifest.code.foreign)
+        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in recorded]
         if state == "ok":
             self._nothing_lost({each.path for each in manifest.outputs})
         manifest.result_sha256 = result_hash(manifest)
