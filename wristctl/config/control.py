@@ -70,9 +70,7 @@ class Objective(OpenSection):
 class TuneSettings(Section):
     """A search for gains: the same budget, optimiser, objective and start for every controller."""
 
-    controllers: tuple[ControllerName, ...] = choice(
-        ("smc",), "controllers to tune (or file.py:NAME)", min_length=1
-    )
+    controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune (or file.py:NAME)", min_length=1)
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser (or file.py:NAME)", "paper")
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
     iterations: int = choice(60, "iterations of each search", "assumed", ge=1, le=100_000)

@@ -9,6 +9,7 @@ import hashlib
 import os
 import re
 import sys
+import sysconfig
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -104,7 +105,8 @@ def load(reference: str) -> tuple[Any, Foreign]:
         known = _loaded[file] = _imported(file)
     module, files = known
     if not hasattr(module, attribute):
-        names = [name for name in vars(module) if not name.startswith("_")]
+        own = {name: each for name, each in vars(module).items() if not name.startswith("_")}
+        names = [name for name, each in own.items() if not callable(each) and not isinstance(each, ModuleType)]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, _root(file))
 
@@ -182,11 +184,9 @@ def _imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
     root, seen = _root(file), dict[Path, str]()
     agreed = trusted(file, root)
     dotted = ".".join(file.relative_to(root).with_suffix("").parts)
-    name = dotted if "." in dotted else _PREFIX + dotted
-    package = dotted.partition(".")[0] + "."
-    for known, module in list(sys.modules.items()):  # of another law, or of this one before it was changed
-        if isinstance(getattr(module, "__loader__", None), _Source) or f"{known}.".startswith(package):
-            del sys.modules[known]
+    where = hashlib.sha256(str(file).encode()).hexdigest()[:8]  # compiled code that is kept knows it by its name
+    name = dotted if "." in dotted else f"{_PREFIX}{dotted}_{where}"
+    others = _set_aside(root, name.partition(".")[0])
     finder = _Beside(root, name, file, seen, agreed)
     sys.meta_path.insert(0, finder)
     try:
@@ -198,7 +198,24 @@ def _imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
         raise UserError(what, _place(error, seen), "mend it there; --debug shows the traceback") from error
     finally:
         sys.meta_path.remove(finder)
+        sys.modules.update(others)
     return module, seen
+
+
+def _set_aside(root: Path, package: str) -> dict[str, ModuleType]:
+    """Take modules out of the way that have a name of what stands beside a file and were loaded from elsewhere, or
+    before it was changed; of what is installed only the package of which this is a copy. Those to be put back."""
+    names = {each.stem for each in root.iterdir()} - {"wristctl"}
+    installed_at = [sysconfig.get_path(each) for each in ("stdlib", "platstdlib", "purelib", "platlib")]
+    others: dict[str, ModuleType] = {}
+    for known, module in list(sys.modules.items()):
+        top, place = known.partition(".")[0], getattr(module, "__file__", None)
+        there = place and any(Path(place).is_relative_to(each) for each in installed_at)
+        if top == package or (top in names and place and not there):
+            del sys.modules[known]
+            if not isinstance(getattr(module, "__loader__", None), _Source):
+                others[known] = module
+    return others
 
 
 def _place(error: BaseException, seen: Mapping[Path, str]) -> str:

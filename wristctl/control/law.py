@@ -8,7 +8,6 @@ own by name; `memory` is indexed, and the law may write it. What a law may call 
 
 from __future__ import annotations
 
-import inspect
 import keyword
 import re
 from collections.abc import Callable, Mapping
@@ -173,20 +172,30 @@ class _NativeLaw(types.WrapperAddressProtocol):
         """Nothing can have gone wrong in native code."""
 
 
+_TOLD = (
+    (r"(?:bool|truth)\((?:Mask|Lane)Type",
+     "it branches on a value, which differs from rollout to rollout: use where(condition, yes, no)"),
+    (r"Unknown attribute '(\w+)' of type rows\(.*?, \d+, ([\w,]*)\)", "there is no '{0}' among {1}"),
+    (r"No implementation of function Function\((.*?)\) found", "it calls {0}, which compiled code does not have"),
+    (r"No conversion from none to LaneType", "it returns no torque"),
+)  # fmt: skip
+"""What numba says, and what it means."""
+
+
 def _refused(law: Law, error: NumbaError) -> UserError:
     """What a law does that compiled code cannot, in a line, at its own line."""
-    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    text, file = re.sub(r"\x1b\[[0-9;]*m", "", str(error)), law.__code__.co_filename
     lines = [each.strip() for each in text.splitlines() if each.strip()]
     told = [each for each in lines if not each.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
-    file = law.__code__.co_filename
-    at = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
     why = told[0] if told else type(error).__name__
-    if "BranchPruning" in text or ("LaneType" in why and "bool" in text) or ("MaskType" in text and "bool" in text):
-        why = "it branches on a value, which differs from rollout to rollout: use where(condition, yes, no)"
+    known = [(found, words) for pattern, words in _TOLD if (found := re.search(pattern, text))]
+    if known:
+        found, words = known[0]
+        why = words.format(*found.groups())
+    at = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
+    line = at[-1] if at else law.__code__.co_firstlineno
     fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
-    return UserError(
-        f"the law does not compile: {why}", f"{file}:{at[-1] if at else inspect.getsourcelines(law)[1]}", fix
-    )
+    return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
 
 
 def _signature(lanes: int, gains: tuple[str, ...] = ()) -> Any:

@@ -41,6 +41,8 @@ class PlainLaw(types.WrapperAddressProtocol):
         self._now, self._wrist, self._gains = _seen(tuple(now)), wrist, _named(gains)
         self._law: Callable[..., Any] = law() if isinstance(law, type) else law
         self._signals = len(now) + _REFERENCE * self._preview
+        code = getattr(law.__call__ if isinstance(law, type) else law, "__code__", None)
+        self._where = f"{code.co_filename}:{code.co_firstlineno}" if code else name
         self._callback = _CALLBACK(self._call)
 
     def __wrapper_address__(self) -> int:
@@ -79,7 +81,7 @@ class PlainLaw(types.WrapperAddressProtocol):
         value = float(torque)
         if not math.isfinite(value):
             what = f"{self._name} returned {value} at theta = {seen.theta:.4g} rad, rate = {seen.rate:.4g} rad/s"
-            raise UserError(what, "the law", "return a finite torque [N m] whatever it sees")
+            raise UserError(what, self._where, "return a finite torque [N m] whatever it sees")
         return value
 
 

@@ -14,6 +14,7 @@ from wristctl.config.foreign import PLAIN
 from wristctl.config.wrist import WristParameters
 from wristctl.control.design import LawDesign
 from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
+from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.segments import segments
@@ -21,6 +22,11 @@ from wristctl.wrist.segments import segments
 _STATES = 32
 _GUARD = 256
 """Values on both sides of what a law may read or write."""
+_PARTS = ("what it sees", "the wrist", "its gains", "its memory")
+_READ_BEYOND = {
+    "its memory": "reads more memory than the {0.memory} values it declares",
+    "what it sees": "looks further ahead than the {0.preview} periods of its preview",
+}
 
 
 class TriedStates(NamedTuple):
@@ -52,6 +58,26 @@ def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, out: Any, tim
         rows_of(out)[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
 
 
+def call_law(controller: Controller, signals: Array, gains: Array, wide: bool = False, times: int = 1) -> Array:
+    """The torques (S,) at states of what a law sees (S, signals) with gains (S, g), its memory empty before the first.
+
+    Each state stands for so many ticks; `wide` calls it for blocks of lanes. Raises what a plain law raises.
+    """
+    count = len(signals)
+    groups = [np.arange(count)] if wide else [np.array([each]) for each in range(count)]
+    found, law = np.empty(count), controller.compiled(count if wide else 1)
+    for own in groups:
+        wrists = np.tile(segments(WristParameters(), 1), (len(own), 1))
+        kept, out = np.zeros((len(own), controller.memory + 1)), np.zeros((len(own), 1))
+        rows = (signals[own], wrists, np.pad(gains[own], ((0, 0), (0, 1))), kept, out)
+        seen, known, given, memory, answers = (to_blocks(each) for each in rows)
+        for block in range(len(seen)):
+            _call(law, seen[block], known[block], given[block], memory[block], answers[block], times)
+        found[own] = to_rows(answers, len(own))[:, 0]
+    law.check()
+    return found
+
+
 def vet(controller: Controller, where: str) -> TriedStates:
     """Call a law on random states with the gains of each preset.
 
@@ -65,10 +91,12 @@ def vet(controller: Controller, where: str) -> TriedStates:
     gains = np.array([[*rows[each % len(rows)]] for each in range(_STATES)]).reshape(_STATES, -1)
     signals = np.array([_state(rng, controller.preview) for _ in range(_STATES)])
     for seen, own in zip(signals, gains, strict=True):
-        first, left = _guarded(controller, law, (seen, wrist, own), 0.0, where)
-        again, also = _guarded(controller, law, (seen, wrist, own), np.nan, where)
-        if not (_same(first, again) and _same(left, also)):
-            raise _beyond(controller, "reads", where)
+        first, left = _guarded(controller, law, (seen, wrist, own), "", where)
+        for beside, fault in _READ_BEYOND.items():
+            again, also = _guarded(controller, law, (seen, wrist, own), beside, where)
+            if not (_same(first, again) and _same(left, also)):
+                fix = "declare them: memory=... and preview=... of its Controller"
+                raise UserError(f"{controller.name} {fault.format(controller)}", where, fix)
         if not np.isfinite(first):
             at = dict(zip(NOW, seen, strict=False))
             what = f"{controller.name} returned {first} at theta = {at['theta']:.3g} rad, rate = {at['rate']:.3g} rad/s"
@@ -93,11 +121,12 @@ def _state(rng: np.random.Generator, preview: int) -> Array:
 
 
 def _guarded(
-    controller: Controller, law: Any, given: tuple[Array, Array, Array], beside: float, where: str
+    controller: Controller, law: Any, given: tuple[Array, Array, Array], unknown: str, where: str
 ) -> tuple[float, Array]:
-    """The torque, and what it leaves in its memory, with `beside` on both sides of all that the law is handed."""
+    """The torque, and what it leaves in its memory; nan stands on both sides of what is `unknown`, else zeros."""
     sizes = [len(each) for each in given] + [controller.memory]
-    blocks = [np.full(size + 2 * _GUARD, beside) for size in sizes]
+    beside = [np.nan if name == unknown else 0.0 for name in _PARTS]
+    blocks = [np.full(size + 2 * _GUARD, value) for size, value in zip(sizes, beside, strict=True)]
     for block, each in zip(blocks, (*given, np.zeros(controller.memory)), strict=True):
         block[_GUARD : _GUARD + len(each)] = each
     before = [block.copy() for block in blocks]
@@ -105,22 +134,16 @@ def _guarded(
     out = np.zeros(1)
     _call(law, now, wrist, gains, memory, out, 1)
     law.check()
-    for name, block, old in zip(("what it sees", "the wrist", "its gains"), blocks, before, strict=False):
+    for name, block, old in zip(_PARTS[:3], blocks, before, strict=False):
         if not _same(block, old):
             what = f"{controller.name} changes {name}, which it is only shown"
             raise UserError(what, where, "write to memory[k] alone, and declare how many: memory=...")
     outside = np.ones(len(blocks[3]), bool)
     outside[_GUARD : _GUARD + controller.memory] = False
     if not _same(blocks[3][outside], before[3][outside]):
-        raise _beyond(controller, "writes", where)
+        what = f"{controller.name} writes more memory than the {controller.memory} values it declares"
+        raise UserError(what, where, "declare them: memory=... of its Controller")
     return float(out[0]), memory.copy()
-
-
-def _beyond(controller: Controller, does: str, where: str) -> UserError:
-    what = f"{controller.name} {does} more memory than the {controller.memory} values it declares"
-    return UserError(
-        what, where, "declare them: memory=... of its Controller; or a shorter look ahead than its preview"
-    )
 
 
 def _allocated(law: Any, given: tuple[Array, Array, Array], memory: int) -> int:
