@@ -92,7 +92,7 @@ def vet(controller: Controller, where: str) -> TriedStates:
     signals = np.array([_state(rng, controller.preview) for _ in range(_STATES)])
     for seen, own in zip(signals, gains, strict=True):
         first, left = _guarded(controller, law, (seen, wrist, own), "", where)
-        for beside, fault in _READ_BEYOND.items():
+        for beside, fault in ({} if controller.plain else _READ_BEYOND).items():  # Python checks, and may remember
             again, also = _guarded(controller, law, (seen, wrist, own), beside, where)
             if not (_same(first, again) and _same(left, also)):
                 fix = "declare them: memory=... and preview=... of its Controller"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any, NamedTuple
 
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, Choices
@@ -11,6 +12,8 @@ from wristctl.config.foreign import PLAIN, Foreign, is_reference
 from wristctl.config.renamed import named_in, renamed
 from wristctl.config.resolved import names_read
 from wristctl.config.study import Study
+
+log = logging.getLogger(__name__)
 
 
 class Adopted(NamedTuple):
@@ -113,5 +116,7 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         raise UserError(what, origin.reference, f'rename this one: name="my-{own}"')
     if table.what == CONTROLLERS.what:
         vet(entry, origin.reference)
+        if entry.plain:
+            log.warning("%s is plain Python: its rollouts run one by one, and its times are Python's", own)
     table.lend(own, entry, origin)
     return own
