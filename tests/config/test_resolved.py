@@ -81,9 +81,11 @@ def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
         "seed",
         "wrist",
         command.replace("-", "_"),
-        {"train": "gen_data", "analyse": "simulate", "simulate": "sweep"}.get(command),
+        {"train": "gen_data", "analyse": "simulate"}.get(command),
+        "laws" if command in ("tune", "compare", "simulate", "analyse", "hw-run", "study") else None,
     }
-    own |= {"tune": {"families", "sweep"}, "compare": {"families", "sweep"}, "study": {"families"}}.get(command, set())
+    drawn, swept = command in ("tune", "compare", "study"), command in ("tune", "compare", "simulate")
+    own |= ({"families"} if drawn else set()) | ({"sweep"} if swept else set())
     base = config_hash(Study(), command)
     for path, study in _changed(Study()):
         assert isinstance(study, Study)

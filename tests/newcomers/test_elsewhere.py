@@ -124,7 +124,8 @@ def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -
     assert "end_frequency: 3  # [1/s] frequency after `duration`" in said
     tuned = elsewhere("tune", "--dry-run", "--set", "objective.jerk=0.5").stdout
     assert "jerk: 0.5  # weight of root mean square of the angle's third derivative" in tuned
-    assert "optimiser: pso  # ask/tell optimiser: pso, differential-evolution, cma-es, random, coordinates" in tuned
+    listed = "pso, differential-evolution, cma-es, random, coordinates"
+    assert f"optimiser: pso  # ask/tell optimiser (or file.py:NAME): {listed}" in tuned
 
 
 def test_the_shell_completes_them(elsewhere: Elsewhere) -> None:

@@ -18,7 +18,7 @@ from wristctl.config.printable import printable
 from wristctl.config.system_errors import error_of_the_system
 from wristctl.interrupt import again, interrupts
 
-_REPRODUCE, _HARDWARE, _RESULTS = "Reproduce the paper", "Hardware", "Results"
+_REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
 
 COMMANDS = {
     "gen-data": (
@@ -43,6 +43,8 @@ COMMANDS = {
     "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."),
     "track": ("wristctl.cli.track", _HARDWARE, "Find the wrist's angle in a recorded video."),
     "export-model": ("wristctl.cli.export_model", _RESULTS, "Write the wrist of a run for MuJoCo or MATLAB."),
+    "new": ("wristctl.cli.new", _OWN, "Write a controller, reference or optimiser of your own to begin from."),
+    "check-law": ("wristctl.cli.check_law", _OWN, "Check a law of your own, and print its certificate."),
     "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
 }
 """Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""

@@ -18,11 +18,13 @@ from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.options import Options, Own, signature
 from wristctl.cli.output import print_job, print_plan, print_result
 from wristctl.cli.progress import PLAIN, listening, progress
+from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
 from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
 from wristctl.config.load import read_study
 from wristctl.config.plausible import check_lengths
+from wristctl.config.trust import asking
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
 
@@ -91,14 +93,21 @@ def _workers(given: dict[str, Any]) -> str:
 def _execute(
     procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
 ) -> None:
+    with asking(partial(asked_to_trust, options.trust_code)):
+        _perform(procedure, options, shortcuts, flags, executor)
+
+
+def _perform(
+    procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
+) -> None:
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)
     if not options.force:
         check_lengths(study, origins)
     with listening(options.quiet, options.verbose) as console:
-        prepared = prepare(procedure, study, options.out)
         try:
+            prepared = prepare(procedure, study, options.out)
             plan = prepared.plan()
         except UserError as error:
             raise located(error, origins) from error

@@ -15,6 +15,9 @@ from wristctl.cli.completion import study_files
 Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")]
+TrustCode = Annotated[
+    bool, typer.Option("--trust-code", help="Let code run that a run carries, and ask nobody: read it first.")
+]
 Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
 
 
@@ -41,6 +44,7 @@ class Options:
         bool,
         typer.Option("--force", help="Go on with lengths hardly meant in metres; hw-run: with gains that may swing."),
     ] = False
+    trust_code: TrustCode = False
     out: Out = Path("results")
     label: Annotated[
         str | None, typer.Option("--label", help="Part of the run's name; by default the study file's.")

@@ -14,12 +14,13 @@ from wristctl.config.study import Study
 from wristctl.records import Run
 from wristctl.records.journal import jsonable
 from wristctl.report.printed_table import Table
+from wristctl.studies.adopted import with_places
 from wristctl.studies.perform import plain_tables
 
 
 def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> None:
     """The resolved study, every leaf with unit and source, and what would be done."""
-    resolved = resolved_yaml(study, kind)
+    resolved = resolved_yaml(with_places(study), kind)
     if as_json:
         shown = {"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan}
         print(json.dumps(shown, indent=2))

@@ -1,9 +1,10 @@
 """Tables of what a study may name: controllers, references, disturbances, metrics, optimisers, plants.
 
 Each is a mapping from the name in a study to what it names, which is imported when it is first asked for: here stand
-names and places only. A newcomer in this package is one file and one line here; one from elsewhere puts itself into a
-table, `CONTROLLERS["lqr"] = LQR`. The configuration's choices, errors, completion and the page of choices
-(docs/choices.md) come from these tables.
+names and places only. A newcomer in this package is one file and one line here; one from elsewhere is named by its
+place, `path/to/file.py:NAME`, by the name of an entry point of an installed package, or puts itself into a table,
+`CONTROLLERS["lqr"] = LQR`. The configuration's choices, errors, completion and the page of choices (docs/choices.md)
+come from these tables.
 """
 
 from __future__ import annotations
@@ -12,20 +13,30 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
+from wristctl.config import foreign
+from wristctl.config.entry_points import entry_point, entry_point_names
 from wristctl.config.errors import UserError, meant
+from wristctl.config.foreign import Foreign, is_reference
 
 T = TypeVar("T")
 
 
 class Choices(MutableMapping[str, T], Generic[T]):
-    """Entries by name; those given as "module:attribute" are imported when asked for. Names are cheap to list."""
+    """Entries by name; those given as "module:attribute" are imported when asked for. Names are cheap to list.
 
-    def __init__(self, what: str, entries: Mapping[str, str]) -> None:
-        self.what = what
-        """What an entry is, in a word."""
+    With a `group`, entry points of that group are entries too, and so is every file.py:NAME: each is loaded when it is
+    asked for, and never listed.
+    """
+
+    def __init__(self, what: str, entries: Mapping[str, str], group: str = "") -> None:
+        self.what, self.group = what, group
+        """What an entry is, in a word, and the group of its entry points."""
         self._entries: dict[str, Any] = dict(entries)
+        self._origins: dict[str, Foreign] = {}
 
     def __getitem__(self, name: str) -> T:
+        if name not in self._entries and self.group and name in self:
+            return self.loaded(name)[0]
         entry = self._entries[name]
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
@@ -38,9 +49,12 @@ class Choices(MutableMapping[str, T], Generic[T]):
 
     def __delitem__(self, name: str) -> None:
         del self._entries[name]
+        self._origins.pop(name, None)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._entries
+        if name in self._entries or not self.group or not isinstance(name, str):
+            return name in self._entries
+        return is_reference(name) or name in entry_point_names(self.group)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._entries)
@@ -51,8 +65,28 @@ class Choices(MutableMapping[str, T], Generic[T]):
     def named(self, name: str) -> T:
         """The entry of this name; UserError with the nearest name if there is none."""
         if name not in self:
-            raise UserError(f"unknown {self.what} '{name}'", self.what, meant(name, self))
+            raise UserError(f"unknown {self.what} '{name}'", self.what, meant(name, self.known()))
         return self[name]
+
+    def known(self) -> list[str]:
+        """Every name, those of entry points too."""
+        return [*self, *(entry_point_names(self.group) if self.group else ())]
+
+    def loaded(self, name: str) -> tuple[T, Foreign]:
+        """The object of a file.py:NAME or of an entry point, and where it is from."""
+        return foreign.load(name) if is_reference(name) else entry_point(self.group, name)
+
+    def lend(self, name: str, entry: T, origin: Foreign) -> None:
+        """Know what is from elsewhere by its own name, until another is lent under it."""
+        self._entries[name], self._origins[name] = entry, origin
+
+    def origin(self, name: str) -> Foreign | None:
+        """Where an entry is from; None of those that belong here."""
+        return self._origins.get(name)
+
+    def belongs(self, name: str) -> bool:
+        """Whether a name is of the table itself, and not lent."""
+        return name in self._entries and name not in self._origins
 
 
 CONTROLLERS: Choices[Any] = Choices(
@@ -78,6 +112,7 @@ CONTROLLERS: Choices[Any] = Choices(
         "pid-dob": "wristctl.control.pid_dob:PID_DOB",
         "smc-dob": "wristctl.control.smc_dob:SMC_DOB",
     },
+    "wristctl.controllers",
 )
 """Of `wristctl.control.law.Controller`."""
 
@@ -106,6 +141,7 @@ REFERENCES: Choices[Any] = Choices(
         "adl:all-flexion": "wristctl.simulation.daily_living:ALL_FLEXION",
         "adl:all-deviation": "wristctl.simulation.daily_living:ALL_DEVIATION",
     },
+    "wristctl.references",
 )
 """Of `wristctl.simulation.reference.ReferenceKind`."""
 
@@ -157,6 +193,7 @@ OPTIMISERS: Choices[Any] = Choices(
         "cma-es": "wristctl.tuning.optimisers.cma_es:CMAES",
         "random": "wristctl.tuning.optimisers.random_search:RandomSearch",
     },
+    "wristctl.optimisers",
 )
 """Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
 

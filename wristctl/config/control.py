@@ -21,7 +21,7 @@ _REPETITIONS = "repetitions, each with noise and drawn plants of its own, the sa
 class Row(Section):
     """One controller with one set of gains."""
 
-    controller: ControllerName = choice("smc", "name in the table of controllers")
+    controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
     gains: GainsChoice = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
 
     @property
@@ -72,8 +72,8 @@ class Objective(OpenSection):
 class TuneSettings(Section):
     """A search for gains: the same budget, optimiser, objective and start for every controller."""
 
-    controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune", min_length=1)
-    optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser", "paper")
+    controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune (or file.py:NAME)", min_length=1)
+    optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser (or file.py:NAME)", "paper")
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
     iterations: int = choice(60, "iterations of each search", "assumed", ge=1, le=100_000)
     restarts: int = choice(1, "searches, the first from a preset, the others from the middle of the box", ge=1, le=100)
@@ -135,7 +135,7 @@ class CompareSettings(Section):
 class SimulateSettings(Section):
     """One closed loop."""
 
-    controller: ControllerName = choice("smc", "name in the table of controllers")
+    controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
     gains: GainsChoice = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()

@@ -64,7 +64,7 @@ def choices_of(field: FieldInfo) -> Sequence[str]:
     """The names that a leaf may have, where they are few and known: those of a table, or of a Literal."""
     tables = [each.table for each in field.metadata if isinstance(each, OneOf)]
     if tables:
-        return tuple(tables[0])
+        return tuple(name for name in tables[0] if tables[0].belongs(name))
     return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
 
 

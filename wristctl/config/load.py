@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
+from wristctl.config.foreign import placed
 from wristctl.config.former import leave_out_former
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.keys import field_at, home_of, keys_of, section_keys
@@ -41,7 +42,7 @@ def read_study(
         _merge_file(data, file, origins, ())
     leave_out_former(data, origins)
     for override in overrides:
-        _merge(data, _override(override, command), Setting(override), origins)
+        _merge(data, _whole(_override(override, command), None), Setting(override), origins)
     try:
         return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
@@ -64,7 +65,7 @@ def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase]
             raise UserError(f"there is no {inner} to include", where, "paths are from the file that includes")
         _merge_file(data, inner, origins, (*outer, file))
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
-    _merge(data, Document(content, lines), str(file), origins)
+    _merge(data, _whole(Document(content, lines), file), str(file), origins)
 
 
 def _read(file: Path) -> Document:
@@ -80,6 +81,11 @@ def _read(file: Path) -> Document:
             f"one of {', '.join(keys_of(Study))} at the top",
         )
     return Document(_found_from(document.data, file.parent), document.lines)
+
+
+def _whole(document: Document, file: Path | None) -> Document:
+    """With the code that it names by its whole path, which counts from the file."""
+    return Document(placed(document.data, file), document.lines)
 
 
 def _override(text: str, command: str | None) -> Document:

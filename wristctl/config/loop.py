@@ -68,7 +68,7 @@ class Reference(OpenSection):
     course of their own: recordings, excitations, motions of daily living.
     """
 
-    kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of it")
+    kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of it (or file.py:NAME)")
     angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
     angles_deg: tuple[float, ...] = quantity((20.0, -10.0, 30.0), "deg", "angles of a multi-step", min_length=1)

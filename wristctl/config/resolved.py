@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import yaml
 
+from wristctl.config.choices import CONTROLLERS
+from wristctl.config.foreign import PLAIN
 from wristctl.config.keys import SUBJECTS, choices_of, keys_of, source_of, unit_of
-from wristctl.config.section import OpenSection, Section
+from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.truth import is_unsaid
@@ -21,32 +23,36 @@ _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 Entry = tuple[str, Any, str]
 
 _SHARED = ("seed", "wrist")
-_SWEPT = ("families", "sweep")
-_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "tune": _SWEPT, "compare": _SWEPT, "simulate": ("sweep",)}
-_READ["study"] = ("families",)
-_READ |= {command: (subject,) for command, subject in SUBJECTS.items()}
+_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": ("laws", "sweep"), "hw-run": ("laws",)}
+_READ |= dict.fromkeys(("tune", "compare"), ("families", "laws", "sweep")) | {"study": ("families", "laws")}
+_READ |= {command: (subject, "laws") for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 
 def sections_read(command: str) -> tuple[str, ...]:
     """The sections of a study that a command reads, by their names as attributes."""
-    return tuple(name.replace("-", "_") for name in (command, *_READ.get(command, ())) if name in keys_of(Study))
+    return tuple(name.replace("-", "_") for name in _keys(command) if name in keys_of(Study) and name not in _SHARED)
 
 
 def resolved_yaml(study: Study, command: str) -> str:
     """What `command` reads of the study (seed, wrist, sections) as YAML that gives the same study."""
-    entries = [entry for entry in _entries(study) if entry[0] in (*_SHARED, command, *_READ.get(command, ()))]
+    entries = [entry for entry in _entries(study) if entry[0] in _keys(command)]
     return "\n".join(_mapping(entries, "")) + "\n"
 
 
 def config_hash(study: Study, command: str) -> str:
     """SHA-256 of what `command` reads, as canonical JSON."""
-    part = study.model_dump(mode="json", by_alias=True, include=_names(command))
+    part = study.model_dump(mode="json", by_alias=True, include=names_read(command))
     return hashlib.sha256(json.dumps(part, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def _names(command: str) -> set[str]:
-    return {name.replace("-", "_") for name in (*_SHARED, command, *_READ.get(command, ()))}
+def names_read(command: str) -> set[str]:
+    """The fields of a study that a command reads."""
+    return {name.replace("-", "_") for name in _keys(command)}
+
+
+def _keys(command: str) -> Sequence[str]:
+    return (*_SHARED, command, *_READ.get(command, ()))
 
 
 def _entries(section: Section) -> Iterator[Entry]:
@@ -61,8 +67,7 @@ def _entries(section: Section) -> Iterator[Entry]:
         yield key, value, " ".join(part for part in parts if part)
     if isinstance(section, OpenSection):
         for name in section.model_extra or ():
-            added = section.added()[name]
-            yield name, section.value(name), f"[{added.unit}] {added.meaning}" if added.unit else added.meaning
+            yield name, section.value(name), _parameter(section.added()[name])
 
 
 def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
@@ -73,7 +78,7 @@ def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
             yield from _mapping(_entries(value), pad + "  ")
         elif isinstance(value, dict) and value:
             yield f"{pad}{_scalar(key)}:{remark}"
-            yield from _mapping(((name, item, "") for name, item in value.items()), pad + "  ")
+            yield from _mapping(((name, item, _of_a_law(key, name)) for name, item in value.items()), pad + "  ")
         elif isinstance(value, tuple) and any(isinstance(item, Section) for item in value):
             yield f"{pad}{_scalar(key)}:{remark}"
             for item in value:
@@ -82,6 +87,18 @@ def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
                 yield from others
         else:
             yield f"{pad}{_scalar(key)}: {_flow(value)}{remark}"
+
+
+def _of_a_law(law: str, setting: str) -> str:
+    """Unit and meaning of a setting of a law from elsewhere, which has been loaded by now; empty of all else."""
+    for name in (law, law + PLAIN):
+        if CONTROLLERS.origin(name) is not None and setting in CONTROLLERS[name].settings:
+            return _parameter(CONTROLLERS[name].settings[setting])
+    return ""
+
+
+def _parameter(added: Parameter) -> str:
+    return f"[{added.unit}] {added.meaning}" if added.unit else added.meaning
 
 
 def _flow(value: Any) -> str:

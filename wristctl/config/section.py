@@ -11,6 +11,7 @@ from pydantic.config import JsonDict
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from wristctl.config.choices import Choices
+from wristctl.config.foreign import is_reference, split
 
 
 class Section(BaseModel):
@@ -41,8 +42,15 @@ class OneOf:
         return core_schema.no_info_after_validator_function(self._known, handler(source))
 
     def _known(self, name: str) -> str:
-        if name not in self.table:
-            *others, last = (f"'{each}'" for each in self.table)
+        if self.table.group and is_reference(name):
+            file, _ = split(name)
+            if not file.is_file():
+                raise PydanticCustomError("added_value", "no file {file}", {"file": str(file)})
+        elif self.table.group and name.endswith(".py"):
+            told = {"file": name, "what": self.table.what}
+            raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", told)
+        elif name not in self.table:
+            *others, last = (f"'{each}'" for each in self.table.known())
             expected = f"{', '.join(others)} or {last}" if others else last
             raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
         return name

@@ -31,6 +31,11 @@ class Study(Section):
     sweep: tuple[str, ...] = Field(
         (), description="leaves at many values, as KEY=1,2,3 or KEY=0..3:20", json_schema_extra={"unsaid": True}
     )
+    laws: dict[str, dict[str, float]] = Field(
+        {},
+        description="settings of laws from elsewhere that have some, by the law's name",
+        json_schema_extra={"unsaid": True},
+    )
     gen_data: DataSettings = Field(DataSettings(), alias="gen-data")
     train: TrainSettings = TrainSettings()
     tune: TuneSettings = TuneSettings()

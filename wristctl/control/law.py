@@ -9,6 +9,7 @@ own by name; `memory` is indexed, and the law may write it. What a law may call 
 from __future__ import annotations
 
 import keyword
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -17,9 +18,15 @@ from typing import Any, NamedTuple
 
 import numba
 from numba.core import types
+from numba.core.errors import NumbaError
 
+from wristctl.config.errors import UserError
+from wristctl.config.foreign import PLAIN
+from wristctl.config.section import Parameter
+from wristctl.control.plain_law import PlainLaw
 from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import caching, compiled
+from wristctl.lanes.frozen_values import frozen_values
 from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
@@ -90,6 +97,9 @@ class Controller:
     the control periods ahead whose reference it looks at.
 
     The law reads a gain by its name, `gains.Kp`; where that is a Python word, such as lambda, by `gains.lambda_`.
+
+    A `plain` law is Python that does not compile (docs/your-own-controller.md): a function of the same four, or a class
+    of which every rollout and trial makes one for itself. Its name ends in (py), in every table.
     """
 
     name: str
@@ -106,9 +116,17 @@ class Controller:
     """Of the presets that are made for motors, tendons and a camera too; the others are for tensions as commanded."""
     surface: Surface | None = None
     """Of the sliding laws, for where their rate is that of the error."""
+    plain: bool = False
+    settings: Mapping[str, Parameter] = field(default_factory=dict)
+    """What it was made from (`wristctl.control.design`): its own section of a study."""
 
     def __post_init__(self) -> None:
-        """ValueError for a preset that does not give every gain and no other, and for conditions of none."""
+        """ValueError for a preset that does not give every gain and no other, for conditions of none, and for a name
+        that cannot be a file's."""
+        if not re.fullmatch(r"[A-Za-z0-9][\w.+-]*", self.name.removesuffix(PLAIN)):
+            raise ValueError(f"{self.name!r} is no name for a controller: letters, digits, dots and dashes")
+        if self.plain and not self.name.endswith(PLAIN):
+            object.__setattr__(self, "name", f"{self.name}{PLAIN}")
         if unknown := set(self.conditions) - set(self.presets):
             raise ValueError(f"{self.name} has conditions for {', '.join(unknown)}, and no such preset")
         for preset, given in self.presets.items():
@@ -120,8 +138,13 @@ class Controller:
         return tuple(float(gains[name]) for name in self.gains)
 
     def compiled(self, count: int = 1) -> Any:
-        """The law as native code that every kernel of as many rollouts can call."""
+        """The law as what every kernel of as many rollouts can call: native code, or a way out to plain Python.
+
+        Raises UserError where it does not compile.
+        """
         names = tuple(f"{name}_" if keyword.iskeyword(name) else name for name in self.gains)
+        if self.plain:
+            return PlainLaw(self.name, self.law, (NOW, Segments, names), (self.preview, self.memory), _signature(1))
         return _native(self.law, width(count), names)
 
 
@@ -130,8 +153,12 @@ class _NativeLaw(types.WrapperAddressProtocol):
 
     def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
         self._lanes = lanes
-        with caching(Path(law.__code__.co_filename)) as cached:
-            self._code = numba.cfunc(_signature(lanes, names), cache=cached)(law)
+        frozen, others = frozen_values(law)
+        with caching(Path(law.__code__.co_filename), *others, frozen=frozen) as cached:
+            try:
+                self._code = numba.cfunc(_signature(lanes, names), cache=cached)(law)
+            except NumbaError as error:
+                raise _refused(law, error) from error
 
     def __wrapper_address__(self) -> int:
         """Where the code is."""
@@ -140,6 +167,35 @@ class _NativeLaw(types.WrapperAddressProtocol):
     def signature(self) -> Any:
         """What kernels call."""
         return _signature(self._lanes)
+
+    def check(self) -> None:
+        """Nothing can have gone wrong in native code."""
+
+
+_TOLD = (
+    (r"(?:bool|truth)\((?:Mask|Lane)Type",
+     "it branches on a value, which differs from rollout to rollout: use where(condition, yes, no)"),
+    (r"Unknown attribute '(\w+)' of type rows\(.*?, \d+, ([\w,]*)\)", "there is no '{0}' among {1}"),
+    (r"No implementation of function Function\((.*?)\) found", "it calls {0}, which compiled code does not have"),
+    (r"No conversion from none to LaneType", "it returns no torque"),
+)  # fmt: skip
+"""What numba says, and what it means."""
+
+
+def _refused(law: Law, error: NumbaError) -> UserError:
+    """What a law does that compiled code cannot, in a line, at its own line."""
+    text, file = re.sub(r"\x1b\[[0-9;]*m", "", str(error)), law.__code__.co_filename
+    lines = [each.strip() for each in text.splitlines() if each.strip()]
+    told = [each for each in lines if not each.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
+    why = told[0] if told else type(error).__name__
+    known = [(found, words) for pattern, words in _TOLD if (found := re.search(pattern, text))]
+    if known:
+        found, words = known[0]
+        why = words.format(*found.groups())
+    at = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
+    line = at[-1] if at else law.__code__.co_firstlineno
+    fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
+    return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
 
 
 def _signature(lanes: int, gains: tuple[str, ...] = ()) -> Any:

@@ -8,6 +8,7 @@ from wristctl.config.choices import CONTROLLERS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError, meant
 from wristctl.control.law import Controller
+from wristctl.control.vetting import law_of
 
 CONTROLLERS: Choices[Controller] = _TABLE
 
@@ -16,8 +17,9 @@ TunedGains = Mapping[str, Mapping[str, float]]
 
 
 def controller(name: str) -> Controller:
-    """The controller of this name; UserError with the nearest name if there is none."""
-    return CONTROLLERS.named(name)
+    """The controller of this name, or of this file.py:NAME; UserError with the nearest name if there is none."""
+    entry = CONTROLLERS.named(name)
+    return entry if isinstance(entry, Controller) else law_of(entry, name, {})
 
 
 def gains_of(

@@ -68,11 +68,14 @@ def sources(file: Path) -> list[Path]:
 
 
 @cache
-def cache_folder(file: Path, *others: Path) -> Path | None:
-    """Folder for what is compiled of these source files, or None where none can be written: then nothing is kept."""
+def cache_folder(file: Path, *others: Path, frozen: bytes = b"") -> Path | None:
+    """Folder for what is compiled of these source files, or None where none can be written: then nothing is kept.
+
+    `frozen` stands for what decides it beside them.
+    """
     if not file.is_file():  # typed into a notebook
         return None
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(numba.__version__.encode() + frozen)
     for source in sorted({each for root in (file, *others) for each in sources(root)}):
         digest.update(_read(source)[0])
     try:
@@ -96,12 +99,12 @@ def _kernels() -> Path:
 
 
 @contextmanager
-def caching(file: Path, *others: Path) -> Iterator[bool]:
+def caching(file: Path, *others: Path, frozen: bytes = b"") -> Iterator[bool]:
     """Within the block numba caches what these source files define where it belongs; yields whether it can.
 
     numba takes its folder from a setting of the whole process, when a function is decorated: it is put back at once.
     """
-    folder, before = cache_folder(file, *others), numba.config.CACHE_DIR
+    folder, before = cache_folder(file, *others, frozen=frozen), numba.config.CACHE_DIR
     if folder is not None:
         numba.config.CACHE_DIR = str(folder)
     try:

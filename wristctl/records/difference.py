@@ -64,15 +64,17 @@ def _leaves(value: Any, path: str) -> list[tuple[str, Any]]:
 
 
 def _code(a: Run, b: Run) -> list[Change]:
+    foreign = changes(a.manifest.code.foreign, b.manifest.code.foreign)
+    own = [Change(each.name, _short(each.before), _short(each.after)) for each in foreign]
     if a.manifest.code.tree_sha256 == b.manifest.code.tree_sha256:
-        return []
+        return own
     facts = []
     for run in (a, b):
         code = run.manifest.code
         commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
         facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
     files = changes(*(_listing(run.path / SOURCES, "  ", 1) for run in (a, b)))
-    return [*changes(*facts), *(Change(each.name, _short(each.before), _short(each.after)) for each in files)]
+    return [*own, *changes(*facts), *(Change(each.name, _short(each.before), _short(each.after)) for each in files)]
 
 
 def _environment(a: Run, b: Run) -> list[Change]:

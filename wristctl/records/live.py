@@ -63,8 +63,8 @@ class LiveRun:
     ) -> None:
         self.path, self.id, self._page, self.files = path, manifest.id, page, dict(files or {})
         self._home = path.stat()
-        known = (*_PROVENANCE, *self.files.values())
-        self._provenance = {name: sha256_of(path / name) for name in known if (path / name).is_file()}
+        kept = (*_PROVENANCE, *self.files.values(), *manifest.code.foreign)
+        self._provenance = {name: sha256_of(path / name) for name in kept if (path / name).is_file()}
         self._handed: set[str] = set()
         with (path / RESERVE).open("wb") as file:
             file.write(bytes(_RESERVED))
@@ -163,7 +163,8 @@ class LiveRun:
             write_text(self.path / METRICS, json.dumps(self._metrics, indent=2, allow_nan=False) + "\n")
         manifest = self._manifest
         manifest.state, manifest.exit_code, manifest.error = state, exit_code, error
-        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in _RECORDS]
+        recorded = _RECORDS | set(manifest.code.foreign)
+        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in recorded]
         if state == "ok":
             self._nothing_lost({each.path for each in manifest.outputs})
         manifest.result_sha256 = result_hash(manifest)

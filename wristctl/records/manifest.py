@@ -63,7 +63,10 @@ class Input(ManifestPart):
 
 
 class Code(ManifestPart):
-    """The code that ran: version, state of its checkout (null outside one), hash of the package's files."""
+    """The code that ran: version, state of its checkout (null outside one), hash of the package's files.
+
+    `foreign` are the copies of laws from elsewhere and of what they import, by name in the run, with their hashes.
+    """
 
     version: str
     commit: str | None = None
@@ -71,6 +74,7 @@ class Code(ManifestPart):
     dirty: bool | None = None
     patch_sha256: str | None = None
     tree_sha256: str
+    foreign: dict[str, str] = {}
 
 
 class Environment(ManifestPart):

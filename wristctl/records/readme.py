@@ -46,4 +46,6 @@ def readme(manifest: Manifest, summary: str) -> str:
         f"- code, machine, hashes: `{MANIFEST}`; packages: `{PACKAGES}`"
         + f"; uncommitted changes: `{PATCH}`" * bool(manifest.code.dirty),
     ]
+    if foreign := manifest.code.foreign:
+        lines.append(f"- code from elsewhere, which you should read before you run it: `{'`, `'.join(foreign)}`")
     return "\n".join(lines) + "\n"

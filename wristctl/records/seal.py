@@ -117,6 +117,9 @@ def faults_of_manifest(folder: Path, sums: dict[str, str], manifest: Manifest) -
             found.append((each.path, f"is an output of {MANIFEST}, and not in {SUMS}"))
         elif each.sha256 != sums[each.path]:
             found.append((each.path, f"hash in {SUMS} is not that in {MANIFEST}"))
+    for name, digest in manifest.code.foreign.items():
+        if sums.get(name) != digest:
+            found.append((name, f"hash in {SUMS} is not that in {MANIFEST}"))
     if manifest.result_sha256 != result_hash(manifest):
         found.append((MANIFEST, "result_sha256 is not that of the outputs"))
     return found

@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.foreign import Foreign
 from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
 from wristctl.config.system_errors import error_of_the_system
@@ -22,6 +23,7 @@ from wristctl.interrupt import deferred, interrupts, undisturbed
 from wristctl.records.code import code_state
 from wristctl.records.environment import environment_state
 from wristctl.records.files import replacing, sha256_of, sync, write_text
+from wristctl.records.foreign_code import copy_code
 from wristctl.records.journal import now
 from wristctl.records.live import LiveRun, Page
 from wristctl.records.lock import RunLock
@@ -58,12 +60,14 @@ def start_run(
     argv: Sequence[str] = (),
     inputs: Sequence[InputRun] = (),
     page: Page | None = None,
+    foreign: Sequence[Foreign] = (),
 ) -> Iterator[LiveRun]:
     """A new run directory under `out`, locked while the block runs and sealed at its end.
 
     The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
-    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Raises
-    UserError where the directory cannot be created or the disk is full.
+    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Copies of
+    the code that is `foreign` are part of it. Raises UserError where the directory cannot be created, the disk is full,
+    or such code has changed since it was loaded.
     """
     files = sealed_files(study, kind)
     digest = config_hash(files.study, kind)
@@ -75,7 +79,7 @@ def start_run(
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 lock = RunLock(path)
-            run = _begin(path, kind, files, label, argv, inputs, digest, page)
+            run = _begin(path, kind, files, label, argv, inputs, digest, page, foreign)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
                 if path is not None:
@@ -146,8 +150,10 @@ def _begin(
     inputs: Sequence[InputRun],
     digest: str,
     page: Page | None,
+    foreign: Sequence[Foreign],
 ) -> LiveRun:
     code, patch, sources = code_state()
+    code.foreign = dict(copy_code(path, foreign))
     environment, packages = environment_state()
     write_text(path / CONFIG, resolved_yaml(files.study, kind))
     write_files(path, files.contents)
@@ -192,6 +198,8 @@ def fingerprint(config: str, code: Code, environment: Environment, inputs: Mappi
     machine = [environment.python, environment.machine, environment.cpu, environment.threads, environment.packages]
     if environment.features or environment.settings:  # of version 0.1.0 neither is known
         machine += [environment.features, environment.settings]
+    if code.foreign:
+        machine.append(code.foreign)
     decisive = (config, code.tree_sha256, sorted(inputs.items()), machine)
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
+from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.control.table import controller, gains_of
+from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory
@@ -67,11 +68,25 @@ def repeat(
             law, np.tile(gains, (len(now), 1)), motions, np.tile(which, len(now)), lane_loops, wrist, start, streams,
             record=True, progress=report,
         )  # fmt: skip
+        _refuse_nan(law, outcome, motions[0].time)
         for lane, k in enumerate(k for k in now for _ in range(rows)):
             plant = plant_of(wrist, loops[k].plant)
             row = lane % rows
             found[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
     return [each.repeated(wrist.tension_limit) for each in found]
+
+
+def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
+    """UserError where a law from elsewhere answered nan while the wrist was well: that is no failure of the wrist."""
+    origin = CONTROLLERS.origin(law.name)
+    if origin is None:
+        return
+    for lane in range(len(outcome.failed)):
+        theta, wanted = outcome.column("theta", lane), outcome.column("torque_wanted", lane)
+        at = np.flatnonzero(np.isfinite(theta) & np.isnan(wanted))
+        if len(at):
+            what = f"{law.name} returned nan at {time[at[0]]:.4g} s, theta = {theta[at[0]]:.3g} rad"
+            raise UserError(what, origin.reference, "return a finite torque [N m] whatever it sees")
 
 
 def simulation(

@@ -74,16 +74,24 @@ def rollout(
     controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and
     what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
     ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
-    (count,) are the entropies of the cameras' noise; all meet the same where none is given.
+    (count,) are the entropies of the cameras' noise; all meet the same where none is given. Raises what a plain law
+    has raised; such rollouts run one by one.
     """
     count = len(gains)
     worlds, world = _worlds(loop, wrist, count)
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
     groups = _by_frames(worlds, world, motions[0].horizon)
-    done = [
-        _run(controller, gains[own], motions, *_of(worlds, lanes, own), start, record, threads, progress)
-        for own in groups
-    ]
+    if controller.plain:
+        groups = [np.array([each]) for each in range(count)]
+    done: list[Outcome] = []
+    for own in groups:
+        before = sum(map(len, (each.failed for each in done)))
+
+        def so_far(share: float, before: int = before, size: int = len(own)) -> None:
+            if progress is not None:
+                progress((before + share * size) / count)
+
+        done.append(_run(controller, gains[own], motions, *_of(worlds, lanes, own), start, record, threads, so_far))
     if len(done) == 1:
         return done[0]
     back = np.argsort(np.concatenate(groups), kind="stable")
@@ -147,12 +155,13 @@ def _run(
     start: Start | None,
     record: bool,
     threads: int | None,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None],
 ) -> Outcome:
     loop, count = worlds[0].loop, len(gains)
     model = PLANTS[loop.plant.model]
     done = batch(controller, gains, motions, worlds, lanes, model, start, record)
     _advance(done, kernel_of(run_blocks, model), threads or cores(), progress)
+    done.setup.law.check()
     sums = to_rows(done.state.sums, count)
     goals = to_rows(done.world.goals, count)
     kept = to_rows(done.state.record.reshape(done.blocks, -1, *done.wide), count) if record else None
@@ -162,7 +171,7 @@ def _run(
     return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], samples)
 
 
-def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None] | None) -> None:
+def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None]) -> None:
     """Run all blocks to the end, on so many threads."""
     setup, blocks, samples = done.setup, done.blocks, done.samples
     each = samples * setup.ticks * setup.substeps
@@ -183,14 +192,12 @@ def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: C
     if min(workers, len(pieces)) == 1:
         for begin in pieces:
             run(begin)
-            if progress is not None:
-                progress(sum(ended) / (blocks * samples))
+            progress(sum(ended) / (blocks * samples))
         return
     with ThreadPoolExecutor(workers) as pool:
         try:
             for _ in pool.map(run, pieces):
-                if progress is not None:
-                    progress(sum(ended) / (blocks * samples))
+                progress(sum(ended) / (blocks * samples))
         except BaseException:
             stop.set()
             raise

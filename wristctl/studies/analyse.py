@@ -89,6 +89,9 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_row(chosen, tuned_gains(inputs))
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
+    if law.plain:
+        what = f"{law.name} is plain Python, and only compiled laws can be linearised"
+        raise UserError(what, "simulate.controller", "one that compiles (docs/your-own-controller.md)")
     if settings.over not in ("loop", *law.gains):
         what = f"{law.name} has no gain '{settings.over}' for a root locus"
         raise UserError(what, "analyse.over", meant(settings.over, ["loop", *law.gains]))

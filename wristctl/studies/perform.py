@@ -11,13 +11,16 @@ from pathlib import Path
 from typing import Any, Generic
 
 from wristctl.config.errors import UserError
+from wristctl.config.foreign import Foreign
 from wristctl.config.given_files import renamed
 from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
+from wristctl.records.foreign_code import sealed_references
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import TABLES, Manifest
 from wristctl.records.overview import Overview
 from wristctl.report.printed_table import Table
+from wristctl.studies.adopted import adopted, with_places
 from wristctl.studies.findings import Findings
 from wristctl.studies.given_motions import check_motions
 from wristctl.studies.inputs import Inputs, named_for_good, opened
@@ -28,11 +31,13 @@ from wristctl.studies.study_result import StudyResult
 
 @dataclass(frozen=True)
 class Prepared(Generic[Found]):
-    """A study that can be performed: its inputs are open, and named for good in it."""
+    """A study that can be performed: its inputs are open, and named for good in it, its laws loaded and tried."""
 
     procedure: Procedure[Found]
     study: Study
     inputs: Inputs
+    foreign: tuple[Foreign, ...] = ()
+    """Where those of its laws are from that are not this package's."""
 
     def plan(self) -> str:
         """What would be done. Raises UserError for what can be known before."""
@@ -42,21 +47,25 @@ class Prepared(Generic[Found]):
 def prepare(
     procedure: Procedure[Found], study: Study, out: Path, given: Mapping[str, Any] | None = None
 ) -> Prepared[Found]:
-    """Open the inputs: those `given` by name, else those that the study names, runs in `out`. Raises UserError."""
+    """Open the inputs: those `given` by name, else those that the study names, runs in `out`; load laws from elsewhere.
+
+    Raises UserError.
+    """
     section = procedure.section(study)
     inputs = opened(procedure.kind, section, procedure.needs, given or {}, out)
     if inputs:
         own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=own)
     check_motions(study, procedure.kind)
-    return Prepared(procedure, study, inputs)
+    study, foreign = adopted(study, procedure.kind)
+    return Prepared(procedure, study, inputs, foreign)
 
 
 @contextmanager
 def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str]) -> Iterator[LiveRun]:
     """A run directory in `out` for a prepared study, sealed with a report at the block's end, however it ends."""
-    read = prepared.inputs.recorded()
-    with start_run(prepared.procedure.kind, prepared.study, label, out, argv, read, _page) as run:
+    read, study = prepared.inputs.recorded(), with_places(prepared.study, sealed_references(prepared.foreign))
+    with start_run(prepared.procedure.kind, study, label, out, argv, read, _page, prepared.foreign) as run:
         yield run
 
 

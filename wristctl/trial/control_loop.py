@@ -15,6 +15,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag
+from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
@@ -196,6 +197,8 @@ class ControlLoop:
     def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
             answer = task.faults.answer(self._steering.respond(task.course, k), time)
+        except UserError as error:
+            raise SafetyStop(f"the controller failed: {error.what}", error.where, error.fix) from error
         except Exception as error:
             what = f"the controller failed: {type(error).__name__}: {error}"
             raise SafetyStop(what, fix="run again with --debug for the traceback") from error

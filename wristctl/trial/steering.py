@@ -77,10 +77,12 @@ class Steering:
     def respond(self, course: Array, tick: int = 0) -> Answer:
         """The law's answer, at the present estimate, to a reference (T, 3) of angle, rate and acceleration at its tick.
 
-        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
+        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead. Raises what a plain law
+        has raised.
         """
         control = Controlled(self._law, self._signals, self._model, self._gains, self._memory, self._target)
         _respond(control, self._bounds, self._observer.now, (course, tick, self._preview), self._period, self._found)
+        self._law.check()
         wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
 

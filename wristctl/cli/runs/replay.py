@@ -7,17 +7,22 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from wristctl.cli.child import end_with_parent
-from wristctl.cli.options import Debug, Json, Out
+from wristctl.cli.options import Debug, Json, Out, TrustCode
 from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.cli.say import say
+from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
+from wristctl.config.foreign import check_trust
+from wristctl.config.trust import asking
 from wristctl.records import Run, list_runs, open_run
+from wristctl.records.difference import leaves_of
 from wristctl.records.leftovers import SCRATCH
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import RunLock
@@ -35,6 +40,7 @@ def replay(
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Repeat it with another setting.")
     ] = None,
+    trust_code: TrustCode = False,
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -42,12 +48,17 @@ def replay(
 
     The scratch folder is kept where something differs. A run on real hardware is refused: nothing here moves a motor.
     """
-    run = open_run(ref, out)
+    with asking(partial(asked_to_trust, trust_code)):
+        _replay(open_run(ref, out), override or [], as_json)
+
+
+def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
     if run.kind not in KINDS:  # it becomes a part of a command
         raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
-    if _moved_motors(run) or any(_key(text) == "port" for text in override or []):
+    check_trust(leaves_of(run).values(), run.path / CONFIG)
+    if _moved_motors(run) or any(_key(text) == "port" for text in overrides):
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
         raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
     changed = changed_inputs(run)
@@ -56,7 +67,7 @@ def replay(
     scratch = Path(tempfile.mkdtemp(prefix=SCRATCH))
     lock = RunLock(scratch)  # a sign of life, for `runs gc`
     try:
-        code = _again(run, scratch, override or [])
+        code = _again(run, scratch, overrides)
     except KeyboardInterrupt:
         shutil.rmtree(scratch, ignore_errors=True)
         raise

@@ -1,0 +1,46 @@
+"""A law that is made from settings of its own, which stand in a study with units: weights, horizons, sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from wristctl.config.errors import UserError, meant
+from wristctl.config.foreign import PLAIN
+from wristctl.config.section import Parameter
+from wristctl.control.law import Controller
+
+
+@dataclass(frozen=True)
+class LawDesign:
+    """Makes a controller from the settings that a study gives it in `laws`, `laws: {lqr: {angle_weight: 400}}`.
+
+    What `make` works out before a law runs, as numbers or as functions that it closes over, is part of the compiled
+    law: other settings compile anew.
+    """
+
+    name: str
+    section: Mapping[str, Parameter]
+    """The settings: default, unit and meaning of each."""
+    make: Callable[[Mapping[str, float]], Controller]
+    """A controller of this name, from every setting by name."""
+
+    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+        """Every setting: as given, or as by default."""
+        return {name: float(given.get(name, each.default)) for name, each in self.section.items()}
+
+    def made(self, given: Mapping[str, float]) -> Controller:
+        """The controller for these settings, the others as by default. Raises UserError for what is none of them."""
+        for key in given:
+            if key not in self.section:
+                raise UserError(
+                    f"unknown setting '{key}' of {self.name}", f"laws.{self.name}", meant(key, self.section)
+                )
+        try:
+            controller = self.make(self.values(given))
+        except (ArithmeticError, ValueError, TypeError, KeyError) as error:
+            what = f"{self.name} cannot be made of these settings: {type(error).__name__}: {error}"
+            raise UserError(what, f"laws.{self.name}", "other settings, or mend what makes it") from error
+        if not isinstance(controller, Controller) or controller.name.removesuffix(PLAIN) != self.name:
+            raise UserError(f"{self.name} makes no controller of that name", f"laws.{self.name}", "mend what makes it")
+        return replace(controller, settings=self.section)

@@ -1,0 +1,166 @@
+"""Is a law from elsewhere what a law is? It is tried on a few states before anything relies on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.core.runtime import _nrt_python, rtsys
+
+from wristctl.arrays import Array
+from wristctl.config.errors import UserError
+from wristctl.config.foreign import PLAIN
+from wristctl.config.wrist import WristParameters
+from wristctl.control.design import LawDesign
+from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
+from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.rows import rows_of
+from wristctl.wrist.segments import segments
+
+_STATES = 32
+_GUARD = 256
+"""Values on both sides of what a law may read or write."""
+_PARTS = ("what it sees", "the wrist", "its gains", "its memory")
+_READ_BEYOND = {
+    "its memory": "reads more memory than the {0.memory} values it declares",
+    "what it sees": "looks further ahead than the {0.preview} periods of its preview",
+}
+
+
+class TriedStates(NamedTuple):
+    """What a law saw (S, signals), the gains that it had (S, g), and its torques (S,)."""
+
+    signals: Array
+    gains: Array
+    torques: Array
+
+
+def law_of(entry: Any, where: str, settings: Mapping[str, Mapping[str, float]]) -> Controller:
+    """The controller behind what a file or an entry point has, made of its settings where it has some.
+
+    Raises UserError for what is neither a Controller nor a LawDesign, and for settings of a law that has none.
+    """
+    if isinstance(entry, LawDesign):
+        return entry.made(settings.get(entry.name, {}))
+    if not isinstance(entry, Controller):
+        what = f"{where.rpartition(':')[2]} is a {type(entry).__name__}, and no Controller"
+        raise UserError(what, where, "name the Controller of that file: `wristctl new controller NAME` writes one")
+    if settings.get(entry.name.removesuffix(PLAIN)):
+        raise UserError(f"{entry.name} has no settings", f"laws.{entry.name}", "leave them out, or make it a LawDesign")
+    return entry
+
+
+@kernel
+def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, out: Any, times: int) -> None:
+    for _ in range(times):
+        rows_of(out)[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
+
+
+def call_law(controller: Controller, signals: Array, gains: Array, wide: bool = False, times: int = 1) -> Array:
+    """The torques (S,) at states of what a law sees (S, signals) with gains (S, g), its memory empty before the first.
+
+    Each state stands for so many ticks; `wide` calls it for blocks of lanes. Raises what a plain law raises.
+    """
+    count = len(signals)
+    groups = [np.arange(count)] if wide else [np.array([each]) for each in range(count)]
+    found, law = np.empty(count), controller.compiled(count if wide else 1)
+    for own in groups:
+        wrists = np.tile(segments(WristParameters(), 1), (len(own), 1))
+        kept, out = np.zeros((len(own), controller.memory + 1)), np.zeros((len(own), 1))
+        rows = (signals[own], wrists, np.pad(gains[own], ((0, 0), (0, 1))), kept, out)
+        seen, known, given, memory, answers = (to_blocks(each) for each in rows)
+        for block in range(len(seen)):
+            _call(law, seen[block], known[block], given[block], memory[block], answers[block], times)
+        found[own] = to_rows(answers, len(own))[:, 0]
+    law.check()
+    return found
+
+
+def vet(controller: Controller, where: str) -> TriedStates:
+    """Call a law on random states with the gains of each preset.
+
+    Raises UserError where it does not compile, allocates, changes what it sees, reads or writes more memory than it
+    declares, raises, or returns what is no finite torque.
+    """
+    rng, torques = np.random.default_rng(0), []
+    law, wrist = controller.compiled(), segments(WristParameters(), 1)
+    rows = [controller.values(each) for each in controller.presets.values()]
+    rows = rows or [tuple(np.sqrt(gain.low * gain.high) for gain in controller.gains.values())]
+    gains = np.array([[*rows[each % len(rows)]] for each in range(_STATES)]).reshape(_STATES, -1)
+    signals = np.array([_state(rng, controller.preview) for _ in range(_STATES)])
+    for seen, own in zip(signals, gains, strict=True):
+        first, left = _guarded(controller, law, (seen, wrist, own), "", where)
+        for beside, fault in ({} if controller.plain else _READ_BEYOND).items():  # Python checks, and may remember
+            again, also = _guarded(controller, law, (seen, wrist, own), beside, where)
+            if not (_same(first, again) and _same(left, also)):
+                fix = "declare them: memory=... and preview=... of its Controller"
+                raise UserError(f"{controller.name} {fault.format(controller)}", where, fix)
+        if not np.isfinite(first):
+            at = dict(zip(NOW, seen, strict=False))
+            what = f"{controller.name} returned {first} at theta = {at['theta']:.3g} rad, rate = {at['rate']:.3g} rad/s"
+            raise UserError(what, where, "return a finite torque [N m] at every state and preset")
+        torques.append(first)
+    if not controller.plain and (made := _allocated(law, (signals[0], wrist, gains[0]), controller.memory)):
+        what = f"{controller.name} allocates memory, {made} times a call"
+        raise UserError(what, where, "lanes, tuples and memory[k] in place of arrays: docs/lanes.md")
+    return TriedStates(signals, gains, np.array(torques))
+
+
+def _state(rng: np.random.Generator, preview: int) -> Array:
+    """What a law may see: angles within 50 deg, tendons that can pull either way, a control period of 1 ms."""
+    seen = np.zeros(signals_of(preview))
+    largest = {"theta": 0.9, "rate": 5.0, "theta_ref": 0.9, "rate_ref": 5.0, "acceleration_ref": 50.0, "load": 0.3}
+    for name, most in largest.items():
+        seen[NOW.index(name)] = rng.uniform(-most, most)
+    seen[NOW.index("torque_low")], seen[NOW.index("torque_high")] = -rng.uniform(0.2, 2.0), rng.uniform(0.2, 2.0)
+    seen[NOW.index("period")] = 1e-3
+    seen[len(NOW) :] = rng.uniform(-0.9, 0.9, len(seen) - len(NOW))
+    return seen
+
+
+def _guarded(
+    controller: Controller, law: Any, given: tuple[Array, Array, Array], unknown: str, where: str
+) -> tuple[float, Array]:
+    """The torque, and what it leaves in its memory; nan stands on both sides of what is `unknown`, else zeros."""
+    sizes = [len(each) for each in given] + [controller.memory]
+    beside = [np.nan if name == unknown else 0.0 for name in _PARTS]
+    blocks = [np.full(size + 2 * _GUARD, value) for size, value in zip(sizes, beside, strict=True)]
+    for block, each in zip(blocks, (*given, np.zeros(controller.memory)), strict=True):
+        block[_GUARD : _GUARD + len(each)] = each
+    before = [block.copy() for block in blocks]
+    now, wrist, gains, memory = (b[_GUARD : _GUARD + size] for b, size in zip(blocks, sizes, strict=True))
+    out = np.zeros(1)
+    _call(law, now, wrist, gains, memory, out, 1)
+    law.check()
+    for name, block, old in zip(_PARTS[:3], blocks, before, strict=False):
+        if not _same(block, old):
+            what = f"{controller.name} changes {name}, which it is only shown"
+            raise UserError(what, where, "write to memory[k] alone, and declare how many: memory=...")
+    outside = np.ones(len(blocks[3]), bool)
+    outside[_GUARD : _GUARD + controller.memory] = False
+    if not _same(blocks[3][outside], before[3][outside]):
+        what = f"{controller.name} writes more memory than the {controller.memory} values it declares"
+        raise UserError(what, where, "declare them: memory=... of its Controller")
+    return float(out[0]), memory.copy()
+
+
+def _allocated(law: Any, given: tuple[Array, Array, Array], memory: int) -> int:
+    """How often a call takes memory from the system."""
+    counted = _nrt_python.memsys_stats_enabled()
+    kept, out = np.zeros(memory + 1), np.zeros(1)
+    _nrt_python.memsys_enable_stats()
+    try:
+        counts = [rtsys.get_allocation_stats().alloc]
+        for times in (1, 2):  # handing arrays over takes memory too, and as much each time
+            _call(law, *given, kept, out, times)
+            counts.append(rtsys.get_allocation_stats().alloc)
+        return int(counts[2] - 2 * counts[1] + counts[0])
+    finally:
+        if not counted:
+            _nrt_python.memsys_disable_stats()
+
+
+def _same(a: Any, b: Any) -> bool:
+    return np.array_equal(a, b, equal_nan=True)

@@ -1,0 +1,111 @@
+"""Is a law fit for all that a law is used for? Checks of one, each with what was found."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.comparison.step_cost import step_time
+from wristctl.config.control import Row
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, Controller, signals_of
+from wristctl.control.table import controller
+from wristctl.control.vetting import call_law, vet
+from wristctl.studies.adopted import adopted
+from wristctl.studies.hw_run import HW_RUN
+from wristctl.studies.in_python import carry_out
+
+_BENT, _SETTLED = 0.1, 20
+"""Angle from which a law should bend the wrist back [rad], and ticks in which its memory may come to know of it."""
+
+
+class LawCheck(NamedTuple):
+    """What was asked of a law, whether it is so (None: it was not asked), and what was found."""
+
+    asked: str
+    passed: bool | None
+    found: str
+
+
+def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bool = True) -> Iterator[LawCheck]:
+    """Check a law by its file.py:NAME or its name, made of the settings in `laws` where it has some.
+
+    Raises UserError where it cannot be loaded, or does not even keep to what a law is: see `vetting.vet`.
+    """
+    row = {"controller": name, "gains": "default"}
+    study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(each) for key, each in laws.items()}})
+    known, foreign = adopted(study, "hw-run")
+    law = controller(known.hw_run.rows[0].controller)
+    for origin in foreign:
+        for file, digest in origin.files.items():
+            yield LawCheck("source", None, f"{file.relative_to(origin.root)} sha256 {digest}")
+    tried = vet(law, name)
+    states = f"{len(tried.torques)} random states"
+    yield LawCheck("finite", True, f"torques of {np.ptp(tried.torques):.3g} N m from least to largest, {states}")
+    yield LawCheck("memory", True, f"{law.memory} values, {law.preview} periods of preview, as declared")
+    if law.plain:
+        yield LawCheck("compiles", None, "plain Python: one rollout at a time, and no analyse")
+    else:
+        wide = call_law(law, tried.signals, tried.gains, wide=True)
+        same = bool(np.array_equal(wide, tried.torques))
+        yield LawCheck("compiles", same, f"at widths 1 and 8, with {'the same' if same else 'OTHER'} bits")
+        yield LawCheck("takes and changes", True, "no memory of the system, nothing that it is shown")
+    yield _restoring(law)
+    gains = ", ".join(f"{each} [{gain.unit or '1'}] {gain.low:g} to {gain.high:g}" for each, gain in law.gains.items())
+    yield LawCheck("gains", True, f"{gains or 'none'}; presets {', '.join(law.presets) or 'none'}")
+    cost = step_time(law, tuple(_gains(law)), WristParameters())
+    yield LawCheck("time per tick", None, f"{cost.median:.3g} us, 99 % within {cost.p99:.3g} us, on this machine")
+    yield _on_board(law, known) if on_board else LawCheck("emulated board", None, "not asked")
+
+
+def _gains(law: Controller) -> Array:
+    """Of the last preset, which is for the hardest conditions; the middle of the box where there is none."""
+    presets = list(law.presets.values())
+    middle = {name: float(np.sqrt(gain.low * gain.high)) for name, gain in law.gains.items()}
+    return np.array(law.values(presets[-1] if presets else middle))
+
+
+def _restoring(law: Controller) -> LawCheck:
+    """At rest, bent to either side of a straight reference: does its torque, less what holds the wrist there, bend it
+    back?"""
+    sides = np.array([_BENT, -_BENT])
+    net = _torques(law, _gains(law), theta=sides) - _torques(controller("feedforward"), np.zeros(0), theta_ref=sides)
+    found = f"{net[0]:.3g} and {net[1]:.3g} N m at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there"
+    return LawCheck("bends the wrist back", bool(net[0] < 0.0 < net[1]), found)
+
+
+def _torques(law: Controller, gains: Array, **angles: Array) -> Array:
+    (sides,) = angles.values()
+    signals = np.zeros((len(sides), signals_of(law.preview)))
+    signals[:, NOW.index("torque_low")], signals[:, NOW.index("torque_high")] = -2.0, 2.0
+    signals[:, NOW.index("period")] = 1e-3
+    for name, values in angles.items():
+        signals[:, NOW.index(name)] = values
+    return call_law(law, signals, np.tile(gains, (len(sides), 1)), times=_SETTLED)
+
+
+def _on_board(law: Controller, study: Study) -> LawCheck:
+    """A short trial on the emulated rig, with the gains of the last preset."""
+    gains = dict(zip(law.gains, map(float, _gains(law)), strict=True))
+    preset = list(law.presets)[-1] if law.presets else gains
+    trial = {
+        "rows": (Row(controller=law.name, gains=preset),),
+        "directions": ("ulnar",),
+        "horizon": 1.5,
+        "push": study.hw_run.push.model_copy(update={"force": 0.0}),
+    }
+    own = study.model_copy(update={"hw_run": study.hw_run.model_copy(update=trial)})
+    with tempfile.TemporaryDirectory(prefix="wristctl-check-") as scratch:
+        try:
+            done = carry_out(HW_RUN, own, {}, Path(scratch), "", None)
+        except UserError as error:
+            return LawCheck("emulated board", False, f"gains {preset}: {error.what}")
+    rmse = float(np.rad2deg(done.frame()["rmse"].iloc[0]))
+    return LawCheck("emulated board", True, f"a trial with gains {preset}: RMSE {rmse:.2g} deg")
