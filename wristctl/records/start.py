@@ -57,12 +57,13 @@ def start_run(
     argv: Sequence[str] = (),
     inputs: Sequence[InputRun] = (),
     page: Page | None = None,
+    about: str = "",
 ) -> Iterator[LiveRun]:
     """A new run directory under `out`, locked while the block runs and sealed at its end.
 
     The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
-    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Raises
-    UserError where the directory cannot be created or the disk is full.
+    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run, `about` tells
+    it from others of its kind. Raises UserError where the directory cannot be created or the disk is full.
     """
     digest = config_hash(study, kind)
     path, lock = None, None
@@ -73,7 +74,7 @@ def start_run(
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 lock = RunLock(path)
-            run = _begin(path, kind, study, label, argv, inputs, digest, page)
+            run = _begin(path, kind, study, label, argv, inputs, digest, page, about)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
                 if path is not None:
@@ -144,6 +145,7 @@ def _begin(
     inputs: Sequence[InputRun],
     digest: str,
     page: Page | None,
+    about: str,
 ) -> LiveRun:
     code, patch, sources = code_state()
     environment, packages = environment_state()
@@ -170,6 +172,7 @@ def _begin(
             id=path.name,
             kind=kind,
             label=label,
+            about=about,
             argv=list(argv or sys.argv),
             config_sha256=digest,
             seed=study.seed,
