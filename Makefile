@@ -1,21 +1,24 @@
-# make run: the paper's study in small, from data to the table of controllers. make test: what CI runs.
+# make run: the paper's study in small, from data to which law is best and what of the paper holds. make test: what CI runs.
 
 SHELL := /bin/bash
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 STUDY ?= experiments/quick.yaml
+CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
 	test-rig test-statistics worlds clean venv mutants coverage
 
 run: .venv/run
-	@set -e; \
+	@set -eo pipefail; \
 	step() { echo; echo "== wristctl $$*"; said=$$($(BIN)/wristctl "$$@"); echo "$$said"; made=$${said##*$$'\n'}; }; \
+	last() { echo "== wristctl $$*" >&2; $(BIN)/wristctl "$$@" | sed '/^$$/d'; }; \
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	step compare $(STUDY) --network "$$network" --tuned "$$tuned"; \
-	printf '\nRuns:\n%s\n%s\n%s\n%s\n' "$$data" "$$network" "$$tuned" "$$made"
+	compared=$$(last compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
+	judged=$$(last audit $(CLAIMS)); \
+	printf '\nWhich law is best\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
 
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4

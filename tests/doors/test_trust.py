@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.doors.conftest import ROOT, wristctl
 
 import wristctl as face
+from tests.doors.conftest import ROOT, wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import load
 from wristctl.config.trust import asking

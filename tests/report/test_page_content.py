@@ -14,6 +14,8 @@ import pytest
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
+from wristctl.records.manifest import OVERVIEW
+from wristctl.records.overview import Overview, read_overview
 from wristctl.report.comparison_page import several_page
 from wristctl.report.inline_figure import LARGEST, inline_figure
 from wristctl.report.page import figures, page
@@ -44,26 +46,51 @@ def rows(text: str) -> list[list[str]]:
     return [[re.sub(r"<.*?>", "", cell).strip() for cell in each] for each in cells]
 
 
-def test_of_few_metrics_the_first_six_are_the_headline(tmp_path: Path) -> None:
+def test_a_command_says_which_metrics_head_its_page(tmp_path: Path) -> None:
+    run = made(tmp_path, {f"m_{k}": float(k) for k in range(20)} | {"none": float("nan")})
+    overview = Overview(cards=["m_7", "gone", "none", "m_3"])
+    (run.path / OVERVIEW).write_text(overview.text())
+    assert cards(run) == [("m 7", "7"), ("m 3", "3")], "what is not known is none"
+
+
+def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_path: Path) -> None:
     run = made(tmp_path, {"none": float("nan")} | {f"m_{k}": 12.0 - k for k in range(11)})
-    assert cards(run) == [(f"m {k}", f"{12 - k}") for k in range(6)], "one that is not known is none"
-    twelve = made(tmp_path / "b", {f"m_{k}": float(12 - k) for k in range(12)})
-    assert [name for name, _ in cards(twelve)] == [f"m {k}" for k in range(6)]
-    thirteen = made(tmp_path / "c", {f"m_{k}": float(13 - k) for k in range(13)})
-    assert cards(thirteen)[0] == ("m 12", "1"), "of more the best"
+    assert cards(run) == [(f"m {k}", f"{12 - k}") for k in range(6)]
+    plain = made(tmp_path / "b", {f"m_{k}": float(k) for k in range(20, 0, -1)}, better=None)
+    assert [name for name, _ in cards(plain)] == [f"m {k}" for k in range(20, 14, -1)]
 
 
-@pytest.mark.parametrize(("better", "best"), [("lower", [1, 2, 3, 4, 5, 6]), ("higher", [13, 12, 11, 10, 9, 8])])
-def test_of_many_metrics_the_best_that_are_like_the_first_are_the_headline(
-    tmp_path: Path, better: str, best: list[int]
-) -> None:
-    run = made(tmp_path, {f"m_{k}": float(k) for k in (7, *range(1, 7), *range(8, 14))} | {"other": 0.0}, better=better)
-    assert cards(run) == [(f"m {k}", str(k)) for k in best]
+def test_the_answer_begins_the_page_and_figures_follow_in_reading_order(tmp_path: Path) -> None:
+    run = made(tmp_path, {"rmse": 1.0}, tables=[{"title": "All", "columns": ["a"], "rows": [["b"]]}])
+    folder = run.path / "figures"
+    folder.mkdir()
+    for name in ("alone", "b-late", "a-early", "first"):
+        (folder / f"{name}.svg").write_text(SVG)
+    captions = {"first": "the answer drawn", "b-late": "comes <second>", "a-early": "", "undrawn": "drawn later"}
+    (run.path / OVERVIEW).write_text(Overview(["smc < pid", "holds"], "first", [], captions).text())
+    text = page_of(run)
+    order = [
+        "smc &lt; pid\nholds",
+        "the answer drawn",
+        "All",
+        "comes &lt;second&gt;",
+        "a early",
+        "alone",
+        "drawn later",
+    ]
+    places = [text.index(each) for each in order]
+    assert places == sorted(places) and "<details><summary>All</summary>" in text
+    assert f"wristctl runs report --all-figures {run.id}" in text
+    assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "alone"]
 
 
-def test_of_many_metrics_without_a_direction_the_first_are_the_headline(tmp_path: Path) -> None:
-    run = made(tmp_path, {f"m_{k}": float(k) for k in range(20, 0, -1)}, better=None)
-    assert [name for name, _ in cards(run)] == [f"m {k}" for k in range(20, 14, -1)]
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{", '{"answer": 3, "captions": [1], "cards": {"a": 1}}', '{"answer": [1]}']
+)
+def test_an_overview_that_cannot_be_read_costs_nothing(tmp_path: Path, content: str) -> None:
+    run = made(tmp_path, {"rmse": 1.0})
+    (run.path / OVERVIEW).write_text(content)
+    assert read_overview(run.path) == Overview() and cards(run) == [("rmse", "1")]
 
 
 def test_all_metrics_stand_in_a_table_with_unit_direction_and_meaning(tmp_path: Path) -> None:
@@ -143,7 +170,10 @@ def test_figures_come_by_name_and_a_link_is_no_figure(tmp_path: Path) -> None:
     for name in ("b-c", "a"):
         (run.path / "figures" / f"{name}.svg").write_text(f"<svg >{name}</svg>")
     (run.path / "figures" / "secret.svg").symlink_to("/etc/hostname")
-    assert [(name, shown(url)) for name, url in figures(run)] == [("a", "<svg >a</svg>"), ("b c", "<svg >b-c</svg>")]
+    assert [(caption, shown(url)) for _, caption, url in figures(run)] == [
+        ("a", "<svg >a</svg>"),
+        ("b c", "<svg >b-c</svg>"),
+    ]
 
 
 def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_path: Path) -> None:

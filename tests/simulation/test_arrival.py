@@ -55,6 +55,14 @@ def test_the_papers_exchanged_gains_arrive_sampled_and_not_on_four_segments() ->
     assert four.metrics["saturation"][0] > 0.9 and not four.arrives and four.fate.startswith("DOES NOT ARRIVE")
 
 
+def test_who_stands_still_does_not_arrive_where_a_swing_happens_to_end() -> None:
+    """10 deg (1 - cos) over two whole periods ends where it began."""
+    one = course("smc/x")
+    swing = np.radians(10.0) * (1.0 - np.cos(2.0 * np.pi * one.time))
+    assert not arrives(replace(one, theta=np.zeros(200), theta_ref=swing))
+    assert arrives(replace(one, theta=0.95 * swing, theta_ref=swing))
+
+
 def test_a_reference_rests_or_never_does() -> None:
     one = course("smc/x")
     assert rests(one) and not rests(replace(one, theta_ref=np.sin(one.time)))

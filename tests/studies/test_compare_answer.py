@@ -54,7 +54,7 @@ def test_the_best_stands_first_with_its_interval_and_what_it_buys() -> None:
 
 def test_the_paper_is_answered_by_name() -> None:
     said = " ".join(answer_lines([stands(away=("smc/printed",)), stands("pushed", swings=("pid/printed",))]))
-    assert "smc/printed never arrives in 1 of 2 classes" in said
+    assert "smc/printed does not arrive in 1 of 2 classes" in said
     assert "pid/printed fails or swings in 1 of 2 classes" in said
     assert "the paper's order by RMSE, smc < mrac < pid < gvsc < nc, holds in 0 of 2 classes" in said
     order = dict(
@@ -72,7 +72,7 @@ def test_limit_cycles_failures_and_short_ends_are_named_with_how_often() -> None
     scores[4, :5] = np.inf
     half = replace(one, scores=scores, standing=standing(scores, np.zeros(scores.shape, bool), 1.5, 0))
     lost = " ".join(answer_lines([one]))
-    assert "limit cycle: pid/printed +-2.9 deg; never arrives: smc/printed" in lost
+    assert "limit cycle: pid/printed +-2.9 deg; does not arrive: smc/printed" in lost
     assert "fails: gvsc in 5 of 12" in " ".join(answer_lines([half]))
 
 

@@ -23,7 +23,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
 from wristctl.config.load import read_study
-from wristctl.config.plausible import check_lengths
+from wristctl.config.plausible import check_sizes
 from wristctl.config.trust import asking
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
@@ -77,7 +77,8 @@ def study_command(
     own += [Own("executor", _EXECUTOR, str), Own("slurm", _SLURM, str)] * procedure.in_units
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
-    epilog = "\n\n".join(["Examples:", *examples]) if examples else None
+    shown = [each.replace("[", r"\[") for each in examples]  # a bracket begins rich's markup
+    epilog = "\n\n".join(["Examples:", *shown]) if shown else None
     app.command(procedure.kind, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
 
@@ -104,7 +105,7 @@ def _perform(
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)
     if not options.force:
-        check_lengths(study, origins)
+        check_sizes(study, origins)
     with listening(options.quiet, options.verbose) as console:
         try:
             prepared = prepare(procedure, study, options.out)
@@ -121,8 +122,11 @@ def _perform(
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
                 found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor)
         except KeyboardInterrupt:
-            console.print(f"interrupted; what was found is in {run.path}" if run else "interrupted", **PLAIN)
+            told = f"; what was found is in {run.path}" if run else ""
+            if run and any(each.leaf == "resume" for each in procedure.needs):
+                told += f"; go on: wristctl {procedure.kind} --resume {run.id}"
+            console.print(f"interrupted{told}", **PLAIN)
             raise
-    print_result(run.path, found.tables, options.as_json, found.summary, options.all_)
+    print_result(run.path, found.tables, options.as_json, found.summary, options.all_ or found.remark)
     if found.fault is not None:
         raise found.fault

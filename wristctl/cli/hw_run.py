@@ -12,7 +12,7 @@ app = study_command(
     flags=YES,
     examples=(
         "wristctl hw-run",
-        "wristctl hw-run --set 'directions=\\[ulnar]' --set push.force=0",
+        "wristctl hw-run --set 'directions=[ulnar]' --set push.force=0",
         "wristctl hw-run --dry-run --port /dev/ttyACM0",
         "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
     ),

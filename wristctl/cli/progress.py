@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
+import os
+import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from rich.console import Console
@@ -34,6 +37,14 @@ class Terminal(Console):
     """stderr. What is drawn there live gives way while a person is asked something."""
 
     _live_now: Live | None = None
+
+    def on_broken_pipe(self) -> None:
+        """Whoever read what is shown is gone: nothing more is shown, and what was begun goes on."""
+        self.quiet = True
+        with suppress(OSError, ValueError):
+            devnull = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(devnull, sys.stderr.fileno())
+            os.close(devnull)
 
     def set_live(self, live: Live) -> Any:
         """Something begins to be drawn."""
@@ -95,6 +106,16 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
     bar = Progress(*_columns(), console=console, transient=True, disable=not live)
     task = bar.add_task(what, total=total, figures="", left="")
     last_line = time.monotonic()
+    over, said = threading.Event(), threading.Event()
+
+    def still_at_it() -> None:
+        """Off a terminal what says nothing of its own for long is said to go on."""
+        passed, each = 0.0, max(1.0, _LINE_EVERY)
+        while not over.wait(each):
+            passed += each
+            if not said.is_set():
+                console.print(f"{what} ... {passed:.0f} s", **PLAIN)
+            said.clear()
 
     def show(count: Count) -> None:
         nonlocal last_line
@@ -102,12 +123,18 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
         instant = time.monotonic()
         if lines and instant - last_line >= _LINE_EVERY:
             last_line = instant
+            said.set()
             console.print(", ".join(part for part in (count.line(), count.remaining()) if part), **PLAIN)
 
     if lines and total is None:
         console.print(f"{what} ...", **PLAIN)
-    with counting(event, what, total, unit, show) as done, bar:
-        yield done
+    if lines:
+        threading.Thread(target=still_at_it, daemon=True).start()
+    try:
+        with counting(event, what, total, unit, show) as done, bar:
+            yield done
+    finally:
+        over.set()
 
 
 def _columns() -> tuple[ProgressColumn, ...]:

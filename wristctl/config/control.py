@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import AfterValidator, model_validator
 
 from wristctl.config.choices import CONTROLLERS, METRICS, OPTIMISERS
+from wristctl.config.errors import Unfitting
 from wristctl.config.families import TuningWorlds, Worlds
 from wristctl.config.loop import LOOPS, DirectionName, InverseName, Loop, Loops, Reference, Scenario
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
@@ -69,10 +70,20 @@ class Objective(OpenSection):
         return self
 
 
+def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise Unfitting(f"{twice[0]} is named twice: it would be searched twice", "name each once")
+    return names
+
+
+Controllers = Annotated[tuple[ControllerName, ...], AfterValidator(_each_once)]
+
+
 class TuneSettings(Section):
     """A search for gains: the same budget, optimiser, objective and start for every controller."""
 
-    controllers: tuple[ControllerName, ...] = choice(("smc",), "controllers to tune (or file.py:NAME)", min_length=1)
+    controllers: Controllers = choice(("smc",), "controllers to tune (or file.py:NAME)", min_length=1)
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("pso", "ask/tell optimiser (or file.py:NAME)", "paper")
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
     iterations: int = choice(60, "iterations of each search", "assumed", ge=1, le=100_000)
@@ -136,7 +147,7 @@ class SimulateSettings(Section):
     """One closed loop."""
 
     controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
-    gains: GainsChoice = choice("exchanged", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    gains: GainsChoice = choice("stepper", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
     direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")

@@ -8,6 +8,9 @@ from contextlib import contextmanager
 
 from wristctl.config.wording import Phrase, worded
 
+_TOLD = 30
+"""Choices that an error names."""
+
 
 class UserError(Exception):
     """Something the user can mend: what is wrong, where (file, line, key path), how to fix it.
@@ -67,7 +70,8 @@ def nearest(word: str, choices: Iterable[str]) -> str | None:
 
 
 def meant(word: str, choices: Iterable[str]) -> str:
-    """How to fix an unknown `word`: the nearest choice, else all of them."""
+    """How to fix an unknown `word`: the nearest choice, else all of them, or the first of very many."""
     known = sorted(choices)
     best = nearest(word, known)
-    return f"did you mean {best!r}?" if best else f"one of {', '.join(known)}"
+    more = f" and {len(known) - _TOLD} more" if len(known) > _TOLD else ""
+    return f"did you mean {best!r}?" if best else f"one of {', '.join(known[:_TOLD])}{more}"

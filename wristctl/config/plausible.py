@@ -19,6 +19,23 @@ _TIMES = 20.0
 _BELIEVED = WristParameters.model_fields | Actuator.model_fields
 
 
+_SENSIBLE = {"stiffness": (1e-3, 1e3), "force": (0.0, 1e3), "load": (0.0, 1e3), "tension_limit": (0.1, 1e4)}
+"""Sizes of leaves that are no lengths, beyond which they are asked about; in their units."""
+
+
+def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
+    """UserError for a length, stiffness or force that was given and cannot well be meant."""
+    check_lengths(study, origins)
+    for path, where in origins.items():
+        _, field = field_at(path)
+        low, high = _SENSIBLE.get(str(path[-1]), (0.0, math.inf))
+        value = _at(study, path) if field is not None and unit_of(field) else None
+        if isinstance(value, float | int) and value != 0.0 and not low <= abs(value) <= high:
+            assert field is not None
+            what = f"{value:g} {unit_of(field)} is not between {low:g} and {high:g}"
+            raise UserError(what, (where, f": {'.'.join(map(str, path))}"), "is that meant? go on with --force")
+
+
 def check_lengths(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
     """UserError, with what may have been meant, for a length that was given and is far beyond the default's size."""
     for path, where in origins.items():

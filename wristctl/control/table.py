@@ -43,6 +43,10 @@ def gains_of(
     for name in gains:
         if name not in chosen.gains:
             raise UserError(f"unknown gain '{name}' of {chosen.name}", f"gains.{name}", meant(name, chosen.gains))
+    below = [name for name, value in gains.items() if value < 0.0 <= chosen.gains[name].low]
+    if below:
+        what = f"{gains[below[0]]:g} for {below[0]} of {chosen.name}, which pushes the wrong way"
+        raise UserError(what, f"gains.{below[0]}", "a gain is not negative")
     missing = [name for name in chosen.gains if name not in gains]
     if missing:
         raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", "gains", "give every gain by name")

@@ -6,8 +6,8 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
-from wristctl.config.errors import UserError, meant
-from wristctl.config.wording import OUT, Call
+from wristctl.config.errors import UserError, meant, nearest
+from wristctl.config.wording import OUT, Call, Phrase
 from wristctl.records.index import RESULTS, indexed, run_names
 from wristctl.records.manifest import MANIFEST, command_of
 from wristctl.records.run import NAME_A_RUN, Run
@@ -22,6 +22,8 @@ def list_runs(results: Path = RESULTS) -> list[Run]:
 
 def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     """The run that `ref` names: a path, an id in `results` or its beginning, `latest:<kind>` (that ended ok).
+
+    `latest:<kind>:<label>` is the latest with that label.
 
     Raises UserError where there is none, more than one, or what is there is not a run. A run whose manifest was
     changed after sealing is one still; reading the manifest raises.
@@ -40,8 +42,11 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
         return _readable(runs[path.name].path)
     match [run for run in runs.values() if run.id.startswith(path.name)]:
         case []:
-            fix = meant(path.name, runs) if runs else ("name a path, or the results folder with ", OUT)
-            raise UserError("no such run", f"{ref} in {results}", fix)
+            alike = nearest(path.name, runs)
+            fix: Phrase = f"did you mean {alike!r}?" if alike else NAME_A_RUN
+            raise UserError(
+                "no such run", f"{ref} in {results}", fix if runs else ("name a path, or the results folder with ", OUT)
+            )
         case [one]:
             return _readable(one.path)
         case several:
@@ -76,16 +81,23 @@ def _readable(path: Path) -> Run:
 
 
 def _latest(ref: str, results: Path) -> Run:
-    kind = ref.removeprefix("latest:")
+    kind, _, label = ref.removeprefix("latest:").partition(":")
     entries = indexed(results, renew=False)
     ended = [run for run in entries if run.state == "ok"]
-    latest = max((run for run in ended if run.kind == kind), key=lambda run: run.started, default=None)
+    fitting = [run for run in ended if run.kind == kind and label in ("", run.label)]
+    latest = max(fitting, key=lambda run: run.started, default=None)
     for run in (Run(results / each.id) for each in entries if each.state == "broken"):
         stamp, _, rest = run.id.partition("-")
-        if rest.startswith(f"{kind}-") and run.sealed and (latest is None or stamp >= latest.id.partition("-")[0]):
+        if (
+            rest.startswith(f"{kind}-{label}")
+            and run.sealed
+            and (latest is None or stamp >= latest.id.partition("-")[0])
+        ):
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
     if latest is None:
-        kinds = {run.kind for run in ended}
+        kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
+        if labels:
+            raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
         fix = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     return Run(results / latest.id)

@@ -15,6 +15,7 @@ from typing import Any
 from wristctl.config.errors import UserError
 from wristctl.config.wording import OUT
 from wristctl.records.manifest import MANIFEST, SUMS
+from wristctl.records.overview import read_overview
 from wristctl.records.run import Run
 
 RESULTS = Path("results")
@@ -36,6 +37,9 @@ class IndexEntry:
     metrics: dict[str, float | None] = field(default_factory=dict)
     inputs: list[str] = field(default_factory=list)
     tags: list[str] = field(default_factory=list)
+    about: str = ""
+    chief: str = ""
+    """The metric that heads its page."""
 
     def value(self, name: str) -> Any:
         """A metric, or one of the entry's own fields; None where it has neither."""
@@ -84,7 +88,7 @@ def _remembered(old: list[Any], name: str) -> IndexEntry | None:
     """What the index says of a run, None where that cannot be."""
     try:
         entry = IndexEntry(**old[1])
-        texts = (entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note)
+        texts = (entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note, entry.about, entry.chief)
         lists = [*entry.inputs, *entry.tags, *entry.metrics]
         numbers = [each for each in (entry.wall_s, *entry.metrics.values()) if each is not None]
         fits = all(isinstance(each, str) for each in (*texts, *lists)) and entry.id == name
@@ -103,7 +107,17 @@ def _entry(run: Run) -> IndexEntry:
     note = manifest.error.what if manifest.error else ""
     timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
     return IndexEntry(
-        run.id, manifest.kind, manifest.label, state, timing.started, timing.wall_s, note, metrics, inputs
+        run.id,
+        manifest.kind,
+        manifest.label,
+        state,
+        timing.started,
+        timing.wall_s,
+        note,
+        metrics,
+        inputs,
+        about=manifest.about,
+        chief=next(iter(read_overview(run.path).cards), ""),
     )
 
 

@@ -129,6 +129,8 @@ class Manifest(ManifestPart):
     state: EndState = "running"
     exit_code: int | None = None
     error: Error | None = None
+    about: str = ""
+    """what it was about, in a word: controller/gains, laws; of older runs nothing"""
     argv: list[str]
     config_sha256: str
     seed: int

@@ -61,13 +61,14 @@ def start_run(
     inputs: Sequence[InputRun] = (),
     page: Page | None = None,
     foreign: Sequence[Foreign] = (),
+    about: str = "",
 ) -> Iterator[LiveRun]:
     """A new run directory under `out`, locked while the block runs and sealed at its end.
 
     The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
-    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run. Copies of
-    the code that is `foreign` are part of it. Raises UserError where the directory cannot be created, the disk is full,
-    or such code has changed since it was loaded.
+    exception, which is raised again. What was written is kept. `page` makes report.html of the ended run, `about` tells
+    it from others of its kind; copies of the code that is `foreign` are part of it. Raises UserError where the directory
+    cannot be created, the disk is full, or such code has changed since it was loaded.
     """
     files = sealed_files(study, kind)
     digest = config_hash(files.study, kind)
@@ -79,7 +80,7 @@ def start_run(
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 lock = RunLock(path)
-            run = _begin(path, kind, files, label, argv, inputs, digest, page, foreign)
+            run = _begin(path, kind, files, label, argv, inputs, digest, page, foreign, about)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
                 if path is not None:
@@ -151,6 +152,7 @@ def _begin(
     digest: str,
     page: Page | None,
     foreign: Sequence[Foreign],
+    about: str,
 ) -> LiveRun:
     code, patch, sources = code_state()
     code.foreign = dict(copy_code(path, foreign))
@@ -179,6 +181,7 @@ def _begin(
             id=path.name,
             kind=kind,
             label=label,
+            about=about,
             argv=list(argv or sys.argv),
             config_sha256=digest,
             seed=files.study.seed,

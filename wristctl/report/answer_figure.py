@@ -28,7 +28,7 @@ _MARKS: dict[str, dict[str, Any]] = {
     "best, or tied with it": {"marker": "o", "markersize": 7.0, "markeredgecolor": BLACK},
     "behind it": {"marker": "o", "markersize": 4.5},
     "fails or limit-cycles": {"marker": "x", "color": VERMILLION, "markersize": 6.0, "markeredgewidth": 1.8},
-    "never arrives": {"marker": "v", "color": GREY, "markersize": 5.5},
+    "does not arrive": {"marker": "v", "color": GREY, "markersize": 5.5},
 }
 
 
@@ -68,7 +68,7 @@ def _panel(panel: Axes, each: ClassStanding, labels: Sequence[str]) -> None:
 
 def _kind(each: ClassStanding, row: int) -> str:
     best, behind, lost, away = _MARKS
-    if each.away[row] == each.scores.shape[1]:
+    if each.away[row] > 0.5 * each.scores.shape[1]:
         return away
     group = each.group(row)
     return lost if group is None else best if group == 1 else behind

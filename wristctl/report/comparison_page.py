@@ -6,7 +6,7 @@ from typing import Any
 
 from wristctl.records.difference import difference
 from wristctl.records.run import Run
-from wristctl.report.page import figures, render
+from wristctl.report.page import Figures, figures, render
 
 _TITLES = {
     "config": "Configuration",
@@ -48,10 +48,10 @@ def _differences(runs: list[Run]) -> list[dict[str, Any]]:
     return tables
 
 
-def _pictures(runs: list[Run]) -> list[tuple[str, list[tuple[str, str]]]]:
+def _pictures(runs: list[Run]) -> list[tuple[str, Figures]]:
     """The figures by name, each with one picture per run that has it."""
-    found: dict[str, list[tuple[str, str]]] = {}
+    found: dict[str, Figures] = {}
     for run in runs:
-        for name, picture in figures(run):
-            found.setdefault(name, []).append((run.id, picture))
+        for _, caption, picture in figures(run):
+            found.setdefault(caption, []).append((run.id, run.id, picture))
     return list(found.items())

@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import shlex
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.wording import Call
 from wristctl.records.lineage import ancestry
 from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of
+from wristctl.records.overview import read_overview
 from wristctl.records.run import Run
 from wristctl.report.animation import animation
 from wristctl.report.inline_figure import inline_figure
@@ -24,23 +26,29 @@ from wristctl.report.lineage_picture import lineage_picture
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-_CARDS, _FEW = 6, 12
-"""Headline numbers shown, and how many metrics a run may have for the first ones to be the headline."""
+_CARDS = 6
+"""Headline numbers shown where the command names none."""
 
-Figures = list[tuple[str, str]]
+Figures = list[tuple[str, str, str]]
+"""Name, caption and data URL."""
 
 
 def page(run: Run, manifest: Manifest) -> str:
     """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed."""
+    overview, drawn = read_overview(run.path), figures(run)
+    there = {name for name, *_ in drawn}
     return render(
         "run.html",
         heading=run.id,
         manifest=manifest,
         command=command_of(manifest.kind),
-        headline=_headline(run.metrics),
+        answer=overview.answer,
+        headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
         tables=_tables(run),
-        figures=figures(run),
+        figures=[each for each in drawn if each[0] != overview.figure],
+        first=[each for each in drawn if each[0] == overview.figure],
+        undrawn=[caption or name for name, caption in overview.captions.items() if name not in there],
         animation=animation(run),
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
         provenance=_provenance(manifest),
@@ -68,9 +76,12 @@ def _templates() -> Environment:
 
 
 def figures(run: Run) -> Figures:
-    """Name and data URL of each figure of a run, in alphabetical order."""
-    files = sorted((run.path / "figures").glob("*.svg"))
-    return [(file.stem.replace("-", " "), inline_figure(file)) for file in files if not file.is_symlink()]
+    """Name, caption and data URL of each figure of a run, in reading order where the run has one, then by name."""
+    captions = read_overview(run.path).captions
+    order = {name: at for at, name in enumerate(captions)}
+    files = [file for file in (run.path / "figures").glob("*.svg") if not file.is_symlink()]
+    files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
+    return [(file.stem, captions.get(file.stem) or file.stem.replace("-", " "), inline_figure(file)) for file in files]
 
 
 def _cell(value: Any) -> str:
@@ -83,15 +94,12 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
-def _headline(metrics: dict[str, dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
-    """The first metrics, or of many the best ones of the first one's direction and unit."""
-    known = [(name, each) for name, each in metrics.items() if each["value"] is not None]
-    if len(known) > _FEW:
-        first = known[0][1]
-        alike = [pair for pair in known if (pair[1]["unit"], pair[1]["better"]) == (first["unit"], first["better"])]
-        if first["better"]:
-            known = sorted(alike, key=lambda pair: pair[1]["value"], reverse=first["better"] == "higher")
-    return known[:_CARDS]
+def _headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
+    """The metrics that the command chose; where it chose none, the first that may be better or worse."""
+    known = {name: each for name, each in metrics.items() if each["value"] is not None}
+    chosen = [name for name in cards if name in known]
+    chosen = chosen or [name for name, each in known.items() if each.get("better")] or list(known)
+    return [(name, known[name]) for name in chosen[:_CARDS]]
 
 
 def _metrics(run: Run) -> list[tuple[Any, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wristctl.simulation.trajectory import Trajectory
+from wristctl.simulation.trajectory import Trajectory, rests
 
 SHORT = 0.2
 """Share of the move that may be missing at the end of what arrives."""
@@ -19,9 +19,10 @@ _BOTH_WAYS = 0.2
 def missing(course: Trajectory) -> float:
     """What is missing at the end: mean |theta - theta_ref| over the last 10 % as a share of the largest reference.
 
-    0 where the reference stays at zero; inf where the wrist has failed.
+    Of a reference that never rests over the last half, since it may pass where a wrist stands that does not move. 0
+    where the reference stays at zero; inf where the wrist has failed.
     """
-    late = max(1, len(course.time) // _LATE)
+    late = max(1, len(course.time) // (_LATE if rests(course) else 2))
     asked = float(np.max(np.abs(course.theta_ref)))
     if not np.isfinite(course.theta[-late:]).all():
         return np.inf

@@ -86,7 +86,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     settings, chosen = study.analyse, study.simulate
     with under("simulate"):
-        check_row(chosen, tuned_gains(inputs))
+        check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:

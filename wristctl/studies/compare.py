@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
-from wristctl.studies.compare_answer import answer_lines
+from wristctl.studies.compare_answer import answer_lines, head_with_the_best
 from wristctl.studies.compare_outputs import loop_tables, step_table, units
 from wristctl.studies.compare_pictures import draw
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
     check_inverses,
+    check_reach,
     check_row,
     compared_inverses,
     family_of,
@@ -68,7 +69,7 @@ class Compared(StudyResult):
         return UserError("every row fails or swings in some world", where, "other gains, or milder worlds", exit_code=3)
 
     @property
-    def summary(self) -> list[str]:
+    def answer(self) -> list[str]:
         """Which row is best in each class of conditions, in words."""
         return answer_lines(self.standings)
 
@@ -98,13 +99,15 @@ def plan(study: Study, inputs: Inputs) -> str:
     for number, row in enumerate(settings.rows):
         if row.gains != "tuned" or row.controller not in found_here:
             with under(f"compare.rows.{number}"):
-                check_row(row, tuned_gains(inputs))
+                check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
     if settings.tuning is not None:
         with under("compare.tuning"):
-            searched = f"a search first: {planned_search(settings.tuning, study.families)}\n"
+            searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist)}\n"
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
+    if not settings.worlds.family:
+        check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):
         if settings.worlds.family:
             family = family_of(study.families, settings.worlds, "worlds")
@@ -140,7 +143,9 @@ def compare(session: Session) -> Compared:
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
     if settings.worlds.family:
         ranking, table = ranked(session, study, network, tuned)
-        return Compared(study, findings, [table], [], searches, {}, [of_ranking(ranking)], ranking)
+        stands = of_ranking(ranking)
+        head_with_the_best(findings, [stands])
+        return Compared(study, findings, [table], [], searches, {}, [stands], ranking)
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
     scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
@@ -155,6 +160,7 @@ def compare(session: Session) -> Compared:
         found = spread(result.repeated.metrics["rmse"])
         findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
     standings = class_standings(results, settings, study.wrist)
+    head_with_the_best(findings, standings)
     times = _step_times(session, tuned)
     with session.progress("drawing"):
         draw(findings, study, results, standings)

@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from wristctl.studies.findings import Findings
+
 if TYPE_CHECKING:
     from wristctl.comparison.class_standing import ClassStanding
 
@@ -32,6 +34,19 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
     rooms = [max(2, room // len(found)) + (at < room % len(found)) for at in range(len(found))]
     blocks = [_block(each, names, own) for each, own in zip(found, rooms, strict=True)]
     return [head, *[line for block in blocks for line in block][:room], *end]
+
+
+def head_with_the_best(findings: Findings, found: Sequence[ClassStanding]) -> None:
+    """Let the run's page be headed by the error of the best row of each class."""
+    names: list[str] = []
+    for each in found:
+        if each.standing.groups:
+            best = each.standing.groups[0].rows[0]
+            mean, names = each.means[best], [*names, f"best_{each.name.replace(' ', '_')}"]
+            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
+            meaning = f"RMSE of {each.labels[best]}, the best row there, over {each.cells}"
+            findings.metric(names[-1], mean.value, "rad", "lower", each.scores.shape[1], interval, meaning)
+    findings.headline(*names)
 
 
 def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
@@ -85,7 +100,9 @@ def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
             for row in each.standing.unreliable
             if swings[row].times
         ],
-        "never arrives": [names[each.labels[row]] for row in each.order if each.away[row] == count],
+        "does not arrive": [
+            f"{names[each.labels[row]]}{among(int(each.away[row]))}" for row in each.order if each.away[row]
+        ],
         "no tendon bears it": [
             f"{names[each.labels[row]]} {each.peak[row]:.2g} N" for row in each.order if each.peak[row] > 0.0
         ],
@@ -112,9 +129,9 @@ def _printed(found: Sequence[ClassStanding]) -> list[str]:
     said = []
     for label in dict.fromkeys(label for each in found for label in each.labels if label.endswith(f"/{PRINTED}")):
         own = [(each, each.labels.index(label)) for each in found if label in each.labels]
-        away = sum(each.away[row] == each.scores.shape[1] for each, row in own)
+        away = sum(each.away[row] > 0.5 * each.scores.shape[1] for each, row in own)
         lost = sum(row in each.standing.unreliable for each, row in own)
-        kinds = [f"never arrives in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
+        kinds = [f"does not arrive in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
         said.append(f"{label} {' and '.join(kinds) or 'works in all'} of {len(own)} classes")
     return said
 

@@ -109,6 +109,9 @@ def gen_data(session: Session) -> Generated:
         meaning = "error of the exact inverse 2 atan2(y, x) on these samples"
         findings.metric(f"exact_inverse_{name}", getattr(exact, name), "deg", "lower", count, meaning=meaning)
     rows.append(("error of the exact inverse [deg]", 0.0, exact.max_error_deg))
+    findings.headline(
+        "samples", "theta_min_deg", "theta_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
+    )
     tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
     return Generated(session.study, findings, tables, samples)
 

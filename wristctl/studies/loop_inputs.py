@@ -12,7 +12,7 @@ from wristctl.config.errors import UserError, meant
 from wristctl.config.families import Family, TuningWorlds, Worlds
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
-from wristctl.config.wording import Argument
+from wristctl.config.wording import Argument, Call
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run
 from wristctl.studies.inputs import Inputs
@@ -30,15 +30,32 @@ log = logging.getLogger(__name__)
 NETWORK = "models/network.safetensors"
 
 
-def check_row(row: Row | SimulateSettings, tuned: Gains | None) -> None:
-    """UserError, naming the key, for an unknown controller, preset or gain, or gains that are not among the tuned."""
+def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None = None) -> None:
+    """UserError, naming the key, for an unknown controller, preset or gain, or gains that are not among the tuned.
+
+    `run` is where those are from.
+    """
     from wristctl.control.table import controller, gains_of
 
     law = controller(row.controller)
     if row.gains == "tuned" and law.name not in (tuned or {}):
-        fix = (Argument("tuned"), f", a tune run that tuned {law.name}")
-        raise UserError(f"no tuned gains of {law.name}", "gains", fix)
+        looked = f" in {run.id}, which tuned {', '.join(tuned or ()) or 'nothing'}" if run else ""
+        fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), " --kind tune` shows them")
+        raise UserError(f"no tuned gains of {law.name}{looked}", "gains", fix)
     gains_of(law, row.gains, tuned)
+
+
+def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:
+    """UserError for the first reference that asks for more than the wrist's range."""
+    from wristctl.simulation.reference import motion
+
+    for number, reference in enumerate(references):
+        tips = reference.tip is not None or reference.kind == "tip-path"
+        plain = reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
+        try:
+            motion(plain, wrist, 1.0, 0.1)
+        except UserError as error:
+            raise error.at(f"{where.format(number)}.{error.where.removeprefix('reference.')}") from error
 
 
 def check_inverses(inverses: Iterable[str], network: Inverse | None) -> None:

@@ -28,6 +28,9 @@ from wristctl.studies.procedure import Found, Procedure
 from wristctl.studies.session import Operator, Session, ShowProgress
 from wristctl.studies.study_result import StudyResult
 
+_NAMED = 2
+"""Laws that a listing names."""
+
 
 @dataclass(frozen=True)
 class Prepared(Generic[Found]):
@@ -65,8 +68,20 @@ def prepare(
 def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str]) -> Iterator[LiveRun]:
     """A run directory in `out` for a prepared study, sealed with a report at the block's end, however it ends."""
     read, study = prepared.inputs.recorded(), with_places(prepared.study, sealed_references(prepared.foreign))
-    with start_run(prepared.procedure.kind, study, label, out, argv, read, _page, prepared.foreign) as run:
+    kind, about = prepared.procedure.kind, _about(prepared.procedure.section(prepared.study))
+    with start_run(kind, study, label, out, argv, read, _page, prepared.foreign, about) as run:
         yield run
+
+
+def _about(section: Any) -> str:
+    """What tells a study from others of its kind: its laws with their gains."""
+    rows = [section] if hasattr(section, "controller") else getattr(section, "rows", ())
+    names = [_law(row) for row in rows] or list(getattr(section, "controllers", ()))
+    return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} more" * (len(names) > _NAMED)
+
+
+def _law(row: Any) -> str:
+    return f"{row.controller}/{row.gains if isinstance(row.gains, str) else 'given'}"
 
 
 def perform(

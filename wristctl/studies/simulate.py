@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,15 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_inverses, check_row, identified, inverses_of, network_for, tuned_gains
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    check_reach,
+    check_row,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_gains,
+)
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_if_outside, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
@@ -22,6 +31,7 @@ if TYPE_CHECKING:
 
     from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
+    from wristctl.wrist.kinematics import Inverse
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -33,6 +43,8 @@ class Simulated(StudyResult):
     repeated: Repeated
     """Metrics of every repetition."""
     failed: bool
+    short_of: str = ""
+    """in a line why it does not arrive where it was asked to, and what to try"""
 
     @property
     def fault(self) -> UserError | None:
@@ -42,6 +54,16 @@ class Simulated(StudyResult):
         where = str(self.findings.run.path) if self.findings.run else ""
         fix = "look at the figures; try other gains or a slower move"
         return UserError(f"the wrist {self.repeated.failure}", where, fix, exit_code=3)
+
+    @property
+    def summary(self) -> list[str]:
+        """Why a loop does not arrive, and what does; empty where it does."""
+        return [self.short_of] if self.short_of else []
+
+    @property
+    def remark(self) -> bool:
+        """The metrics are the answer."""
+        return True
 
     @property
     def trajectory(self) -> Trajectory:
@@ -61,7 +83,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.simulation.size import check_size
 
     with under("simulate"):
-        check_row(settings, tuned_gains(inputs))
+        check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
         check_size([settings.loop], settings.horizon)
 
     times = settings.repetitions if is_random(settings.loop) else 1
@@ -110,7 +133,27 @@ def simulate(session: Session) -> Simulated:
         if course.load is not None and course.expected > 0.0:
             findings.figure("observer", consistency, course, heading=world)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
-    return Simulated(session.study, findings, tables, repeated, failed)
+    short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network)
+    return Simulated(session.study, findings, tables, repeated, failed, short_of)
+
+
+def _short_of(session: Session, study: Study, repeated: Repeated, network: Inverse | None) -> str:
+    """Why the loop does not arrive, and which of its law's presets do: they are tried on the very same loop."""
+    from wristctl.control.table import controller
+    from wristctl.simulation.arrival import why_not
+    from wristctl.simulation.closed_loop import simulate as run_simulation
+
+    chosen = study.simulate
+    limit = study.wrist.tension_limit if chosen.loop.limits else math.inf
+    arriving = []
+    with session.progress("trying the law's other gains"):
+        for preset in controller(chosen.controller).presets:
+            other = chosen.model_copy(update={"gains": preset, "repetitions": 1})
+            if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": other}), network).arrives:
+                arriving.append(preset)
+    tune = f"wristctl tune --set controllers=[{chosen.controller}]"
+    fix = f"try --gains {' or '.join(arriving)}" if arriving else f"no preset of the law does here: {tune}"
+    return f"does not arrive: {why_not(repeated.first.trajectory, limit)}; {fix}"
 
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
@@ -120,6 +163,7 @@ def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
     from wristctl.comparison.statistics import spread
     from wristctl.simulation.metrics import METRICS
 
+    findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")
     once, rows = len(repeated.failed) == 1, list[tuple[object, ...]]()
     for name, metric in METRICS.items():
         if once:

@@ -46,8 +46,14 @@ class StudyResult(ABC):
 
     @property
     def summary(self) -> Sequence[str]:
-        """What was found in a few lines of at most 100 columns; empty where the tables are the answer."""
-        return ()
+        """What was found in a few lines of at most 100 columns, as its `answer`; empty where the tables are that."""
+        answer = getattr(self, "answer", ())
+        return answer if isinstance(answer, list) else ()
+
+    @property
+    def remark(self) -> bool:
+        """Whether the summary only introduces the tables, which are printed all the same."""
+        return False
 
     @property
     def metrics(self) -> dict[str, float]:

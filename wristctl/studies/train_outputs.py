@@ -138,6 +138,7 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
         findings.metric(
             f"{_key(name)}_multiply_adds", multiply_adds, better="lower", meaning=f"{name}: of one angle (C13)"
         )
+    findings.headline("rmse_deg", "max_error_deg", "workspace_rmse_deg", "exact_rmse_deg", "polynomial_rmse_deg", "r2")
     if not samples.curvature_is_constant:
         for place in where:
             ratio = rmse["network", place.name] / rmse["exact inverse", place.name]

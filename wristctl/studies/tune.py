@@ -11,11 +11,13 @@ from wristctl.config.errors import UserError, under
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
     check_inverses,
+    check_reach,
     family_of,
     identified,
     inverses_of,
@@ -64,11 +66,12 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.report.truth_table import truth_told
 
     with under("tune"):
-        told = truth_told(identified(study, "tune", inputs).wrist, judged_loops(study, study.tune))
-        return planned_search(study.tune, study.families) + told
+        wrist = identified(study, "tune", inputs).wrist
+        told = truth_told(wrist, judged_loops(study, study.tune))
+        return planned_search(study.tune, study.families, wrist) + told
 
 
-def planned_search(settings: TuneSettings, families: Mapping[str, Family]) -> str:
+def planned_search(settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters) -> str:
     """What a search costs. UserError, naming the key, for a controller or a scenario that it cannot have.
 
     That is an unknown controller, one without gains, a scenario on an unknown loop, or an unknown family.
@@ -90,6 +93,7 @@ def planned_search(settings: TuneSettings, families: Mapping[str, Family]) -> st
         each, horizon = settings.worlds.draws * len(family.references), family.horizon
     else:
         check_loops(settings)
+        check_reach([each.reference for each in settings.scenarios], wrist, "scenarios.{}.reference")
         check_size(settings.loops.values(), settings.horizon)
         loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
         each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
@@ -207,6 +211,7 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
         for gain, value in result.gains.items():
             findings.metric(f"{name}_{gain}", value, unit=gains[gain].unit, better="", meaning=gains[gain].meaning)
         findings.figure(f"gains-{name}", gain_history, result, gains)
+    findings.headline(*(f"{name}_objective" for name in sorted(found, key=lambda name: found[name].objective)))
     findings.figure("convergence", convergence, list(found.values()))
 
 

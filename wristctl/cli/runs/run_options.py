@@ -13,9 +13,15 @@ RESULTS = Path("results")
 
 Ref = Annotated[
     str,
-    typer.Argument(metavar="RUN", help="Path, id, beginning of an id, or latest:KIND.", autocompletion=run_ids),
+    typer.Argument(
+        metavar="RUN", help="Path, id, beginning of an id, latest:KIND or latest:KIND:LABEL.", autocompletion=run_ids
+    ),
 ]
 Refs = Annotated[
     list[str],
-    typer.Argument(metavar="RUN...", help="Paths, ids, beginnings of ids, or latest:KIND.", autocompletion=run_ids),
+    typer.Argument(
+        metavar="RUN...",
+        help="Paths, ids, beginnings of ids, latest:KIND or latest:KIND:LABEL.",
+        autocompletion=run_ids,
+    ),
 ]

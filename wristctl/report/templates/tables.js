@@ -1,4 +1,12 @@
 "use strict";
+// What is typed above a table leaves the rows that contain it.
+for (const typed of document.querySelectorAll(".filter input")) {
+  const body = typed.parentElement.nextElementSibling.querySelector("tbody");
+  typed.addEventListener("input", () => {
+    const wanted = typed.value.toLowerCase();
+    for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
+  });
+}
 // A click on a column's head sorts its table by it; a second one turns the order round.
 for (const button of document.querySelectorAll("table.sortable th button")) {
   button.addEventListener("click", () => {
