@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,10 +46,10 @@ def test_a_loop_is_in_the_class_of_what_is_hardest_about_it(loop: Loop, expected
     assert class_of(loop, WRIST) == expected and expected in CLASSES
 
 
-def compared(label: str, rmse: list[float], loop: str = "a", inverse: str = "none", **how: float) -> list[ComparedRow]:
+def compared(label: str, rmse: list[float], loop: str = "a", inverse: str = "none", **how: Any) -> list[ComparedRow]:
     """A row on as many motions as there are errors."""
-    own = [repeated(label, [each], **how) for each in rmse]
-    return [ComparedRow(loop, f"move {k}", inverse, *label.split("/"), each) for k, each in enumerate(own)]
+    own, (name, gains) = [repeated(label, [each], **how) for each in rmse], label.split("/")
+    return [ComparedRow(loop, f"move {k}", inverse, name, gains, each) for k, each in enumerate(own)]
 
 
 def stand(rows: list[ComparedRow], loops: str = "{a: {}}") -> list[ClassStanding]:

@@ -111,8 +111,8 @@ def test_the_papers_numbers_stand_nowhere_but_where_they_can_be_meant() -> None:
 def test_courses_of_loops_sampled_at_different_rates_share_their_instants() -> None:
     """One at 1 ms, one at 5: of the faster every fifth is kept, of the slower every one."""
     fast, slow = (row("smc", {"rmse": [1.0]}, [False], 1) for _ in range(2))
-    late = replace(slow.simulation.trajectory, time=5e-3 * np.arange(SAMPLES))
-    longer = replace(fast.simulation.trajectory, time=1e-3 * np.arange(SAMPLES))
+    late = replace(slow.simulation.trajectory, time=np.arange(SAMPLES) / 200.0)
+    longer = replace(fast.simulation.trajectory, time=np.arange(SAMPLES) / 1000.0)
     both = [replace(fast, repeated=Repeated.once(replace(fast.simulation, trajectory=longer))),
             replace(slow, repeated=Repeated.once(replace(slow.simulation, trajectory=late)))]  # fmt: skip
     found = series(both)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ def drawn(seed: int, factors: list[float], worlds: int = 40, own: float = 0.1) -
     return np.exp(hardness + np.log(factors)[:, None] + own * rng.standard_normal((len(factors), worlds)))
 
 
-def stand(scores: Array, swings: Array | None = None, **more: float) -> Standing:
+def stand(scores: Array, swings: Array | None = None, **more: Any) -> Standing:
     swinging = np.zeros(scores.shape, bool) if swings is None else swings.astype(bool)
     return standing(scores, swinging, RANGE_DEG, seed=3, **more)
 

@@ -67,8 +67,8 @@ def start_run(
 
     The block's end decides the state: ok; interrupted by KeyboardInterrupt or SIGTERM; failed by any other
     exception, which is raised again. What was written is kept. `page` makes report.html of the ended run, `about` tells
-    it from others of its kind; copies of the code that is `foreign` are part of it. Raises UserError where the directory
-    cannot be created, the disk is full, or such code has changed since it was loaded.
+    it from others of its kind, and copies of `foreign` code are part of it. Raises UserError where the directory cannot
+    be created, the disk is full, or such code has changed since it was loaded.
     """
     files = sealed_files(study, kind)
     digest = config_hash(files.study, kind)
