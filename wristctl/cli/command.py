@@ -78,7 +78,7 @@ def _execute(procedure: Procedure[Any], options: Options, shortcuts: Sequence[st
     if not options.force:
         check_lengths(study, origins)
     with listening(options.quiet, options.verbose) as console:
-        prepared = prepare(procedure, study, options.out)
+        prepared = prepare(procedure, study, options.out, files=files)
         try:
             plan = prepared.plan()
         except UserError as error:

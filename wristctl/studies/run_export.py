@@ -83,7 +83,7 @@ def _number(value: float | None) -> float:
 
 
 def _named(content: Any) -> Any:
-    """Names that MATLAB has: letters, digits and underscores, 63 at most; of two that would be one, the second is _2."""
+    """Names that MATLAB has: letters, digits and underscores, 63 at most; of two that would be one the second is _2."""
     if not isinstance(content, Mapping):
         return content
     found: dict[str, Any] = {}
