@@ -53,8 +53,9 @@ def gen_data(
 ) -> Generated:  # fmt: skip
     """Samples of tip positions [m] and bending angles [rad], by the study's `gen-data` section.
 
-    `run` (simulate or compare) holds the courses to take them from where `source` is `run`. The result has `.samples`;
-    `.frame()` is a row per sample. Raises UserError for a run without courses, or with too few samples.
+    `run` (hw-run, track, simulate or compare) holds the recordings to take them from where `source` is `run`; `csv`
+    takes files. The result has `.samples`; `.frame()` is a row per sample. Raises UserError for a run without courses,
+    a file that is none, or too few samples.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """

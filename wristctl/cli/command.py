@@ -108,7 +108,7 @@ def _perform(
         check_sizes(study, origins)
     with listening(options.quiet, options.verbose) as console:
         try:
-            prepared = prepare(procedure, study, options.out)
+            prepared = prepare(procedure, study, options.out, files=files)
             plan = prepared.plan()
         except UserError as error:
             raise located(error, origins) from error

@@ -17,9 +17,10 @@ from wristctl.records.lock import LOCK, is_locked
 from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, SUMS
 from wristctl.records.remove import REMOVED
 from wristctl.records.run import Run
+from wristctl.records.sealed_files import INPUTS
 from wristctl.records.tags import change_tags, known_tags
 
-_BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK}
+_BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK, INPUTS}
 """All that a run may have written before its manifest."""
 
 SCRATCH = "wristctl-replay-"
@@ -88,7 +89,8 @@ def _began_no_run(folder: Path) -> bool:
     """Whether a folder holds only what a run writes before its manifest: anything else is somebody's."""
     names = {each.name for each in folder.iterdir()}
     begun = {name for name in names if name in _BEGINNING or (name.startswith(".") and name.endswith(PART))}
-    return names == begun and dated(folder.name) != "" and not any(each.is_dir() for each in folder.iterdir())
+    folders = {each.name for each in folder.iterdir() if each.is_dir()}
+    return names == begun and dated(folder.name) != "" and folders <= {INPUTS}
 
 
 def _size(path: Path) -> int:

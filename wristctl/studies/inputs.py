@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument, Call
 from wristctl.records import InputRun, Run, open_run, require
+from wristctl.records.manifest import MANIFEST
 from wristctl.studies.study_result import StudyResult
 
 Given = Run | StudyResult
@@ -73,14 +74,22 @@ class Inputs(Mapping[str, Given]):
         return [InputRun(role, run) for role, run in runs.items()]
 
 
-def opened(kind: str, section: Any, needs: Iterable[EarlierRun], given: Mapping[str, Any], out: Path) -> Inputs:
+def opened(
+    kind: str,
+    section: Any,
+    needs: Iterable[EarlierRun],
+    given: Mapping[str, Any],
+    out: Path,
+    beside: Sequence[Path] = (),
+) -> Inputs:
     """The inputs that a command needs: as `given`, else as its section of a study names them; runs are in `out`.
 
-    Raises UserError for a run that is missing, of another kind, or not as it was sealed.
+    What is not there is looked for `beside`: in the folders of the runs whose configuration the study is. Raises
+    UserError for a run that is missing, of another kind, or not as it was sealed.
     """
     found: dict[str, Given] = {}
     for need in needs:
-        named, several = getattr(section, need.leaf), isinstance(getattr(section, need.leaf), tuple)
+        named, several = _here(getattr(section, need.leaf), out, beside), isinstance(getattr(section, need.leaf), tuple)
         chosen = named if given.get(need.leaf) is None else given[need.leaf]
         if several and chosen:
             each = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else (chosen,)
@@ -102,6 +111,16 @@ def named_for_good(inputs: Inputs, section: Any, out: Path) -> Any:
     for leaf in dict.fromkeys(role.partition("[")[0] for role in names if role.endswith("]")):
         names[leaf] = tuple(names.pop(role) for role in inputs if role.startswith(f"{leaf}["))
     return section.model_copy(update=names)
+
+
+def _here(named: Any, out: Path, beside: Sequence[Path]) -> Any:
+    """The runs that a study names where they are: a run that was moved stands beside those that were made from it."""
+    if isinstance(named, tuple):
+        return tuple(_here(each, out, beside) for each in named)
+    if not isinstance(named, str) or not named or Path(named).exists():
+        return named
+    there = (folder / Path(named).name for folder in (out, *beside))
+    return next((str(path) for path in there if (path / MANIFEST).is_file()), named)
 
 
 def _one(chosen: Reference, need: EarlierRun, out: Path) -> Given:

@@ -17,7 +17,7 @@ from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.foreign_code import sealed_references
 from wristctl.records.journal import jsonable
-from wristctl.records.manifest import TABLES, Manifest
+from wristctl.records.manifest import MANIFEST, TABLES, Manifest
 from wristctl.records.overview import Overview
 from wristctl.report.printed_table import Table
 from wristctl.studies.adopted import adopted, with_places
@@ -48,14 +48,20 @@ class Prepared(Generic[Found]):
 
 
 def prepare(
-    procedure: Procedure[Found], study: Study, out: Path, given: Mapping[str, Any] | None = None
+    procedure: Procedure[Found],
+    study: Study,
+    out: Path,
+    given: Mapping[str, Any] | None = None,
+    files: Sequence[Path] = (),
 ) -> Prepared[Found]:
     """Open the inputs: those `given` by name, else those that the study names, runs in `out`; load laws from elsewhere.
 
-    Raises UserError.
+    Where one of the study's `files` is the configuration of a run, its inputs may also be beside that. Raises
+    UserError.
     """
     section = procedure.section(study)
-    inputs = opened(procedure.kind, section, procedure.needs, given or {}, out)
+    beside = [file.absolute().parent.parent for file in files if (file.parent / MANIFEST).is_file()]
+    inputs = opened(procedure.kind, section, procedure.needs, given or {}, out, beside)
     if inputs:
         own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=own)

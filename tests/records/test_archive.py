@@ -1,0 +1,195 @@
+"""Runs in one archive, and out of it: as sealed, all or none, and nowhere but in the results folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from wristctl.config.errors import UserError
+from wristctl.config.study import Study
+from wristctl.records import InputRun, Run, start_run
+from wristctl.records.archive import PACK, SCHEMA, pack, unpack
+
+Make = Callable[..., Run]
+Entries = dict[str, bytes]
+
+
+@pytest.fixture
+def packed(make: Make, tmp_path: Path) -> tuple[list[Run], Path]:
+    """A run that was made from one that was made from another, and its archive."""
+    chain = [make("gen-data")]
+    for kind in ("train", "compare"):
+        with start_run(kind, Study(), "", tmp_path / kind, inputs=[InputRun("data", chain[-1])]) as live:
+            live.metric("rmse", 0.5)
+        chain.append(Run(live.path))
+    file = tmp_path / "mail.zip"
+    assert [each.id for each in pack(chain[-1], file)] == [each.id for each in chain]
+    return chain, file
+
+
+def rewritten(file: Path, change: Callable[[Entries], Entries], mode: int = 0) -> Path:
+    """A copy of an archive with other entries."""
+    with zipfile.ZipFile(file) as archive:
+        entries = change({name: archive.read(name) for name in archive.namelist()})
+    other = file.with_name("other.zip")
+    with zipfile.ZipFile(other, "w") as archive:
+        for name, content in entries.items():
+            entry = zipfile.ZipInfo(name)
+            entry.external_attr = (mode if content == b"/etc/passwd" else stat.S_IFREG | 0o644) << 16
+            archive.writestr(entry, content)
+    return other
+
+
+def test_a_run_arrives_with_all_that_it_was_made_from_as_it_was_sealed(
+    packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    chain, file = packed
+    found = unpack(file, tmp_path / "colleague")
+    assert [each.id for each in found.new] == [each.id for each in chain] and not found.known
+    assert found.run.id == chain[-1].id and found.run.state == "ok"
+    for here, there in zip(found.new, chain, strict=True):
+        assert here.problems() == [] and here.result_hash == there.result_hash
+    assert sorted(os.listdir(tmp_path / "colleague")) == sorted(each.id for each in chain)
+    again = unpack(file, tmp_path / "colleague")
+    assert not again.new and [each.id for each in again.known] == [each.id for each in chain]
+
+
+def test_the_same_runs_are_the_same_archive(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    chain, file = packed
+    pack(chain[-1], tmp_path / "twice.zip")
+    assert (tmp_path / "twice.zip").read_bytes() == file.read_bytes()
+    with pytest.raises(UserError, match="a file is in the way"):
+        pack(chain[-1], file)
+
+
+def test_what_was_added_to_a_run_stays_at_home(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    chain, _ = packed
+    (chain[0].path / "private.txt").write_text("mine")
+    pack(chain[0], tmp_path / "clean.zip")
+    assert not any("private" in name for name in zipfile.ZipFile(tmp_path / "clean.zip").namelist())
+
+
+def test_a_run_that_is_not_as_sealed_or_whose_input_is_gone_is_not_packed(
+    packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    chain, _ = packed
+    (chain[0].path / "data/samples.csv").write_text("x\n")
+    with pytest.raises(UserError, match="hash does not match"):
+        pack(chain[-1], tmp_path / "a.zip")
+    chain[0].path.rename(tmp_path / "gone")
+    with pytest.raises(UserError, match="the data run is gone"):
+        pack(chain[-1], tmp_path / "a.zip")
+    assert not (tmp_path / "a.zip").exists()
+
+
+HOSTILE = (
+    "../evil",
+    "/tmp/evil",
+    "ID/../../evil",
+    "ID/./evil",
+    "ID//evil",
+    "ID\\..\\evil",
+    "other/run.json",
+    "evil",
+    "C:/x",
+)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_name_that_leads_elsewhere_is_refused_before_anything_is_written(
+    name: str, packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    chain, file = packed
+    named = name.replace("ID", chain[0].id)
+    other = rewritten(file, lambda entries: entries | {named: b"evil"})
+    before = set(tmp_path.rglob("*"))
+    with pytest.raises(UserError, match="a name that leads elsewhere") as caught:
+        unpack(other, tmp_path / "colleague")
+    assert caught.value.exit_code == 2
+    assert {path for path in tmp_path.rglob("*") if path not in before} == {tmp_path / "colleague"}
+
+
+@pytest.mark.parametrize("mode", [stat.S_IFLNK | 0o777, stat.S_IFIFO | 0o644, stat.S_IFCHR | 0o644])
+def test_links_and_devices_are_refused(mode: int, packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    chain, file = packed
+    other = rewritten(file, lambda entries: entries | {f"{chain[0].id}/data/link": b"/etc/passwd"}, mode)
+    with pytest.raises(UserError, match="no plain file"):
+        unpack(other, tmp_path / "colleague")
+
+
+def changed(entries: Entries, end: str, content: bytes) -> Entries:
+    (name,) = [each for each in entries if each.endswith(end)]
+    return entries | {name: content}
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda e: changed(e, "samples.csv", b"x,name\n9,a\n"), "hash does not match what was sealed"),
+        (lambda e: {n: c for n, c in e.items() if not n.endswith("samples.csv")}, "sealed file is missing"),
+        (lambda e: e | {next(n for n in e if n.endswith("samples.csv")) + ".py": b"import os"}, "file was added"),
+        (lambda e: {n: c for n, c in e.items() if "gen-data" not in n}, "is not in it"),
+    ],
+)
+def test_a_run_that_is_not_as_it_was_sealed_does_not_arrive_nor_do_the_others(
+    change: Callable[[Entries], Entries], what: str, packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    with pytest.raises(UserError, match=what) as caught:
+        unpack(rewritten(packed[1], change), tmp_path / "colleague")
+    assert caught.value.exit_code == 3 and os.listdir(tmp_path / "colleague") == []
+
+
+def test_another_run_of_the_same_id_is_not_written_over(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    chain, file = packed
+    here = tmp_path / "colleague" / chain[0].id
+    here.mkdir(parents=True)
+    (here / "notes.txt").write_text("mine")
+    with pytest.raises(UserError, match="a run of this id is here already") as caught:
+        unpack(file, tmp_path / "colleague")
+    assert caught.value.exit_code == 3 and os.listdir(tmp_path / "colleague") == [chain[0].id]
+    assert (here / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("told", "what"),
+    [
+        (None, f"it has no {PACK}"),
+        (b"{", "is not valid JSON"),
+        (b"[" * 100_000, "is not valid JSON"),
+        (b'{"runs": ["a"]}', "names no runs"),
+        (json.dumps({"schema": "wristctl.pack/9", "run": "a", "runs": ["a"]}).encode(), "by another wristctl"),
+        (json.dumps({"schema": SCHEMA, "run": "..", "runs": [".."]}).encode(), "a name that is no run's id"),
+        (json.dumps({"schema": SCHEMA, "run": "a/b", "runs": ["a/b"]}).encode(), "a name that is no run's id"),
+        (json.dumps({"schema": SCHEMA, "run": 3, "runs": [3]}).encode(), "a name that is no run's id"),
+        (json.dumps({"schema": SCHEMA, "run": "a", "runs": ["a", "a"]}).encode(), "a name that is no run's id"),
+    ],
+)
+def test_what_is_no_archive_of_runs_is_said(told: bytes | None, what: str, tmp_path: Path) -> None:
+    file = tmp_path / "mail.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr(PACK if told else "other", told or b"")
+    with pytest.raises(UserError, match=what):
+        unpack(file, tmp_path / "colleague")
+
+
+def test_no_zip_a_broken_one_and_one_that_swells_are_refused(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    _, file = packed
+    with pytest.raises(UserError, match="cannot be read"):
+        unpack(tmp_path / "gone.zip", tmp_path / "colleague")
+    (tmp_path / "text.zip").write_text("no zip")
+    (tmp_path / "half.zip").write_bytes(file.read_bytes()[:-400])
+    for name in ("text.zip", "half.zip"):
+        with pytest.raises(UserError, match="no archive of runs"):
+            unpack(tmp_path / name, tmp_path / "colleague")
+    with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(PACK, json.dumps({"schema": SCHEMA, "run": "a", "runs": ["a"]}))
+        archive.writestr("a/zeros", bytes(50_000_000))
+    with pytest.raises(UserError, match="far more than its size"):
+        unpack(tmp_path / "bomb.zip", tmp_path / "colleague")
+    assert os.listdir(tmp_path / "colleague") == []
