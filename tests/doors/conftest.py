@@ -14,7 +14,7 @@ from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
 
 ROOT = Path(__file__).parents[2]
 
-LAW = '''
+LAW = """
 from helper import scaled
 from wristctl.control.law import Controller, Gain
 from wristctl.control.model import one_segment
@@ -26,14 +26,14 @@ def law(now, wrist, gains, memory):
 GAINS = {"Kp": Gain("N m/rad", "spring", 1e-2, 1e2), "Kd": Gain("N m s/rad", "damper", 1e-3, 1e1)}
 PRESETS = {"default": {"Kp": 4.0, "Kd": 0.2}, "rig": {"Kp": 0.3, "Kd": 0.02}}
 STRANGE = Controller("strange", law, "a stranger", GAINS, PRESETS)
-'''
-HELPER = '''
+"""
+HELPER = """
 from wristctl.lanes.compiled import compiled
 
 @compiled
 def scaled(k, e):
     return k * e
-'''
+"""
 
 
 @pytest.fixture(autouse=True)

@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.doors.conftest import ROOT, wristctl
 
 import wristctl as face
+from tests.doors.conftest import ROOT, wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import load
 from wristctl.config.trust import asking
@@ -56,7 +56,7 @@ def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
         file.write_text(HOSTILE.format(marker=str(marker)) + file.read_text())
     name, results = run.id, str(run.path.parent)
     again = ("simulate", "--config", f"results/{name}/config.yaml")
-    tried = [("runs", "replay", name), again]
+    tried: list[tuple[str, ...]] = [("runs", "replay", name), again]
     if by == "its reference":  # kinds of references are read where a study is
         config = run.path / "config.yaml"
         config.write_text(config.read_text().replace("kind: minimum-jerk", 'kind: "code/strange/strange.py:STRANGE"'))
