@@ -105,7 +105,7 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     """The same, run to its end."""
     done = prepared(plant, loop, horizon)
-    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, None)
+    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, lambda share: None)
     return done
 
 

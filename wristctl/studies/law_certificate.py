@@ -81,9 +81,8 @@ def _restoring(law: Controller) -> LawCheck:
     sides = np.array([_BENT, -_BENT])
     held = _torques(controller("feedforward"), np.zeros(0), theta_ref=sides)
     presets = {name: np.array(law.values(each)) for name, each in law.presets.items()}
-    net = {
-        name: _torques(law, gains, theta=sides) - held for name, gains in (presets | {"middle": _middle(law)}).items()
-    }
+    presets["middle"] = _middle(law)
+    net = {name: _torques(law, gains, theta=sides) - held for name, gains in presets.items()}
     told = "; ".join(f"{name} {low:.3g}, {high:.3g}" for name, (low, high) in net.items())
     found = f"at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there [N m]: {told}"
     return LawCheck("bends the wrist back", all(low < 0.0 < high for low, high in net.values()), found)
