@@ -56,7 +56,7 @@ def make(settings):
             self.solver.update(
                 q=self.push.T @ (weights * lead) - wished, l=np.full(steps, least), u=np.full(steps, most)
             )
-            v = float(self.solver.solve().x[0])
+            v = float(self.solver.solve(raise_error=False).x[0])
             return inertia * min(max(v, least), most) + load
 
     return Controller(

@@ -31,7 +31,7 @@ def check_law(
         list[Path] | None,
         typer.Option("--config", "-c", metavar="FILE", help="Study file with its `laws`."),
     ] = None,
-    board: Annotated[bool, typer.Option("--board/--no-board", help="A trial on the emulated board too.")] = True,
+    no_board: Annotated[bool, typer.Option("--no-board", help="Leave out the trial on the emulated board.")] = False,
     trust_code: TrustCode = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -42,7 +42,7 @@ def check_law(
 
     checks: list[LawCheck] = []
     with asking(partial(asked_to_trust, trust_code)):
-        for each in certificate(placed(law, None), load_study(config or ()).laws, board):
+        for each in certificate(placed(law, None), load_study(config or ()).laws, not no_board):
             checks.append(each)
             if not as_json:
                 say(f"{_VERDICTS[each.passed]:<6}{each.asked + ':':<23} {each.found}")
@@ -53,4 +53,4 @@ def check_law(
     if failed:
         raise UserError(f"{law} fails: {', '.join(failed)}", law, "mend it; docs/your-own-controller.md", exit_code=3)
     if not as_json:
-        say(f"{law} is fit for simulate, tune and compare" + f"{', and for hw-run' * board}")
+        say(f"{law} is fit for simulate, tune and compare" + f"{', and for hw-run' * (not no_board)}")

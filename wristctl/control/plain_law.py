@@ -57,9 +57,10 @@ class PlainLaw(types.WrapperAddressProtocol):
         """Raise what the law has raised, or a UserError for what it has returned."""
         error, self._error = self._error, None
         if isinstance(error, Exception) and not isinstance(error, UserError):
-            frame = traceback.extract_tb(error.__traceback__)[-1]
+            places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
+            where = next((each for each in places[::-1] if not each.startswith(__file__)), self._where)
             what = f"{self._name} failed: {type(error).__name__}: {error}"
-            raise UserError(what, f"{frame.filename}:{frame.lineno}", "mend the law; --debug shows more") from error
+            raise UserError(what, where, "mend the law; --debug shows more") from error
         if error is not None:
             raise error
 

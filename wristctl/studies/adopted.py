@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Any, NamedTuple
 
-from wristctl.config.choices import CONTROLLERS, OPTIMISERS, Choices
+from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
 from wristctl.config.entry_points import entry_point_names
 from wristctl.config.errors import UserError, nearest
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
@@ -69,7 +69,10 @@ def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
     def place(table: Choices[Any], name: str) -> str:
         origin = table.origin(name)
         whole = origin.reference if origin else name
-        return (places or {}).get(whole, whole)
+        called = (places or {}).get(whole, whole)
+        if called != whole and table.what == REFERENCES.what:  # by which its section is read, also while it is written
+            table.lend(called, *table.loaded(whole))
+        return called
 
     sections = {name: getattr(study, name) for name in type(study).model_fields}
     return study.model_copy(update={name: renamed(each, place) for name, each in sections.items()})

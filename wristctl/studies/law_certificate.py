@@ -68,17 +68,24 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
 def _gains(law: Controller) -> Array:
     """Of the last preset, which is for the hardest conditions; the middle of the box where there is none."""
     presets = list(law.presets.values())
-    middle = {name: float(np.sqrt(gain.low * gain.high)) for name, gain in law.gains.items()}
-    return np.array(law.values(presets[-1] if presets else middle))
+    return np.array(law.values(presets[-1])) if presets else _middle(law)
+
+
+def _middle(law: Controller) -> Array:
+    return np.array([np.sqrt(gain.low * gain.high) for gain in law.gains.values()])
 
 
 def _restoring(law: Controller) -> LawCheck:
     """At rest, bent to either side of a straight reference: does its torque, less what holds the wrist there, bend it
-    back?"""
+    back? With every preset, and in the middle of the box, where a law is stiffer than the wrist itself."""
     sides = np.array([_BENT, -_BENT])
-    net = _torques(law, _gains(law), theta=sides) - _torques(controller("feedforward"), np.zeros(0), theta_ref=sides)
-    found = f"{net[0]:.3g} and {net[1]:.3g} N m at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there"
-    return LawCheck("bends the wrist back", bool(net[0] < 0.0 < net[1]), found)
+    held = _torques(controller("feedforward"), np.zeros(0), theta_ref=sides)
+    presets = {name: np.array(law.values(each)) for name, each in law.presets.items()}
+    presets["middle"] = _middle(law)
+    net = {name: _torques(law, gains, theta=sides) - held for name, gains in presets.items()}
+    told = "; ".join(f"{name} {low:.3g}, {high:.3g}" for name, (low, high) in net.items())
+    found = f"at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there [N m]: {told}"
+    return LawCheck("bends the wrist back", all(low < 0.0 < high for low, high in net.values()), found)
 
 
 def _torques(law: Controller, gains: Array, **angles: Array) -> Array:

@@ -1,0 +1,198 @@
+"""Laws of plain Python: the same loop as a compiled one, one rollout at a time, and nothing compiled for them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core import event
+
+import wristctl as face
+from tests.doors.conftest import ROOT
+from wristctl.config.errors import UserError
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.computed_torque import COMPUTED_TORQUE
+from wristctl.control.law import Controller, Gain
+from wristctl.control.plain_model import plain_one_segment
+from wristctl.control.table import CONTROLLERS
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import Outcome, rollout
+
+WRIST = WristParameters()
+
+
+def ct(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+    """Computed torque, as `wristctl.control.computed_torque` has it."""
+    inertia, load = plain_one_segment(wrist, now.theta, now.rate)
+    error, error_rate = now.theta - now.theta_ref, now.rate - now.rate_ref
+    return inertia * (now.acceleration_ref - 2.0 * gains.zeta * gains.w * error_rate - gains.w**2 * error) + load
+
+
+def plain(law: Any, **more: Any) -> Controller:
+    given: dict[str, Any] = {"gains": {}, "presets": {"default": {}}} | more
+    return Controller("plainly", law, "a test", plain=True, **given)
+
+
+def run(law: Controller, gains: np.ndarray, loop: Loop | None = None, **more: Any) -> Outcome:
+    followed = motion(Reference(angle_deg=20.0, duration=0.3), WRIST, 0.5, 1e-3)
+    which = np.zeros(len(gains), np.int64)
+    return rollout(law, gains, [followed], which, loop or Loop(plant_segments=2), WRIST, record=True, **more)
+
+
+@pytest.mark.parametrize("rig", [False, True], ids=["ideal", "camera and tendons"])
+def test_a_plain_law_moves_the_wrist_as_the_compiled_one_does(rig: bool) -> None:
+    names = list(COMPUTED_TORQUE.gains)
+    law = plain(ct, gains=COMPUTED_TORQUE.gains, presets={})
+    levels = {"actuator": {"level": "tendon"}, "sensor": {"level": "camera"}, "control_period": 5e-3} if rig else {}
+    loop = Loop.model_validate({"plant_segments": 2, **levels})
+    values = {"w": 15.0, "zeta": 1.0}
+    gains = np.array([[values[name] for name in names]])
+    ours, theirs = run(law, gains, loop), run(COMPUTED_TORQUE, gains, loop)
+    np.testing.assert_allclose(ours.column("theta", 0), theirs.column("theta", 0), atol=1e-9)
+    np.testing.assert_allclose(ours.column("torque_wanted", 0), theirs.column("torque_wanted", 0), atol=1e-7)
+
+
+def test_each_of_a_batch_is_what_it_is_alone_and_begins_afresh() -> None:
+    """A class is made anew for every rollout, and so is the memory: nothing is left of the one before."""
+
+    class Counts:
+        def __init__(self) -> None:
+            self.ticks = 0
+
+        def __call__(self, now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+            self.ticks += 1
+            memory[0] += 1.0
+            assert memory[0] == self.ticks
+            return -gains.k * (now.theta - now.theta_ref) - 1e-4 * self.ticks
+
+    law = plain(Counts, gains={"k": Gain("N m/rad", "", 0.1, 10.0)}, presets={}, memory=1)
+    gains = np.array([[1.0], [2.0], [3.0]])
+    heard: list[float] = []
+    together = run(law, gains)
+    run(law, gains, progress=heard.append)
+    for k in range(3):
+        np.testing.assert_array_equal(together.column("theta", k), run(law, gains[k : k + 1]).column("theta", 0))
+    assert heard[-1] == pytest.approx(1.0) and np.all(np.diff(heard) > 0.0)
+
+
+def test_it_sees_what_compiled_laws_see() -> None:
+    seen: list[Any] = []
+
+    def look(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        seen.append((now, now.ahead(1), now.ahead(5), wrist, gains, len(memory)))
+        return 0.0
+
+    law = plain(look, gains={"lambda": Gain("", "", 1.0, 9.0)}, presets={}, preview=5, memory=2)
+    run(law, np.array([[3.5]]))
+    followed = motion(Reference(angle_deg=20.0, duration=0.3), WRIST, 0.5, 1e-3)
+    now, one, five, wrist, gains, memory = seen[100]
+    for told, at in ((now[2:5], 100), (one, 101), (five, 105)):
+        expected = followed.theta_ref[at], followed.rate_ref[at], followed.acceleration_ref[at]
+        np.testing.assert_allclose(told, expected, rtol=1e-12)
+    assert (now.period, gains.lambda_, memory) == (1e-3, 3.5, 2)
+    assert wrist.stiffness == WRIST.stiffness and wrist.length == WRIST.length
+    assert now.torque_low < 0.0 < now.torque_high and math.isfinite(now.load)
+
+
+def test_nothing_is_compiled_for_a_plain_law() -> None:
+    def push(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return 0.1
+
+    def other(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return -0.1
+
+    run(plain(push), np.zeros((1, 0)))
+    with event.install_recorder("numba:compile") as seen:
+        run(plain(other), np.zeros((1, 0)))
+    assert not seen.buffer
+
+
+def test_what_it_raises_ends_the_rollout_there() -> None:
+    calls: list[float] = []
+
+    def fails(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        calls.append(now.theta)
+        if len(calls) == 10:
+            raise KeyError("ten")
+        return 0.0
+
+    with pytest.raises(UserError, match="plainly\\(py\\) failed: KeyError: 'ten'"):
+        run(plain(fails), np.zeros((4, 0)))
+    assert len(calls) == 10
+
+    def interrupted(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(plain(interrupted), np.zeros((1, 0)))
+
+
+def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def push(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return 0.1
+
+    law = plain(push)
+    monkeypatch.setitem(CONTROLLERS, law.name, law)
+    data = {
+        "horizon": 0.1,
+        "rows": ({"controller": law.name, "gains": "default"},),
+        "loops": {"fast": {"plant_segments": 1}},
+        "references": ({"duration": 0.05},),
+        "inverses": ("none",),
+    }
+    compared = face.compare(Study.model_validate({"compare": data}))
+    for table in compared.tables:
+        if "controller" in table.columns:
+            at = list(table.columns).index("controller")
+            assert all("plainly(py)" in str(row[at]) for row in table.rows), table.title
+    with pytest.raises(UserError, match="only compiled laws can be linearised"):
+        face.analyse(Study.model_validate({"simulate": {"controller": law.name, "gains": "default"}}))
+
+
+def test_the_mpc_of_the_worked_example_follows_and_pulls_as_hard_as_it_may_and_no_harder() -> None:
+    pytest.importorskip("osqp")
+    design: Any = CONTROLLERS[f"{ROOT}/experiments/laws/mpc_osqp.py:MPC"]
+    law, loop = design.made({"horizon": 30.0}), Loop(plant_segments=1)
+    assert run(law, np.zeros((1, 0)), loop).metrics["rmse"][0] < 1e-3
+    weak = WRIST.model_copy(update={"tension_limit": WRIST.pretension + 2.0})
+    followed = motion(Reference(kind="step", angle_deg=20.0), weak, 0.2, 1e-3)
+    limited = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, weak, record=True)
+    assert limited.column("tension_plus", 0)[1:20].max() == pytest.approx(weak.tension_limit, rel=1e-6)
+    wanted, given = limited.column("torque_wanted", 0), limited.column("torque", 0)
+    assert np.abs(wanted - given).max() < 1e-9, "it plans within what the tendons reach"
+
+
+def test_the_lqr_of_the_worked_example_solves_its_riccati_equation() -> None:
+    from scipy.linalg import solve_continuous_are
+
+    from wristctl.control.vetting import call_law
+
+    law = CONTROLLERS[f"{ROOT}/experiments/laws/lqr.py:LQR"]
+    q, qd = 4.0e4, 100.0
+    cost = solve_continuous_are(
+        np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), np.diag([q, qd]), np.eye(1)
+    )
+    states = np.zeros((3, 9))
+    states[1, 0], states[2, 1] = 1e-4, 1e-3
+    rest, bent, moving = call_law(law, states, np.tile([q, qd], (3, 1)))
+    inertia, load = plain_one_segment(_segments(), 0.0, 0.0)
+    for torque, state in ((bent, states[1]), (moving, states[2])):
+        own_inertia, own_load = plain_one_segment(_segments(), state[0], state[1])
+        assert (torque - own_load) / own_inertia == pytest.approx(-cost[1] @ state[:2], rel=1e-9)
+    assert rest == pytest.approx(load, abs=1e-15) and inertia > 0.0
+
+
+def _segments() -> Any:
+    from wristctl.wrist.segments import segments
+
+    return segments(WRIST, 1)
+
+
+def test_the_files_of_the_worked_examples_are_shown_in_the_page() -> None:
+    page = (ROOT / "docs" / "your-own-controller.md").read_text(encoding="utf-8")
+    for name in ("lqr", "mpc_osqp"):
+        assert (ROOT / "experiments" / "laws" / f"{name}.py").read_text(encoding="utf-8") in page
