@@ -103,7 +103,7 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
     """The comparison of a study, in a run directory of its own beside that of the audit."""
 
     def compared(run: LiveRun | None) -> Compared:
-        return compare(replace(session, study=study, inputs=Inputs(), findings=Findings(study.seed, run)))
+        return compare(replace(session, study=study, inputs=Inputs(), findings=Findings(study.seed, run, draws=False)))
 
     if session.findings.run is None:
         return compared(None)
