@@ -9,12 +9,14 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
+from wristctl.comparison.class_standing import class_standings
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.paper import T2
 from wristctl.config.load import load_study
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records.formats import write_figure
+from wristctl.report.answer_figure import answer_figure
 from wristctl.report.hysteresis_figures import loops as loops_by_speed
 from wristctl.report.loop_figures import errors
 from wristctl.report.wrist_drawing import directions
@@ -73,9 +75,19 @@ def hysteresis() -> None:
     keep("hysteresis", loops_by_speed(own, loops(own)))
 
 
+def answer() -> None:
+    """What `make run` answers: every law in each class of conditions, but for the rows that are tuned first."""
+    study = load_study([HERE.parent / "experiments" / "quick.yaml"], [])
+    rows = tuple(row for row in study.compare.rows if row.gains != "tuned")
+    chosen = study.compare.model_copy(update={"rows": rows})
+    results = compare(study.model_copy(update={"compare": chosen}))
+    keep("answer", answer_figure(class_standings(results, chosen, study.wrist)))
+
+
 def main() -> None:
     camera()
     hysteresis()
+    answer()
     study = load_study([], [f"rows={ROWS}", "inverses=[none]"], "compare")
     results = compare(study)
     shown = ("smc/exchanged", "smc/initial", "pid/printed", "computed-torque/default")

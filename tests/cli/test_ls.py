@@ -67,5 +67,5 @@ def test_runs_are_chosen_by_what_was_asked(
 
 def test_where_there_is_none_that_is_said(call: Call) -> None:
     assert call("runs", "ls") == (0, "no runs in results\n", "")
-    for asked in (("--kind", "x"), ("--label", "x"), ("--state", "x"), ("--tag", "x"), ("--newer", "1h")):
+    for asked in (("--kind", "x"), ("--label", "x"), ("--state", "failed"), ("--tag", "x"), ("--newer", "1h")):
         assert call("runs", "ls", *asked, "--out", "other") == (0, "no runs in other that meet this\n", ""), asked

@@ -69,6 +69,17 @@ def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings,
     return found, findings, twins
 
 
+def test_the_papers_numbers_stand_beside_its_own_law_alone(
+    tmp_path: Path, asked: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (theirs, _), _, _ = tables(tmp_path / "a")
+    of_pid = trials().assign(controller="pid")
+    monkeypatch.setattr("tests.studies.test_hw_tables.trials", lambda: of_pid)
+    (others, _), _, _ = tables(tmp_path / "b")
+    assert "paper" in theirs.title and "paper" not in others.title
+    assert not [row for row in others.rows if str(row[0]).startswith("paper")]
+
+
 def test_means_are_over_what_ended_well_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
     (means, by_trial), _, twins = tables(tmp_path)
     assert means.columns[:4] == ("", "trials", "RMSE [rad]", "steady state [rad]")

@@ -11,6 +11,6 @@ app = study_command(
     examples=(
         "wristctl hysteresis experiments/hysteresis.yaml",
         "wristctl hysteresis --measured loop.csv",
-        r"wristctl hysteresis --drive tensions --set 'ranges_deg=\[\[0, 30]]' --set 'sheaths=\[0, 1]'",
+        "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
     ),
 )

@@ -61,7 +61,8 @@ def _what(detail: Any) -> str:
         key = next(iter(detail["input"]))
         return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
     if detail["type"] == "too_short":
-        return f"{value} is too few: at least {detail['ctx']['min_length']}"
+        given = "[]" if value == "()" else value
+        return f"{given} is too few: at least {detail['ctx']['min_length']}"
     message: str = detail["msg"].replace("tuple", "list")
     return message.replace("Input", value, 1) if message.startswith("Input") else f"{value}: {message}"
 

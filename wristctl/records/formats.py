@@ -72,6 +72,20 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise UserError(f"no file of arrays: {error}", str(path), "bring back the file that was sealed") from error
 
 
+def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300) -> None:
+    """A figure made without pyplot in the format that the file's name ends with, as large as it was laid out."""
+    import matplotlib as mpl
+
+    known: dict[str, dict[str, Any]] = {
+        ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+        ".svg": {"Date": None, "Creator": None},
+        ".png": {"Software": None},
+    }
+    fixed: Any = {"svg.hashsalt": file.stem, "agg.path.chunksize": 500, "pdf.fonttype": 42}
+    with mpl.rc_context(fixed), replacing(file) as temporary:
+        figure.savefig(temporary, format=file.suffix[1:], dpi=dpi, metadata=known[file.suffix])
+
+
 def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
     """A figure made without pyplot as PNG and SVG, without date or program version; its layout stays as it is then."""
     import matplotlib as mpl

@@ -20,6 +20,8 @@ from wristctl.records.run import Run
 
 RESULTS = Path("results")
 INDEX, TEMPORARY = ".index.json", ".index-"
+DRAWN = "figures-"
+"""How folders begin that hold figures of a run which were drawn after it was sealed."""
 _SCHEMA = "wristctl.index/1"
 
 
@@ -50,7 +52,7 @@ def run_names(results: Path) -> list[str]:
     """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
     try:
         with os.scandir(results) as found:
-            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith("."))
+            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith((".", DRAWN)))
     except FileNotFoundError:
         return []
     except OSError as error:

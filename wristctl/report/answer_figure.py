@@ -37,7 +37,7 @@ def answer_figure(found: Sequence[ClassStanding]) -> Figure:
     labels = _rows(found)
     columns = columns_within(len(found), 1.1)
     deep = -(-len(found) // columns)
-    made, axes = figure(deep, columns, height=deep * (0.75 + 0.2 * len(labels)) + 0.45, sharey=True)
+    made, axes = figure(deep, columns, height=deep * (0.85 + 0.2 * len(labels)) + 0.95, sharey=True)
     for panel, each in zip(axes.ravel().tolist(), found, strict=False):
         _panel(panel, each, labels)
     for panel in axes.ravel().tolist()[len(found) :]:

@@ -35,6 +35,8 @@ from wristctl.report.style import (
 Across = Literal["reference", "loop"]
 """What the columns of a figure are."""
 
+_BESIDE_CELLS, _NUMBER = 2.3, 0.45
+"""Width [in] of names and bar, and what a cell needs for its number."""
 _FAILED = "///"
 """Hatch of what diverged."""
 
@@ -68,15 +70,27 @@ def rmse_map(
     beside = bool(np.isfinite(printed).any())
     made, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
     ours = axes[0, 0]
-    image = _cells(ours, values, norm, below)
+    narrow = (made.get_figwidth() - _BESIDE_CELLS) / len(columns) < _NUMBER  # then colours and bar have to do
+    image = _cells(ours, values, norm, below, numbers=not narrow)
     if beside:
         _cells(axes[0, 1], printed, norm)
         axes[0, 1].set_xticks([0], ["the paper's\nT2"])
+    ground = "none" if narrow else "w"
     for row, column in np.argwhere(np.isnan(values)):
         ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
-        ours.text(column, row, "x", ha="center", va="center", fontsize=11.0, fontweight="bold", backgroundcolor="w")
+        ours.text(
+            column,
+            row,
+            "x",
+            ha="center",
+            va="center",
+            fontsize=11.0,
+            fontweight="bold",
+            backgroundcolor=ground,
+        )
     ours.set_yticks(range(len(rows)), rows)
-    ours.set_xticks(range(len(columns)), [fill(name, 10) for name in columns])
+    names = columns if narrow else [fill(name, 10) for name in columns]
+    ours.set_xticks(range(len(columns)), names, rotation=90.0 if narrow else 0.0)
     title(ours, heading)
     bar = made.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
     bar.minorformatter = PowersOfTen()
@@ -90,7 +104,7 @@ def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
     Of repetitions a dot is their median, with its 95 % interval; a row of which something failed is marked x.
     """
     rows, _ = _names(results, "reference")
-    made, ((axes,),) = figure(height=1.1 + 0.24 * len(rows))
+    made, ((axes,),) = figure(height=1.6 + 0.24 * len(rows))
     for at, name in enumerate(rows):
         own = [result for result in results if _row(results, result) == name]
         spreads = [spread(result.repeated.metrics["chattering"]) for result in own]
@@ -136,11 +150,17 @@ def _below(result: ComparedRow) -> str:
     return ends + (f"\n{failed.sum()} of {found.n} failed" if failed.any() else "")
 
 
-def _cells(axes: Axes, values: Array, norm: LogNorm, below: Mapping[tuple[int, int], str] | None = None) -> AxesImage:
+def _cells(
+    axes: Axes,
+    values: Array,
+    norm: LogNorm,
+    below: Mapping[tuple[int, int], str] | None = None,
+    numbers: bool = True,
+) -> AxesImage:
     """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan."""
     undress(axes)
     image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
-    for row, column in np.argwhere(np.isfinite(values)):
+    for row, column in np.argwhere(np.isfinite(values) & numbers):
         value = values[row, column]
         text = (below or {}).get((int(row), int(column)), "")
         ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"

@@ -33,9 +33,12 @@ Figures = list[tuple[str, str, str]]
 """Name, caption and data URL."""
 
 
-def page(run: Run, manifest: Manifest) -> str:
-    """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed."""
-    overview, drawn = read_overview(run.path), figures(run)
+def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
+    """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed.
+
+    `beside` is a folder of figures that were drawn later.
+    """
+    overview, drawn = read_overview(run.path), figures(run, beside)
     there = {name for name, *_ in drawn}
     return render(
         "run.html",
@@ -45,7 +48,7 @@ def page(run: Run, manifest: Manifest) -> str:
         answer=overview.answer,
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
-        tables=_tables(run),
+        tables=tables(run),
         figures=[each for each in drawn if each[0] != overview.figure],
         first=[each for each in drawn if each[0] == overview.figure],
         undrawn=[caption or name for name, caption in overview.captions.items() if name not in there],
@@ -75,11 +78,12 @@ def _templates() -> Environment:
     return made
 
 
-def figures(run: Run) -> Figures:
+def figures(run: Run, beside: Path | None = None) -> Figures:
     """Name, caption and data URL of each figure of a run, in reading order where the run has one, then by name."""
     captions = read_overview(run.path).captions
     order = {name: at for at, name in enumerate(captions)}
-    files = [file for file in (run.path / "figures").glob("*.svg") if not file.is_symlink()]
+    folders = [run.path / "figures", *([beside] if beside else [])]
+    files = [file for folder in folders for file in folder.glob("*.svg") if not file.is_symlink()]
     files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
     return [(file.stem, captions.get(file.stem) or file.stem.replace("-", " "), inline_figure(file)) for file in files]
 
@@ -107,7 +111,8 @@ def _metrics(run: Run) -> list[tuple[Any, ...]]:
     return [(name, *(each.get(key) for key in kept)) for name, each in run.metrics.items()]
 
 
-def _tables(run: Run) -> list[dict[str, Any]]:
+def tables(run: Run) -> list[dict[str, Any]]:
+    """The tables that a command printed or kept: title, columns and rows each."""
     if not (run.path / TABLES).exists():
         return []
     file = run.file(TABLES)

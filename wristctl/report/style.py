@@ -123,7 +123,7 @@ def figure(
     paper = _PAPER.get()
     tall = rows * max(1.8, 0.55 * width / cols) if height is None else height
     if paper is not None:
-        tall, width = tall * max(_SMALLEST, min(1.0, paper / width)), paper
+        tall, width = tall * max(0.85, min(1.0, paper / width)), paper
     made = Figure(figsize=(width, tall), layout="constrained")
     axes = made.subplots(rows, cols, squeeze=False, **subplots)
     for each in axes.flat:

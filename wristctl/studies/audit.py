@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wristctl.config.audit import Claim
 from wristctl.config.errors import UserError, meant
@@ -22,7 +22,6 @@ from wristctl.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from wristctl.comparison.evidence import Metrics, TrialsDone
     from wristctl.comparison.ledger import Judgement
@@ -50,18 +49,6 @@ class Audited(StudyResult):
         from wristctl.comparison.ledger import ledger_frame
 
         return ledger_frame(self.judgements)
-
-
-class _Undrawn(Findings):
-    """Findings whose figures are drawn when somebody asks for them, and none of them before."""
-
-    def figure(self, name: str, draw: Callable[..., Figure], *of: Any, **how: Any) -> None:
-        """One more that could be drawn."""
-        run, self.run = self.run, None
-        try:
-            super().figure(name, draw, *of, **how)
-        finally:
-            self.run = run
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -151,7 +138,7 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
     """The comparison of a study, in a run directory of its own beside that of the audit."""
 
     def compared(run: LiveRun | None) -> Compared:
-        return compare(replace(session, study=study, inputs=Inputs(), findings=_Undrawn(study.seed, run)))
+        return compare(replace(session, study=study, inputs=Inputs(), findings=Findings(study.seed, run, draws=False)))
 
     if session.findings.run is None:
         return compared(None)

@@ -60,9 +60,14 @@ def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
 def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
     """Groups in order, who cannot be relied on, and what the best one buys."""
     columns = COLUMNS - _INDENT
-    most = max(1, (room - 2) // 2)
-    below = [*wrapped(_lost(each, names), most, columns), *wrapped(_buys(each, names), most, columns)][: room - 1]
-    lines = [*wrapped(_groups(each, names), max(1, room - len(below)), columns), *below]
+    parts = [each_part for each_part in (_groups(each, names), _lost(each, names), _buys(each, names)) if each_part]
+    needed = [len(wrapped(part, room, columns)) for part in parts]
+    given = [1] * len(parts)
+    for _ in range(room - len(parts)):
+        short = [at for at in range(len(parts)) if given[at] < needed[at]]
+        if short:
+            given[min(short, key=lambda at: (given[at], at))] += 1
+    lines = [line for part, most in zip(parts, given, strict=True) for line in wrapped(part, most, columns)][:room]
     name = f"{each.name} ({each.cells.split()[0]})"
     return [f"{'' if at else name:<{_INDENT}}{line}" for at, line in enumerate(lines)]
 

@@ -49,17 +49,18 @@ class Figures(Mapping[str, "Figure"]):
 class Findings:
     """Metrics and figures of a study; with a run directory these, tables, arrays and files are written as they come.
 
-    Without one nothing touches the disk: what is only written is passed over.
+    Without one nothing touches the disk: what is only written is passed over. Where it `draws` not, every figure is for
+    later.
     """
 
-    def __init__(self, seed: int, run: LiveRun | None = None) -> None:
+    def __init__(self, seed: int, run: LiveRun | None = None, draws: bool = True) -> None:
         self.run = run
         self.metrics: dict[str, dict[str, Any]] = {}
         """value, unit, better, n, interval and meaning by name, as a run's metrics.json has them"""
         self.figures = Figures()
         self.overview = Overview()
         """What the run's page begins with, and in which order it shows the figures."""
-        self._seed = seed
+        self._seed, self._draws = seed, draws
 
     def stream(self, name: str) -> tuple[int, int]:
         """Entropy of the random stream `name` for `numpy.random.default_rng`: the same with and without a run."""
@@ -96,7 +97,7 @@ class Findings:
         drawer = partial(draw, *of, **how)
         self.figures.add(name, drawer)
         self.overview.captions[name] = caption
-        if self.run and not later:
+        if self.run and self._draws and not later:
             self.run.figure(name, drawer())
 
     def headline(self, *metrics: str) -> None:

@@ -41,7 +41,7 @@ def trial_tables(
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
     trials = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
     twins = _twins(session, trials, network, tuned)
-    theirs = any(row.controller == "smc" for row in session.study.hw_run.rows)
+    theirs = bool((trials["controller"] == "smc").any())
     rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
     with session.progress("drawing"):
