@@ -24,7 +24,7 @@ from wristctl.comparison.readings import readings
 from wristctl.config.control import Row
 from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unknowns import STRATA, Box, Setting, Unknown
+from wristctl.config.unstated import STRATA, Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
 from wristctl.control.smc import SMC
 from wristctl.records import open_run
@@ -49,9 +49,9 @@ WRIST = WristParameters()
 SMC_PRINTED, EXCHANGED = Row(controller="smc", gains="printed"), Row(controller="smc", gains="exchanged")
 PID = Row(controller="pid", gains="printed")
 ISLANDS: dict[str, tuple[tuple[int, float], ...]] = {
-    "smc/exchanged": ((4, 1e-4),),
+    "smc/exchanged": ((4, 1e-4), (4, 1e-3)),
     "pid/printed": ((1, 1e-4),),
-    "smc/printed": ((1, 1e-3), (4, 1e-3), (1, 1e-4)),
+    "smc/printed": ((1, 1e-3), (4, 1e-3)),
 }
 """Segments and period of each search; those of a first one, over five, that came closest."""
 GRID = np.logspace(-3.0, 3.0, 7)
@@ -96,7 +96,7 @@ def one_move() -> list[Move]:
     """RMSE over 5 s and settling time by the duration of the move."""
     durations = np.linspace(0.8, 2.2, 29)
     loop = Loop(plant_segments=1, control_period=1e-6, limits=False)
-    settings = [Setting(WRIST, loop, Reference(duration=float(each)), 5.0, "ideal", {}) for each in durations]
+    settings = [PaperSetting(WRIST, loop, Reference(duration=float(each)), 5.0, "ideal", {}) for each in durations]
     found = readings(courses(EXCHANGED, settings, [each.reference for each in settings]))
     return [Move(*each) for each in zip(durations, found["rmse"], found["settling"], strict=True)]
 
@@ -117,11 +117,11 @@ def weighed() -> list[Weighed]:
     return found
 
 
-def _box(**unknowns: Unknown) -> Box:
+def _box(**unknowns: Unstated) -> Box:
     return Box(unknowns={name.replace("__", "."): each for name, each in unknowns.items()}, draws=512, continuous=())
 
 
-def _arrived(settings: list[Setting]) -> Any:
+def _arrived(settings: list[PaperSetting]) -> Any:
     error = readings(courses(EXCHANGED, settings, [each.reference for each in settings]))["steady_state"]
     return error < math.radians(1.0)
 
@@ -130,13 +130,13 @@ def what_decides(box: Box) -> dict[str, Any]:
     """Four segments at 1 kHz: the limit alone, how it is measured, and the rule of the held tick over the box."""
     limits = []
     for seed in range(4):
-        settings = drawn_settings(_box(wrist__tension_limit=Unknown(draw="10..200 log")), WRIST, seed)
+        settings = drawn_settings(_box(wrist__tension_limit=Unstated(draw="10..200 log")), WRIST, seed)
         cut = split(_arrived(settings), [each.values["wrist.tension_limit"] for each in settings])
         assert cut is not None
         limits.append(cut)
     measured = {}
     for name in ("ideal", "differenced", "observer"):
-        own = Box().model_copy(update={"unknowns": {"measured": Unknown(one_of={name: {"measured": name}})}})
+        own = Box().model_copy(update={"unknowns": {"measured": Unstated(one_of={name: {"measured": name}})}})
         (setting, *_) = drawn_settings(own, WRIST, 0)
         measured[name] = float(readings(courses(EXCHANGED, [setting], [setting.reference]))["rmse"][0])
     others = {name: each for name, each in box.unknowns.items() if name not in STRATA}
@@ -311,13 +311,22 @@ def _answer(found: list[BestCase]) -> str:
     for row in dict.fromkeys(each.row for each in found):
         for reading in ("strict", "usual"):
             own = [each for each in found if (each.row, each.reading) == (row, reading)]
-            there = [each.factor for each in own if each.setting is not None]
+            if not own:
+                continue
+            there = _by_seed(own)
             tried = sum(each.rollouts for each in own)
             within = (
                 f"within {min(there):.3f} to {max(there):.3f} over the seeds" if there else f"no setting in {tried}"
             )
             said.append(f"- **{row}**, {reading}: {within}{'' if there else ' rollouts'}")
     return "\n".join(said)
+
+
+def _by_seed(own: list[BestCase]) -> list[float]:
+    """The best factor of each seed over its islands."""
+    seeds = dict.fromkeys(each.seed for each in own)
+    best = [min(each.factor for each in own if each.seed == seed) for seed in seeds]
+    return [each for each in best if np.isfinite(each)]
 
 
 def _cells(each: BestCase) -> str:

@@ -13,7 +13,7 @@ from wristctl.comparison.paper import T2
 from wristctl.comparison.readings import Courses, readings
 from wristctl.config.control import Row
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unknowns import Box, Setting, Unknown
+from wristctl.config.unstated import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
 
 WRIST = WristParameters()
@@ -21,8 +21,8 @@ PRINTED, EXCHANGED = Row(controller="smc", gains="printed"), Row(controller="smc
 LOOP = Loop(plant_segments=1)
 
 
-def setting(wrist: WristParameters, loop: Loop = LOOP) -> Setting:
-    return Setting(wrist, loop, Reference(duration=1.0), 4.0, "ideal", {})
+def setting(wrist: WristParameters, loop: Loop = LOOP) -> PaperSetting:
+    return PaperSetting(wrist, loop, Reference(duration=1.0), 4.0, "ideal", {})
 
 
 def test_the_factor_is_that_of_the_worst_of_three_numbers_either_way() -> None:
@@ -50,7 +50,7 @@ def test_what_has_just_settled_when_time_is_up_has_not_settled() -> None:
         assert np.isinf(closest(of._replace(theta=theta[None]), "gvsc", "usual")[0][0])
 
 
-def sagging() -> Setting:
+def sagging() -> PaperSetting:
     """A wrist that hangs across with tendons too weak to move it, its hand as heavy as 30 deg of sag asks for."""
     masses = np.linspace(0.05, 0.6, 64)
     weak = {"tension_limit": 9.001, "pretension": 9.0, "gravity": (0.0, 9.81), "range_deg": 80.0}
@@ -80,8 +80,8 @@ def test_a_search_that_finds_only_stopped_clocks_finds_nothing(monkeypatch: pyte
     mass = clock.wrist.hand_mass
     own = Box(
         unknowns={
-            "wrist.hand_mass": Unknown(draw=f"{0.99 * mass}..{1.01 * mass}"),
-            "reference.duration": Unknown(draw="0.99..1.01"),
+            "wrist.hand_mass": Unstated(draw=f"{0.99 * mass}..{1.01 * mass}"),
+            "reference.duration": Unstated(draw="0.99..1.01"),
         },
         horizon=4.0,
     )
@@ -93,9 +93,9 @@ def test_a_search_that_finds_only_stopped_clocks_finds_nothing(monkeypatch: pyte
 def test_a_search_comes_closer_and_is_its_seed() -> None:
     own = Box(
         unknowns={
-            "reference.duration": Unknown(draw="0.5..3"),
-            "wrist.tension_limit": Unknown(draw="20..200 log"),
-            "horizon": Unknown(draw="3..4"),
+            "reference.duration": Unstated(draw="0.5..3"),
+            "wrist.tension_limit": Unstated(draw="20..200 log"),
+            "horizon": Unstated(draw="3..4"),
         },
         horizon=4.0,
     )

@@ -19,7 +19,7 @@ from wristctl.config.control import Row
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unknowns import Box, Setting, Unknown
+from wristctl.config.unstated import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.metrics import metrics_of
 
@@ -29,7 +29,7 @@ UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
 
 
 def box(draws: int = 16, **unknowns: Any) -> Box:
-    given = {name.replace("__", "."): Unknown.model_validate(each) for name, each in unknowns.items()}
+    given = {name.replace("__", "."): Unstated.model_validate(each) for name, each in unknowns.items()}
     return Box(unknowns=given, draws=draws, continuous=(2, 1), horizon=2.0)
 
 
@@ -170,7 +170,7 @@ def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None
 
 def test_a_held_tick_by_hand() -> None:
     """One segment has nothing to turn but itself: c F h / M over the law's 1 rad/s."""
-    setting = Setting(WRIST, Loop(plant_segments=1), Reference(), 5.0, "ideal", {})
+    setting = PaperSetting(WRIST, Loop(plant_segments=1), Reference(), 5.0, "ideal", {})
     inertia = 0.05 * 0.04**2 + 0.3 * 0.1**2
     by_hand = 2 * 0.02 / math.sqrt(2) * 60.0 * 0.5e-3 / inertia
     assert overshoot_of_a_tick(setting) == pytest.approx(by_hand, rel=0.02)

@@ -139,7 +139,7 @@ def _all_mappings() -> dict[str, tuple[Mapped, KeyPath, Mapped]]:
         data: Mapped = {}
         for command in COMMANDS:
             data |= parse_yaml(resolved_yaml(study, command), command).data
-        for path, mapping in _mappings(data):
+        for path, mapping in (each for each in _mappings(data) if each[1]):
             names = ["*" if before == "loops" else key for before, key in zip(("", *path), path, strict=False)]
             place = ".".join(str(name) for name in names if not isinstance(name, int))
             found.setdefault(place, (data, path, mapping))

@@ -18,7 +18,7 @@ from wristctl.comparison.box import courses
 from wristctl.comparison.paper import FACTOR, T2
 from wristctl.comparison.readings import Courses, readings, usual
 from wristctl.config.control import Row
-from wristctl.config.unknowns import STRATA, Box, Setting
+from wristctl.config.unstated import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import stream
 from wristctl.tuning.optimisers.differential_evolution import DifferentialEvolution
@@ -48,7 +48,7 @@ class BestCase:
     ours: tuple[float, float, float]
     """RMSE, settling time, steady-state error"""
     read_as: str
-    setting: Setting | None
+    setting: PaperSetting | None
     rollouts: int
     stopped_clocks: int
     """Settings within FACTOR of all three that follow nothing else."""
@@ -78,7 +78,7 @@ def closest(of: Courses, controller: str, reading: Reading) -> tuple[Array, Arra
     return factors[every, best], numbers[every, best], [names[each] for each in best]
 
 
-def follows(row: Row, settings: Sequence[Setting]) -> NDArray[np.bool_]:
+def follows(row: Row, settings: Sequence[PaperSetting]) -> NDArray[np.bool_]:
     """Whether each setting brings the wrist to other angles too, (settings,)."""
     kept = np.ones(len(settings), bool)
     for angle in GUARD_DEG:
@@ -135,18 +135,20 @@ def search(
     )
 
 
-def _at(box: Box, wrist: WristParameters, names: Sequence[str], point: Array, island: tuple[int, float]) -> Setting:
+def _at(
+    box: Box, wrist: WristParameters, names: Sequence[str], point: Array, island: tuple[int, float]
+) -> PaperSetting:
     found = box.setting(wrist, dict(zip(names, np.minimum(point, 1.0 - 1e-12).tolist(), strict=True)))
     loop = found.loop.model_copy(update={"plant_segments": island[0], "control_period": island[1]})
     return found._replace(loop=loop)
 
 
-def _courses(row: Row, settings: Sequence[Setting]) -> Courses:
+def _courses(row: Row, settings: Sequence[PaperSetting]) -> Courses:
     return courses(row, settings, [each.reference for each in settings])
 
 
 def _near(
-    box: Box, wrist: WristParameters, row: Row, reading: Reading, there: Setting, rng: np.random.Generator
+    box: Box, wrist: WristParameters, row: Row, reading: Reading, there: PaperSetting, rng: np.random.Generator
 ) -> float:
     """Share of neighbours within FACTOR: every number of wrist, reference and horizon moved by up to 5 % of itself."""
     moved = []

@@ -14,7 +14,7 @@ from wristctl.arrays import Array
 from wristctl.comparison.readings import READINGS, Courses, readings
 from wristctl.config.control import Row
 from wristctl.config.loop import Reference
-from wristctl.config.unknowns import STRATA, Box, Setting
+from wristctl.config.unstated import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
@@ -34,7 +34,7 @@ _TOGETHER = 64
 class Reactions:
     """What each row did in each setting, (settings,) for each of READINGS by the row's name."""
 
-    settings: Sequence[Setting]
+    settings: Sequence[PaperSetting]
     found: Mapping[str, Mapping[str, Array]]
 
     def values(self, unknown: str) -> list[Any]:
@@ -42,7 +42,7 @@ class Reactions:
         return [each.values[unknown] for each in self.settings]
 
 
-def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[Setting]:
+def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSetting]:
     """The box's draws: every combination of the strata as often, all else a Latin hypercube over all of them."""
     strata = [name for name in box.unknowns if name in STRATA]
     cells = list(product(*(range(_alternatives(box, name)) for name in strata)))
@@ -54,7 +54,7 @@ def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[Setting]
     return [box.setting(wrist, {name: float(each[k]) for name, each in shares.items()}) for k in range(count)]
 
 
-def continuous_settings(box: Box, wrist: WristParameters, seed: int) -> list[Setting]:
+def continuous_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSetting]:
     """As many of them as asked for with ideal measurement in nearly continuous time: of one segment, then of four."""
     found = []
     for segments, count in zip((1, 4), box.continuous, strict=False):
@@ -74,7 +74,7 @@ def continuous_settings(box: Box, wrist: WristParameters, seed: int) -> list[Set
 
 def react(
     rows: Sequence[Row],
-    settings: Sequence[Setting],
+    settings: Sequence[PaperSetting],
     progress: Callable[[float], None] | None = None,
     mirrored: bool = False,
 ) -> Reactions:
@@ -93,7 +93,7 @@ def react(
     return Reactions(settings, found)
 
 
-def courses(row: Row, settings: Sequence[Setting], references: Sequence[Reference]) -> Courses:
+def courses(row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference]) -> Courses:
     """What one row does in settings that can run in one batch, each with a reference of its own."""
     law = controller(row.controller)
     gains = np.tile(gains_of(law, row.gains, None), (len(settings), 1))
@@ -112,13 +112,13 @@ def courses(row: Row, settings: Sequence[Setting], references: Sequence[Referenc
     return Courses(theta, wanted, rests, horizons, period)
 
 
-def _ran(row: Row, settings: Sequence[Setting], mirrored: bool) -> dict[str, Array]:
+def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool) -> dict[str, Array]:
     """The readings (settings,) of one row."""
     references = [each.reference.mirrored() if mirrored else each.reference for each in settings]
     return readings(courses(row, settings, references))
 
 
-def _alike(settings: Sequence[Setting]) -> list[NDArray[np.intp]]:
+def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
     """Settings that can run in one batch, the longest batches last."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for number, each in enumerate(settings):

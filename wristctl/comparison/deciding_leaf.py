@@ -21,7 +21,7 @@ class Leaf(NamedTuple):
     share: float
 
 
-class Split(NamedTuple):
+class Threshold(NamedTuple):
     """One threshold of a number, with its 95 % interval by bootstrap, and the shares of yes below and above it."""
 
     at: float
@@ -64,7 +64,7 @@ def _explained(y: Array, bins: NDArray[np.int64]) -> float:
     return max(0.0, (between - (k - 1) * within) / (total + within))
 
 
-def split(yes: NDArray[np.bool_], values: Sequence[float], seed: int = 0) -> Split | None:
+def split(yes: NDArray[np.bool_], values: Sequence[float], seed: int = 0) -> Threshold | None:
     """The one threshold of a number that leaves least variance on its sides (a tree's first split), of finite draws.
 
     None where all say the same.
@@ -81,7 +81,7 @@ def split(yes: NDArray[np.bool_], values: Sequence[float], seed: int = 0) -> Spl
     again = [each for each in (_threshold(x[own], y[own]) for own in drawn) if each is not None]
     low, high = np.quantile(again, (0.025, 0.975))
     under = x < at
-    return Split(at, float(low), float(high), float(y[under].mean()), float(y[~under].mean()))
+    return Threshold(at, float(low), float(high), float(y[under].mean()), float(y[~under].mean()))
 
 
 def _threshold(x: Array, y: NDArray[np.bool_]) -> float | None:

@@ -13,13 +13,13 @@ import math
 
 import numpy as np
 
-from wristctl.config.unknowns import Setting
+from wristctl.config.unstated import PaperSetting
 from wristctl.control.smc import SMC
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 
 
-def overshoot_of_a_tick(setting: Setting, gains: str = "exchanged") -> float:
+def overshoot_of_a_tick(setting: PaperSetting, gains: str = "exchanged") -> float:
     """How many times too far one held tick goes; infinite without a tension limit."""
     wrist, loop, own = setting.wrist, setting.loop, SMC.presets[gains]
     if not loop.limits:
@@ -32,7 +32,7 @@ def overshoot_of_a_tick(setting: Setting, gains: str = "exchanged") -> float:
     return pull * (turned / wrist.damping + 0.5 * loop.control_period / inertia) / (own["P3"] / own["P1"])
 
 
-def holds(setting: Setting) -> bool:
+def holds(setting: PaperSetting) -> bool:
     """Whether the tendons can hold 30 deg toward the reference's side."""
     wrist, loop = setting.wrist, setting.loop
     theta = math.radians(setting.reference.end_deg)
@@ -41,6 +41,6 @@ def holds(setting: Setting) -> bool:
     return not loop.limits or abs(load) <= most
 
 
-def arrives_by_rule(setting: Setting, gains: str = "exchanged") -> bool:
+def arrives_by_rule(setting: PaperSetting, gains: str = "exchanged") -> bool:
     """Strong enough to hold, and no tick too far."""
     return holds(setting) and overshoot_of_a_tick(setting, gains) < 1.0

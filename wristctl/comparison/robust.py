@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.comparison.box import Reactions
-from wristctl.comparison.deciding_leaf import Leaf, Split, deciding, split
+from wristctl.comparison.deciding_leaf import Leaf, Threshold, deciding, split
 from wristctl.comparison.shares import Share, share
 from wristctl.comparison.verdicts import of_numbers, of_ordering
 from wristctl.config.audit import Claim, VerdictName
@@ -34,7 +34,7 @@ class Strip:
     verdicts: Sequence[VerdictName]
     leaves: Sequence[Leaf]
     """Unknowns by what they explain of whether the claim holds."""
-    split: Split | None
+    split: Threshold | None
     """Of the first of them, where it is a number."""
     told: str
     """Where the claim holds by the first of them, in words."""
@@ -69,7 +69,7 @@ def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None
     return found
 
 
-def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Split | None) -> str:
+def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Threshold | None) -> str:
     """Where it holds by one unknown, with the shares there and elsewhere."""
     kept = np.array(values, object)
     if cut is None:

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
-from wristctl.config.unknowns import Box
+from wristctl.config.unstated import Box
 
 VerdictName = Literal[
     "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"

@@ -89,6 +89,7 @@ def audit(session: Session) -> Audited:
     from wristctl.comparison.evidence import TRAININGS, Grounds, conditions_of, evidence_study
     from wristctl.comparison.ledger import judge, ledger_frame
     from wristctl.control.table import CONTROLLERS
+    from wristctl.report.ledger_figure import ours_over_the_papers
     from wristctl.studies.audit_box import box_table, judged_in_box
     from wristctl.studies.audit_tables import ledger_tables
 
@@ -107,6 +108,8 @@ def audit(session: Session) -> Audited:
     )
     judged = [judge(claim, grounds) for claim in claims]
     boxed = judged_in_box(session)
+    if not boxed and any(name for each in judged for name in each.found):
+        findings.figure("ledger", ours_over_the_papers, judged)
     shown_by = {name: _name(each) for name, each in (*compared.items(), *inputs.items())}
 
     units = {"paper": "", "low": "", "high": ""}

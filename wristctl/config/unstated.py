@@ -22,7 +22,7 @@ STRATA = ("loop.plant_segments", "loop.control_period", "measured")
 """Unknowns that rollouts of one batch share: every combination of them is drawn as often."""
 
 
-class Unknown(Section):
+class Unstated(Section):
     """One thing that is not given: values of a leaf, or alternatives that set several leaves; and why so."""
 
     draw: Drawn | None = None
@@ -50,7 +50,7 @@ class Unknown(Section):
         return drawn_value(self.draw, share / (1.0 - self.odds)), None
 
 
-class Setting(NamedTuple):
+class PaperSetting(NamedTuple):
     """One point of the box: all that a simulation of the paper has to assume."""
 
     wrist: WristParameters
@@ -65,12 +65,12 @@ class Setting(NamedTuple):
 class Box(Section):
     """The unknowns, how many settings are drawn, and over which horizon they run."""
 
-    unknowns: dict[str, Unknown] = choice({}, "what the paper leaves open; experiments/unknowns.yaml has all")
+    unknowns: dict[str, Unstated] = choice({}, "what the paper leaves open; experiments/unknowns.yaml has all")
     draws: int = choice(1008, "settings drawn, each for every controller", ge=8, le=1_000_000)
     continuous: tuple[int, ...] = choice((100, 25), "settings in nearly continuous time: of one segment, of four")
     horizon: float = quantity(6.0, "s", "longest horizon", "assumed", gt=0)
 
-    def setting(self, wrist: WristParameters, shares: Mapping[str, float]) -> Setting:
+    def setting(self, wrist: WristParameters, shares: Mapping[str, float]) -> PaperSetting:
         """The setting at these shares of each unknown."""
         data: dict[str, dict[str, Any]] = {"wrist": wrist.model_dump(), "loop": {}, "reference": {}, "": {}}
         values = {}
@@ -89,7 +89,7 @@ class Box(Section):
         if measured == "observer":
             loop = _observed(loop)
         wrist = WristParameters.model_validate(data["wrist"])
-        return Setting(wrist, loop, Reference.model_validate(data["reference"]), horizon, measured, values)
+        return PaperSetting(wrist, loop, Reference.model_validate(data["reference"]), horizon, measured, values)
 
     @model_validator(mode="after")
     def _all_settings_can_be(self) -> Self:
