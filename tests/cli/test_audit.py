@@ -47,7 +47,7 @@ def test_ledger_orders_the_rows_of_t2_as_it_prints_them_and_judges_no_law_that_i
             assert getattr(less, fields[str(claim.metric)]) < getattr(more, fields[str(claim.metric)])
 
 
-def test_audit_judges_every_claim_on_each_loop_and_draws_nothing(call: Call, tmp_path: Path) -> None:
+def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, tmp_path: Path) -> None:
     """On the ledger without the rivals, whose rollouts on the exact loop take long."""
     data = yaml.safe_load(LEDGER.read_text())
     named = ("mrac", "gvsc", "nc")
@@ -78,7 +78,8 @@ def test_audit_judges_every_claim_on_each_loop_and_draws_nothing(call: Call, tmp
     shown = json.loads((run.path / "evidence.json").read_text())
     assert list(shown)[:3] == ["exact", "sampled", "default"]
     assert all(open_run(each).kind == "compare" for each in shown.values())
-    assert not list((tmp_path / "results").rglob("*.png")), "figures are drawn when somebody asks for them"
+    pictures = [each.relative_to(run.path).as_posix() for each in (tmp_path / "results").resolve().rglob("*.png")]
+    assert pictures == ["figures/ledger.png"], "one; others are drawn when somebody asks for them"
 
 
 def test_trainings_decide_the_claims_on_networks_and_are_cited(call: Call, tmp_path: Path) -> None:

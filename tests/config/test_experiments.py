@@ -139,9 +139,7 @@ def _all_mappings() -> dict[str, tuple[Mapped, KeyPath, Mapped]]:
         data: Mapped = {}
         for command in COMMANDS:
             data |= parse_yaml(resolved_yaml(study, command), command).data
-        for path, mapping in _mappings(data):
-            if not mapping:
-                continue
+        for path, mapping in (each for each in _mappings(data) if each[1]):
             names = ["*" if before == "loops" else key for before, key in zip(("", *path), path, strict=False)]
             place = ".".join(str(name) for name in names if not isinstance(name, int))
             found.setdefault(place, (data, path, mapping))
@@ -174,9 +172,13 @@ def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_
     file.write_text(yaml.safe_dump(_alone(data, path, {misspelt: 1.0}), sort_keys=False))
     line = 1 + next(n for n, text in enumerate(file.read_text().splitlines()) if f"{misspelt}:" in text)
     error = _refusal(file)
+    if "unknowns" in path and (path[-1] == "unless" or path[-2] == "one_of"):  # keys of leaves elsewhere
+        assert error.where.startswith(f"{file}:") and error.what.endswith(f"there is no leaf {misspelt.split('.')[-1]}")
+        return
     names = (0 if isinstance(key, int) else key for key in (*path, misspelt))
     assert error.where == f"{file}:{line}: {'.'.join(map(str, names))}"
-    if path[-1:] in (("loops",), ("families",), ("budgets",), ("variants",)):  # any name will do, but a number is none
+    if path[-1:] in (("loops",), ("families",), ("budgets",), ("variants",), ("unknowns",), ("one_of",)):
+        # any name will do, but a number is none
         assert error.what == "1.0 should be a group of keys and values"
     elif path[-1:] == ("terms",):
         assert error.what == "1.0 should be a valid list"

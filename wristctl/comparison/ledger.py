@@ -54,6 +54,8 @@ def judge(claim: Claim, shown: Grounds) -> Judgement:
     if claim.evidence == "text":
         assert claim.verdict is not None
         return Judgement(claim, {"": Finding(claim.verdict)})
+    if claim.evidence == "symmetry":
+        return Judgement(claim, {"": Finding("not specified enough")})
     if claim.evidence == "equation":
         return Judgement(claim, {"": _by_equation(claim)}, ("equation",))
     if claim.evidence == "hardware":

@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
+from wristctl.config.unstated import Box
 
 VerdictName = Literal[
     "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
@@ -18,6 +19,7 @@ SenseName = Literal["about", "exactly", "at least", "at most"]
 _NEEDED = {
     "comparison": ("value", "controller", "gains", "metric"),
     "ordering": ("controller", "gains", "than", "metric"),
+    "symmetry": ("controller", "gains", "metric"),
     "table1": ("value", "metric"),
     "selection": ("value", "metric"),
     "hardware": ("value", "metric"),
@@ -31,7 +33,9 @@ class Claim(Section):
 
     id: str
     says: str
-    evidence: Literal["comparison", "ordering", "table1", "selection", "hardware", "equation", "text", "settings"]
+    evidence: Literal[
+        "comparison", "ordering", "symmetry", "table1", "selection", "hardware", "equation", "text", "settings"
+    ]
     value: float | None = None
     sense: SenseName = "about"
     """How `value` is meant: within a factor, as it is, or as a bound."""
@@ -83,6 +87,7 @@ class AuditSettings(Section):
     selection: str | None = choice(None, "train run of experiments/model_selection.yaml: path, id or latest:train")
     hardware: str | None = choice(None, "hw-run run that judges the experiment's claims: path, id or latest:hw-run")
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+    box: Box = Box()
 
     @model_validator(mode="after")
     def _ids_differ(self) -> Self:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from wristctl.comparison.evidence import Metrics, TrialsDone
     from wristctl.comparison.ledger import Judgement
+    from wristctl.comparison.robust import Strip
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -36,13 +37,15 @@ class Audited(StudyResult):
     judgements: list[Judgement]
     comparisons: dict[str, Compared]
     """by loop"""
+    strips: list[Strip]
+    """over the box of what the paper leaves open, where the study names it"""
 
     @property
     def answer(self) -> list[str]:
         """What of the paper holds, in a few lines."""
         from wristctl.studies.audit_answer import answer_of
 
-        return answer_of(self.judgements)
+        return answer_of(self.judgements, self.strips)
 
     def frame(self) -> pd.DataFrame:
         """One row per claim: the paper's value, verdict and reason, and on each loop our range, verdict and mark."""
@@ -63,6 +66,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in (*TRAININGS, "hardware"))
     shown = [f"{name}: {_name(inputs[name]) if name in inputs else 'open, for want of a run'}" for name in asked]
     rollouts = f"{len(conditions_of(claims))} comparisons on the built-in loops"
+    box = study.audit.box
+    rollouts += f", and {box.draws + sum(box.continuous)} settings drawn" * bool(box.unknowns)
     return "\n".join([f"{len(claims)} claims; {rollouts}", *shown])
 
 
@@ -71,6 +76,8 @@ def audit(session: Session) -> Audited:
     from wristctl.comparison.evidence import TRAININGS, Grounds, conditions_of, evidence_study
     from wristctl.comparison.ledger import judge, ledger_frame
     from wristctl.control.table import CONTROLLERS
+    from wristctl.report.ledger_figure import ours_over_the_papers
+    from wristctl.studies.audit_box import box_table, judged_in_box
     from wristctl.studies.audit_tables import ledger_tables
 
     findings, inputs, study = session.findings, session.inputs, session.study
@@ -87,6 +94,9 @@ def audit(session: Session) -> Audited:
         study.wrist.tension_limit,
     )
     judged = [judge(claim, grounds) for claim in claims]
+    boxed = judged_in_box(session)
+    if not boxed and any(name for each in judged for name in each.found):
+        findings.figure("ledger", ours_over_the_papers, judged)
     shown_by = {name: _name(each) for name, each in (*compared.items(), *inputs.items())}
 
     units = {"paper": "", "low": "", "high": ""}
@@ -100,7 +110,11 @@ def audit(session: Session) -> Audited:
     for verdict, count in sorted(Counter(counted).items()):
         findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=f"claims whose verdict is: {verdict}")
     evidence = Table("Runs that show it", ("shown by", "run"), list(shown_by.items()))
-    return Audited(study, findings, [*ledger_tables(judged), evidence], judged, compared)
+    tables = [*ledger_tables(judged), *([box_table(boxed)] if boxed else []), evidence]
+    return Audited(study, findings, tables, judged, compared, boxed)
+
+
+_METRICS = ("comparison", "ordering", "symmetry", "hardware")
 
 
 def _check_claims(claims: Sequence[Claim]) -> None:
@@ -109,7 +123,7 @@ def _check_claims(claims: Sequence[Claim]) -> None:
     from wristctl.simulation.metrics import METRICS
 
     loops: Iterable[str] = METRICS
-    tables = {"equation": set(EQUATIONS)} | {each: set(loops) for each in ("comparison", "ordering", "hardware")}
+    tables = {"equation": set(EQUATIONS)} | {kind: set(loops) for kind in _METRICS}
     for claim in claims:
         known = tables.get(claim.evidence)
         if known is not None and claim.metric not in known:

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from wristctl.comparison.ledger import Judgement
+    from wristctl.comparison.robust import Strip
 
 LINES, COLUMNS = 12, 100
 """What an answer may take of a terminal."""
 _ORDER = ("reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open")
 
 
-def answer_of(judged: Sequence[Judgement], more: Sequence[str] = ()) -> list[str]:
-    """At most LINES lines of at most COLUMNS columns; `more` is what else was found, in lines."""
+def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list[str]:
+    """At most LINES lines of at most COLUMNS columns; `strips` are the claims over the box."""
     claims = [j for j in judged if j.verdict is not None]
     counted = Counter(str(j.verdict) for j in claims)
     counts = ", ".join(f"{counted[each]} {each}" for each in _ORDER if counted[each])
@@ -34,12 +35,25 @@ def answer_of(judged: Sequence[Judgement], more: Sequence[str] = ()) -> list[str
     against = [j.claim.id for j in claims if any(each.verdict == "contradicted" for each in j.found.values())]
     if against:
         lines += _wrapped(f"Contradicted by the paper's own equations or words{_listed(against)}.", 2)
-    lines += more
+    lines += _over_the_box(strips)
     missing = [j for j in claims if j.verdict == "open"]
     if missing:
         wanted = [f"--{name}" for name in dict.fromkeys(j.claim.evidence for j in missing if j.claim.evidence in _RUNS)]
         lines += _wrapped(f"{_many(len(missing), 'claim')} open: give {', '.join(wanted) or 'more seeds'}.")
     return [*lines[: LINES - 1], "All claims with reasons: `wristctl audit ... --all`, or the run's README.md."]
+
+
+def _over_the_box(strips: Sequence[Strip]) -> list[str]:
+    """Where the laws arrive, and what decides the claims on the paper's own laws."""
+    if not strips:
+        return []
+    arrive = [each for each in strips if each.claim.id.startswith("A-")]
+    said = [f"{each.claim.label} {100 * each.share('reproduced').value:.0f} % ({each.told})" for each in arrive]
+    begin = f"Over {len(strips[0].verdicts)} settings that the paper may have had, 30 deg are reached by"
+    lines = _wrapped(f"{begin} {', '.join(said)}.", 2)
+    orders = [each for each in strips if each.claim.than and not each.claim.unspecified]
+    most = [f"{each.claim.id} {100 * each.share('reproduced').value:.0f} %" for each in orders]
+    return lines + _wrapped(f"Its orderings of its own two laws hold in: {', '.join(most)}.", 2) * bool(orders)
 
 
 _RUNS = ("table1", "selection", "hardware")

@@ -1,0 +1,213 @@
+"""Settings drawn from what the paper leaves open: what is drawn, how it is read, and what decides."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.comparison.box import continuous_settings, courses, drawn_settings, react
+from wristctl.comparison.deciding_leaf import deciding, split
+from wristctl.comparison.held_tick import arrives_by_rule, overshoot_of_a_tick
+from wristctl.comparison.readings import Courses, readings, usual
+from wristctl.comparison.robust import rows_in_box, strips, strips_frame
+from wristctl.config.audit import Claim
+from wristctl.config.control import Row
+from wristctl.config.errors import UserError
+from wristctl.config.load import load_study
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.unstated import Box, PaperSetting, Unstated
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.metrics import metrics_of
+
+WRIST = WristParameters()
+EXCHANGED = Row(controller="smc", gains="exchanged")
+UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
+
+
+def box(draws: int = 16, **unknowns: Any) -> Box:
+    given = {name.replace("__", "."): Unstated.model_validate(each) for name, each in unknowns.items()}
+    return Box(unknowns=given, draws=draws, continuous=(2, 1), horizon=2.0)
+
+
+def test_every_combination_of_segments_period_and_measurement_is_drawn_as_often() -> None:
+    own = load_study([UNKNOWNS]).audit.box
+    settings = drawn_settings(own, WRIST, 0)
+    assert len(settings) == own.draws == 1008
+    cells = [(each.loop.plant_segments, each.loop.control_period, each.measured) for each in settings]
+    assert {cells.count(each) for each in set(cells)} == {12} and len(set(cells)) == 4 * 7 * 3
+    assert all(unknown.why for unknown in own.unknowns.values()), "each with a reason"
+    free = [each for each in settings if math.isinf(each.values["wrist.tension_limit"])]
+    assert len(free) == 168 and not any(each.loop.limits for each in free)
+    lengths = np.sort([each.wrist.length for each in settings])
+    even = 0.05 + 0.07 * (np.arange(1008) + 0.5) / 1008
+    assert np.abs(lengths - even).max() <= 0.07 / 1008, "a Latin hypercube: one in each of as many parts"
+    assert all(each.loop.sensor.level == "camera" for each in settings if each.measured == "observer")
+
+
+def test_draws_are_their_seeds_and_another_unknown_changes_none_of_the_others() -> None:
+    one = box(wrist__length={"draw": "0.05..0.12"})
+    two = box(wrist__mass={"draw": "0.02..0.1"}, wrist__length={"draw": "0.05..0.12"})
+    lengths = [[each.wrist.length for each in drawn_settings(own, WRIST, 3)] for own in (one, two)]
+    assert lengths[0] == lengths[1] != [each.wrist.length for each in drawn_settings(one, WRIST, 4)]
+
+
+def test_nearly_continuous_settings_are_measured_as_they_are() -> None:
+    own = box(measured={"one_of": {"observer": {"measured": "observer"}}}, wrist__mass={"draw": "0.02..0.1"})
+    found = continuous_settings(own, WRIST, 0)
+    assert [(each.loop.plant_segments, each.loop.control_period) for each in found] == [(1, 1e-6)] * 2 + [(4, 1e-6)]
+    assert {each.measured for each in found} == {"ideal"} == {each.loop.sensor.level for each in found}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("wrist.lenght: {draw: 1..2}", "there is no leaf lenght"),
+        ("lenght: {draw: 1..2}", "there is no leaf lenght"),
+        ("wrist.length: {draw: -1..2}", "cannot draw wrist.length"),
+        ("wrist.length: {why: x}", "give draw: or one_of:"),
+        ("horizon: {draw: 1..9}", "horizon at most 6"),
+        ("measured: {draw: [ideal, guessed]}", "measured is one of ideal, differenced, observer"),
+        ("wrist.length: {draw: 0.1..0.2, odds: 0.5}", "unless: stands beside draw:"),
+    ],
+)
+def test_a_box_that_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "box.yaml"
+    file.write_text(f"audit: {{box: {{unknowns: {{{text}}}}}}}")
+    with pytest.raises(UserError, match=said):
+        load_study([file])
+
+
+def courses_of(theta: np.ndarray, rest: float = 0.0, horizon: float = 5.0, period: float = 1e-3) -> Courses:
+    wanted = np.full_like(theta, 0.5)
+    return Courses(theta[None], wanted[None], np.array([rest]), np.array([horizon]), period)
+
+
+def test_readings_are_the_metrics_of_their_names() -> None:
+    time = np.arange(6000) * 1e-3
+    theta = 0.5 * (1 - np.exp(-time / 0.2)) + 1e-3 * np.sin(40 * time)
+    still = np.full((5000, 2), 3.0)
+    for rest in (0.0, 0.6):
+        found = readings(courses_of(theta, rest))
+        known = metrics_of(1e-3, theta[:5000], np.full(5000, 0.5), still, 0.5, rest)
+        for name, values in found.items():
+            assert values[0] == pytest.approx(known[name], rel=1e-9), (name, rest)
+
+
+def test_what_fails_or_never_settles_has_no_number_and_what_comes_after_the_horizon_does_not_count() -> None:
+    theta = np.full(6000, 0.5)
+    theta[4000:] = np.nan
+    assert np.isnan(readings(courses_of(theta))["rmse"][0])
+    assert readings(courses_of(theta, horizon=3.9))["rmse"][0] == 0.0
+    away = np.full(6000, 0.4)
+    assert np.isnan(readings(courses_of(away))["settling"][0])
+    assert readings(courses_of(away))["rmse"][0] == pytest.approx(0.1)
+    names, numbers = usual(courses_of(np.full(6000, 0.5 * 0.97)))
+    settled = {name for name, each in zip(names, numbers[0], strict=True) if np.isfinite(each).all()}
+    assert settled == {name for name in names if "within 5 %" in name} and len(names) == 18
+
+
+def test_usual_readings_hold_the_strict_one() -> None:
+    time = np.arange(6000) * 1e-3
+    of = courses_of(0.5 * (1 - np.exp(-time / 0.2)))
+    names, numbers = usual(of)
+    strict = readings(of)
+    expected = [strict[name][0] for name in ("rmse", "settling", "steady_state")]
+    assert numbers[0, names.index("angle within 2 %, last 10 %")] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_unknown_that_decides_comes_first_and_noise_explains_nothing() -> None:
+    rng = np.random.default_rng(0)
+    limit, other = rng.uniform(10, 200, 600), rng.uniform(0, 1, 600)
+    kind = rng.choice(["step", "move"], 600).tolist()
+    yes = (limit < 53.0) & np.array([each == "move" for each in kind])
+    leaves = deciding(yes, {"other": other.tolist(), "limit": limit.tolist(), "kind": kind})
+    assert [leaf.name for leaf in leaves[:2]] == ["limit", "kind"] and leaves[2].share < 0.02
+    assert leaves[0].share == pytest.approx(np.var([yes[limit < 53].mean(), 0.0]) * 0.7 / yes.var(), rel=0.25)
+    assert all(leaf.share == 0.0 for leaf in deciding(np.ones(600, bool), {"limit": limit.tolist()}))
+
+
+def test_a_split_finds_the_threshold_and_infinity_is_no_number() -> None:
+    rng = np.random.default_rng(1)
+    x = np.append(rng.uniform(10, 200, 400), [np.inf] * 50)
+    cut = split(x < 53.0, x.tolist())
+    assert cut is not None and cut.low <= 53.0 <= cut.high and cut.high - cut.low < 3.0
+    assert (cut.below, cut.above) == (1.0, 0.0)
+    flipped = split(x >= 53.0, x.tolist())
+    assert flipped is not None and flipped.at == cut.at and (flipped.below, flipped.above) == (0.0, 1.0)
+    assert split(np.ones(450, bool), x.tolist()) is None
+
+
+def test_how_the_rate_is_measured_decides_at_60_newton() -> None:
+    """Four segments at 1 kHz: nothing arrives with the rate as it is, and behind the observer it does."""
+    own = box(24, measured={"one_of": {name: {"measured": name} for name in ("ideal", "differenced", "observer")}})
+    settings = drawn_settings(own.model_copy(update={"draws": 3, "horizon": 5.0}), WRIST, 0)
+    rmse = react([EXCHANGED], settings).found["smc/exchanged"]["rmse"]
+    found = {each.measured: value for each, value in zip(settings, rmse, strict=True)}
+    assert found["ideal"] == pytest.approx(0.49, abs=0.01) and found["observer"] == pytest.approx(0.0014, abs=1e-4)
+
+
+def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None:
+    """Two draws of the limit alone around the 53 N that four segments at 1 kHz stand."""
+    own = box(64, wrist__tension_limit={"draw": "40..70"}).model_copy(update={"horizon": 4.0})
+    settings = drawn_settings(own, WRIST, 0)
+    claim = Claim(
+        id="A", says="", evidence="comparison", controller="smc", gains="exchanged", metric="steady_state",
+        value=0.01745, sense="at most",
+    )  # fmt: skip
+    (strip,) = strips([claim], react(rows_in_box([claim]), settings))
+    assert strip.split is not None and 52.5 < strip.split.at < 55.0 and strip.leaves[0].share > 0.8
+    assert strip.told.startswith("wrist.tension_limit < 5")
+    frame = strips_frame([strip])
+    held = np.array([each == "reproduced" for each in strip.verdicts])
+    assert frame["reproduced"][0] == held.mean() and frame["reproduced_low"][0] < held.mean()
+    rule = np.array([arrives_by_rule(each) for each in settings])
+    assert (rule == held).mean() >= 0.85 and 0 < rule.sum() < len(rule)
+
+
+def test_a_held_tick_by_hand() -> None:
+    """One segment has nothing to turn but itself: c F h / M over the law's 1 rad/s."""
+    setting = PaperSetting(WRIST, Loop(plant_segments=1), Reference(), 5.0, "ideal", {})
+    inertia = 0.05 * 0.04**2 + 0.3 * 0.1**2
+    by_hand = 2 * 0.02 / math.sqrt(2) * 60.0 * 0.5e-3 / inertia
+    assert overshoot_of_a_tick(setting) == pytest.approx(by_hand, rel=0.02)
+    free = setting._replace(loop=Loop(plant_segments=1, limits=False))
+    assert math.isinf(overshoot_of_a_tick(free)) and not arrives_by_rule(free)
+    weak = setting._replace(wrist=WRIST.model_copy(update={"tension_limit": 5.0}))
+    assert not arrives_by_rule(weak), "too weak to hold 30 deg"
+
+
+def test_a_mirrored_wrist_is_symmetrical_and_one_that_sags_is_not() -> None:
+    claim = Claim(id="X", says="", evidence="symmetry", controller="pid", gains="printed", metric="rmse")
+    upright = {"wrist.gravity": (-9.81, 0.0), "loop.plant_segments": 1}
+    across = {"wrist.gravity": (0.0, 9.81), "loop.plant_segments": 1}
+    own = box(pose={"one_of": {"upright": upright, "across": across}}).model_copy(update={"draws": 8})
+    settings = drawn_settings(own, WRIST, 0)
+    rows = rows_in_box([claim])
+    (strip,) = strips([claim], react(rows, settings), react(rows, settings, mirrored=True))
+    assert [each == "reproduced" for each in strip.verdicts] == [each.values["pose"] == "upright" for each in settings]
+    assert strip.told == "pose upright 100 %, else 0 %"
+
+
+def test_orderings_are_judged_draw_by_draw() -> None:
+    claim = Claim(
+        id="O", says="", evidence="ordering", controller="smc", gains="exchanged", than="pid/printed", metric="rmse"
+    )
+    own = box(loop__plant_segments={"draw": (1,)}, wrist__hand_mass={"draw": "0.1..0.4"})
+    drawn = react(rows_in_box([claim]), drawn_settings(own, WRIST, 0))
+    (strip,) = strips([claim], drawn)
+    ratios = drawn.found["pid/printed"]["rmse"] / drawn.found["smc/exchanged"]["rmse"]
+    assert np.allclose(strip.ratios, ratios) and strip.share("reproduced").value == (ratios > 1.05).mean()
+
+
+def test_a_differenced_rate_is_the_angles_change_over_a_period() -> None:
+    """A step of 30 deg asked of a wrist: rates by difference lag half a period, so courses differ, a little."""
+    ways = {"one_of": {name: {"measured": name} for name in ("ideal", "differenced")}}
+    made = box(measured=ways, loop__plant_segments={"draw": (1,)})
+    settings = drawn_settings(made.model_copy(update={"draws": 2}), WRIST, 0)
+    gentle = Row(controller="pid", gains={"Kp": 5.0, "Ki": 1.0, "Kd": 0.3})
+    found = [courses(gentle, [each], [each.reference]).theta[0] for each in settings]
+    assert 1e-9 < np.abs(found[0] - found[1]).max() < 1e-3

@@ -1,0 +1,130 @@
+"""The paper's claims over the box of what it leaves open: in which share each verdict holds, and what decides it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.comparison.box import Reactions
+from wristctl.comparison.deciding_leaf import Leaf, Threshold, deciding, split
+from wristctl.comparison.shares import Share, share
+from wristctl.comparison.verdicts import of_numbers, of_ordering
+from wristctl.config.audit import Claim, VerdictName
+from wristctl.config.control import Row
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+IN_BOX = ("comparison", "ordering", "symmetry")
+"""Evidence that draws give."""
+_LEAST = 0.01
+"""Share of the variance below which no unknown decides."""
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One claim over the box: our value over the paper's in each draw (an ordering: the ratio), and its verdicts."""
+
+    claim: Claim
+    ratios: NDArray[np.float64]
+    verdicts: Sequence[VerdictName]
+    leaves: Sequence[Leaf]
+    """Unknowns by what they explain of whether the claim holds."""
+    split: Threshold | None
+    """Of the first of them, where it is a number."""
+    told: str
+    """Where the claim holds by the first of them, in words."""
+
+    def share(self, verdict: VerdictName) -> Share:
+        """Of the draws."""
+        return share(np.array([each == verdict for each in self.verdicts]))
+
+
+def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
+    """The rows that the claims need, each once; those of a symmetry are run to both sides."""
+    own = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
+    labels = dict.fromkeys(label for claim in own for label in (claim.label, claim.than) if label)
+    return [Row(controller=name, gains=gains) for name, gains in (label.split("/") for label in labels)]
+
+
+def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None = None) -> list[Strip]:
+    """Every claim that draws can judge, by those of its rows."""
+    own = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
+    values = {name: drawn.values(name) for name in drawn.settings[0].values}
+    found = []
+    for claim in own:
+        if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
+            continue
+        ratios, verdicts = _judged(claim, drawn, mirrored)
+        yes = np.array([each == "reproduced" for each in verdicts])
+        leaves = deciding(yes, values)
+        first = values[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
+        cut = split(yes, first) if first and not isinstance(first[0], str) else None
+        told = _worded(leaves[0].name, yes, first, cut) if first else ""
+        found.append(Strip(claim, ratios, verdicts, leaves, cut, told))
+    return found
+
+
+def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Threshold | None) -> str:
+    """Where it holds by one unknown, with the shares there and elsewhere."""
+    kept = np.array(values, object)
+    if cut is None:
+        shares = {each: float(yes[kept == each].mean()) for each in dict.fromkeys(values)}
+        best = max(shares, key=lambda each: shares[each])
+        return f"{name} {best} {100 * shares[best]:.0f} %, else {100 * float(yes[kept != best].mean()):.0f} %"
+    parts = [f"{name} < {cut.at:.3g} {100 * cut.below:.0f} %", f"above {100 * cut.above:.0f} %"]
+    none = yes[kept == np.inf]
+    return ", ".join([*parts, f"none {100 * float(none.mean()):.0f} %"] if len(none) else parts)
+
+
+def _judged(
+    claim: Claim, drawn: Reactions, mirrored: Reactions | None
+) -> tuple[NDArray[np.float64], list[VerdictName]]:
+    """In the box the reference is drawn too: settling counts from its beginning, as the paper's does."""
+    metric = "settling" if claim.metric == "settling_after" else str(claim.metric)
+    ours = drawn.found[claim.label][metric]
+    if claim.evidence == "symmetry":
+        assert mirrored is not None
+        other = mirrored.found[claim.label][metric]
+        orders = [of_ordering([a], [b]) for a, b in zip(ours, other, strict=True)]
+        alike = [each.reason.startswith("alike") for each in orders]
+        return other / ours, ["reproduced" if each else "worse than the paper" for each in alike]
+    if claim.than is not None:
+        other = drawn.found[claim.than][metric]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = other / ours
+        return ratios, [of_ordering([a], [b]).verdict for a, b in zip(ours, other, strict=True)]
+    assert claim.value is not None
+    return ours / claim.value, [of_numbers(claim.value, [each], claim.sense).verdict for each in ours]
+
+
+def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
+    """One row per claim: shares of the box with their 95 % intervals, and the two unknowns that decide most."""
+    import pandas as pd
+
+    rows = []
+    for each in found:
+        row: dict[str, Any] = {"claim": each.claim.id, "draws": len(each.verdicts)}
+        for name in ("reproduced", "better than the paper", "worse than the paper"):
+            own = each.share(name)
+            key = name.split()[0]
+            row |= {key: own.value, f"{key}_low": own.low, f"{key}_high": own.high}
+        for at, leaf in enumerate(each.leaves[:2], start=1):
+            row |= {f"leaf_{at}": leaf.name, f"explained_{at}": leaf.share}
+        rows.append(row | {"decided": each.told})
+    return pd.DataFrame(rows)
+
+
+def draws_frame(drawn: Reactions) -> pd.DataFrame:
+    """Every draw: what each unknown is, and every reading of every row."""
+    import pandas as pd
+
+    columns: dict[str, Any] = {name: drawn.values(name) for name in drawn.settings[0].values}
+    readings: Mapping[str, Any] = {
+        f"{row} {name}": values for row, each in drawn.found.items() for name, values in each.items()
+    }
+    return pd.DataFrame(columns | dict(readings))

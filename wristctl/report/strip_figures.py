@@ -1,0 +1,99 @@
+"""Figures of the robust audit: in which share of the box each claim holds, and one claim draw by draw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wristctl.comparison.paper import FACTOR
+from wristctl.comparison.robust import Strip
+from wristctl.report.style import BLUE, GREEN, GREY, SILVER, VERMILLION, figure, legend_below, logarithmic, title
+
+_COLOURS = {
+    "reproduced": (GREEN, "holds"),
+    "better than the paper": (BLUE, "ours is less"),
+    "worse than the paper": (VERMILLION, "ours is more, fails or never settles; the other way round"),
+    "not specified enough": (SILVER, "alike within 5 %"),
+}
+_FURTHEST = 1e4
+"""Ratios beyond are drawn at the edge."""
+
+
+def shares(found: Sequence[Strip], heading: str = "") -> Figure:
+    """For each claim the shares of drawn settings with each verdict; beside it the unknown that decides it most."""
+    made, axes = figure(height=1.2 + 0.24 * len(found))
+    panel = axes[0, 0]
+    places = np.arange(len(found))[::-1]
+    left = np.zeros(len(found))
+    for verdict, (colour, label) in _COLOURS.items():
+        width = np.array([each.share(verdict).value for each in found])  # type: ignore[arg-type]
+        if width.any():
+            panel.barh(places, width, left=left, height=0.72, color=colour, label=label)
+        left += width
+    for place, each in zip(places, found, strict=True):
+        held = each.share("reproduced")
+        panel.text(1.16, place, f"{100 * held.value:.1f} %", va="center", ha="right", fontsize=8.0)
+        said, shade = (each.told, "k") if each.told else ("none alone", GREY)
+        panel.text(1.22, place, said, va="center", fontsize=8.0, color=shade)
+    panel.set_yticks(places, [each.claim.id for each in found], fontsize=8.0)
+    panel.set_xlim(0.0, 1.0)
+    panel.set_ylim(-0.6, len(found) - 0.4)
+    panel.grid(False, axis="y")
+    panel.text(1.16, len(found) - 0.35, "holds in", fontsize=8.0, va="bottom", ha="right")
+    panel.text(1.22, len(found) - 0.35, "by what decides most", fontsize=8.0, va="bottom")
+    panel.set_xlabel(f"share of {len(found[0].verdicts)} settings", fontsize=10.0)
+    made.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
+    legend_below(made, 2)
+    return made
+
+
+def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
+    """One claim: every drawn setting by the unknown that decides it most, our value over the paper's, and the verdict.
+
+    What fails or never settles stands at the upper edge.
+    """
+    made, axes = figure(height=3.0)
+    panel = axes[0, 0]
+    x, names = _places(values)
+    failed = ~np.isfinite(one.ratios)
+    y = np.clip(np.where(failed, _FURTHEST, one.ratios), 1.0 / _FURTHEST, _FURTHEST)
+    for verdict, (colour, label) in _COLOURS.items():
+        own = np.array([each == verdict for each in one.verdicts])
+        if own.any():
+            panel.plot(x[own], y[own], "o", ms=2.5, mew=0, alpha=0.6, color=colour, label=label)
+    if names:
+        panel.set_xticks(range(len(names)), names)
+    elif x.min() > 0.0 and x.max() > 8.0 * x.min():
+        logarithmic(panel.xaxis)
+    logarithmic(panel.yaxis)
+    if one.claim.sense != "about":
+        panel.axhline(1.0, color=GREY, lw=0.8)
+    elif one.claim.than is None and one.claim.evidence != "symmetry":
+        panel.axhspan(1.0 / FACTOR, FACTOR, color=GREEN, alpha=0.12, lw=0)
+    if one.split is not None and not names:
+        panel.axvline(one.split.at, color=GREY, lw=0.8, ls="--")
+    if not names and np.isinf(np.array(values, float)).any():
+        panel.text(x.max(), -0.02, "none", ha="center", va="top", fontsize=9.0, transform=panel.get_xaxis_transform())
+    name = one.leaves[0].name
+    panel.set_xlabel(f"{name}{f' [{unit}]' if unit else ''}", fontsize=10.0)
+    over = f"{one.claim.than} over {one.claim.label}" if one.claim.than else "ours over the paper's"
+    panel.set_ylabel("one side over the other" if one.claim.evidence == "symmetry" else over, fontsize=10.0)
+    title(panel, fill(f"{one.claim.id}: {one.claim.says}", 78))
+    legend_below(made, 2)
+    return made
+
+
+def _places(values: Sequence[object]) -> tuple[np.ndarray, list[str]]:
+    """Numbers as they are, infinity beyond the largest; names side by side, spread a little."""
+    spread = np.random.default_rng(0).uniform(-0.3, 0.3, len(values))
+    if not isinstance(values[0], str):
+        numbers = np.array(values, float)
+        known = np.isfinite(numbers)
+        apart = np.where(known, numbers, 1.6 * numbers[known].max())
+        few = len(set(numbers.tolist())) <= 12
+        return (apart * np.exp(0.3 * spread) if few and apart.min() > 0.0 else apart), []
+    names = list(dict.fromkeys(str(each) for each in values))
+    return np.array([names.index(str(each)) for each in values]) + spread, names
