@@ -31,9 +31,8 @@ def test_the_script_is_the_one_that_dask_jobqueue_would_submit(tmp_path: Path) -
     )  # fmt: skip
     known = profile(tmp_path, text)
     assert known.job_script() == job.job_script() and known.jobs == 3
-    assert {"#SBATCH -p short", "#SBATCH -A lab", "#SBATCH -t 01:00:00", KERNELS} <= set(
-        known.job_script().splitlines()
-    )
+    lines = known.job_script().splitlines()
+    assert {"#SBATCH -p short", "#SBATCH -A lab", "#SBATCH -t 01:00:00", KERNELS} <= set(lines)
 
 
 def test_a_prologue_of_ones_own_stands_behind(tmp_path: Path) -> None:

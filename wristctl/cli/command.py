@@ -25,6 +25,7 @@ from wristctl.config.keys import section_keys
 from wristctl.config.load import read_study
 from wristctl.config.plausible import check_sizes
 from wristctl.config.trust import asking
+from wristctl.studies.in_python import check_executor
 from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
 
@@ -116,6 +117,8 @@ def _perform(
             return print_job(executor.removeprefix("slurm:"), plan)
         if options.dry_run:
             return print_plan(procedure.kind, prepared.study, plan, options.out, options.as_json)
+        if procedure.in_units:
+            check_executor(executor)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
         show, run = partial(progress, console, quiet=options.quiet), None
         try:

@@ -121,10 +121,11 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
         if not rest and isinstance(own, Section):
             raise UserError(f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(own)))}")
-        given = {
-            each: getattr(section, each) for each in section.model_fields_set if each in type(section).model_fields
-        }
-        return type(section).model_validate({**given, **extra, name: new}, by_name=True)
+        # all that it has, since what is left out would be a default, copied deeply
+        given = {each: getattr(section, each) for each in type(section).model_fields}
+        made = type(section).model_validate({**given, **extra, name: new}, by_name=True)
+        object.__setattr__(made, "__pydantic_fields_set__", section.model_fields_set | {name})
+        return made
     if isinstance(section, Mapping) and (head in section or rest):
         if head not in section:
             raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, map(str, section)))

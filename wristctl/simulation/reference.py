@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Literal
 
 import numpy as np
@@ -69,8 +69,8 @@ class Motion:
     acceleration_ref: Array
     theta_desired: Array
     """The true wanted angle, which a network only approximates."""
-    tip_desired: Array
-    """The wanted tip position, (T, 2)."""
+    tips: Array | Callable[[], Array]
+    """The wanted tip positions, (T, 2) [m], or what works them out once they are asked for."""
     move: float
     """Last move of the reference, signed [rad]."""
     begin: float
@@ -80,6 +80,11 @@ class Motion:
     horizon: float
     outside: float = 0.0
     """Share of samples whose tip position lies outside the domain that the network was trained on."""
+
+    @cached_property
+    def tip_desired(self) -> Array:
+        """The wanted tip position, (T, 2)."""
+        return self.tips() if callable(self.tips) else self.tips
 
     @property
     def final(self) -> float:
@@ -107,7 +112,8 @@ def motion(
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
         return _evaluated(reference, wrist, horizon, period, network)
-    return _known(reference, wrist, horizon, period)
+    path = WristParameters(length=wrist.length, range_deg=wrist.range_deg)  # all that it depends on
+    return _known(reference, path, horizon, period)
 
 
 @lru_cache(maxsize=64)
@@ -122,14 +128,21 @@ def _evaluated(
     time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
     arc, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
     rest = kind.rest(reference, begin, horizon)
-    theta, tip = arc[0], arc_path(arc[0], arc[1])
+    theta, wanted, tips = arc[0], arc[0][0], partial(_tips, arc)
     angles, outside = (theta[0], theta[1], theta[2]), 0.0
     if reference.inverse != "none":
-        found = _inverse(reference, network)(tip)
+        found = _inverse(reference, network)(arc_path(arc[0], arc[1]))
         angles, outside = (found.theta, found.rate, found.acceleration), float(np.mean(found.outside))
-    for each in (time, *angles, theta, tip.position):
+    for each in (time, *angles, wanted, arc):
         each.setflags(write=False)
-    return Motion(time, *angles, theta[0], tip.position, move, begin, rest, horizon, outside)
+    return Motion(time, *angles, wanted, tips, move, begin, rest, horizon, outside)
+
+
+def _tips(arc: Array) -> Array:
+    """Of angle and length of an arc, (2, 3, T)."""
+    found = arc_path(arc[0], arc[1]).position
+    found.setflags(write=False)
+    return found
 
 
 def _moves(

@@ -31,6 +31,13 @@ def in_python() -> Iterator[None]:
         raise
 
 
+def check_executor(named: str) -> None:
+    """UserError for what names no executor."""
+    from wristctl.work.executors import Workers
+
+    Workers.of(named)
+
+
 def carry_out(
     procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
     progress: Watch | None, executor: str = "serial",
@@ -39,6 +46,7 @@ def carry_out(
     folder, show = Path(RESULTS if out is None else out), watched(progress)
     prepared = prepare(procedure, study, folder, given)
     prepared.plan()
+    check_executor(executor)
     if out is None:
         return perform(prepared, None, show, Unattended(), executor)
     with recording(prepared, folder, label, [f"wristctl.{procedure.kind.replace('-', '_')}()"]) as run:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from wristctl.work.fan_out import Poisoned
 
 Found = TypeVar("Found", bound=StudyResult)
+_CHECKED = 20_000
+"""Points that are made before anything is computed, so that a value that cannot be is known by then."""
 _FIRST = ("rmse", "steady_state", "oscillation", "chattering")
 _SHOWN, _SAID = 20, 4
 """Rows and metrics that are printed and drawn of a sweep."""
@@ -61,6 +63,8 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
             return procedure.plan(study, inputs)
         base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
         points = points_of(axes)
+        for each in points[:_CHECKED]:
+            study_at(base, axes, each)
         for each in _corners(axes):
             said = procedure.plan(study_at(base, axes, each), Inputs())
         return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {said}"
@@ -134,7 +138,12 @@ def _swept(session: Session, command: str) -> Swept:
             parts.append(pd.DataFrame(rows | {"point": rows["point"] + first}))
         first += unit.size
     if not parts:
-        raise UserError("no point of the sweep could be computed", Argument("sweep"), done.poisoned[0].why, exit_code=3)
+        raise UserError(
+            "no point of the sweep could be computed",
+            Argument("sweep", metavar="KEY=VALUES"),
+            done.poisoned[0].why,
+            exit_code=3,
+        )
     table = pd.concat(parts, ignore_index=True)
     keys = {axis.key: [points[at][number] for at in table["point"]] for number, axis in enumerate(axes)}
     table = pd.concat([pd.DataFrame(keys), table], axis=1)

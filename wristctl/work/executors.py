@@ -21,6 +21,7 @@ from wristctl.lanes.cores import cores
 from wristctl.work.serving import serve_parent
 from wristctl.work.slurm import SlurmProfile
 
+EXECUTOR = Argument("executor", metavar="WHO")
 KINDS = "serial, processes, processes:N, dask://host:port or module:factory"
 _PROCESSES = re.compile(r"processes(?::([0-9]+))?")
 _PLACE = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
@@ -73,7 +74,7 @@ class Workers:
         if found := _PROCESSES.fullmatch(named):
             many = int(found[1]) if found[1] else cores()
             if not 1 <= many <= 1024:
-                raise UserError(f"{many} processes", Argument("executor"), "1 to 1024")
+                raise UserError(f"{many} processes", EXECUTOR, "1 to 1024")
             return cls(named, many, lambda: _processes(many))
         if named.startswith("dask://"):
             return cls(named, 1, lambda: _dask(named.removeprefix("dask://")))
@@ -83,7 +84,7 @@ class Workers:
         if _PLACE.fullmatch(named):
             factory = _factory(named)
             return cls(named, 1, lambda: _of_factory(named, factory))
-        raise UserError(f"unknown executor '{named}'", Argument("executor"), KINDS)
+        raise UserError(f"unknown executor '{named}'", EXECUTOR, KINDS)
 
 
 @contextmanager
@@ -116,13 +117,13 @@ def _dask(address: str) -> Iterator[Pool]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise UserError("Dask is not installed", Argument("executor"), _CLUSTER) from error
+        raise UserError("Dask is not installed", EXECUTOR, _CLUSTER) from error
     try:
         client: Any = Client(f"tcp://{address}", timeout=_ANSWERS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         what = f"no Dask scheduler answers at tcp://{address}"
-        fix = ("start one (`dask scheduler`), or another ", Argument("executor"))
-        raise UserError(what, Argument("executor"), fix) from error
+        fix = ("start one (`dask scheduler`), or another ", EXECUTOR)
+        raise UserError(what, EXECUTOR, fix) from error
     try:
         yield _of_client(client, address)
     finally:
@@ -158,7 +159,7 @@ def _factory(named: str) -> Callable[[], Any]:
     try:
         found: Callable[[], Any] = getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise UserError(f"no executor at {named}: {error}", Argument("executor"), KINDS) from error
+        raise UserError(f"no executor at {named}: {error}", EXECUTOR, KINDS) from error
     return found
 
 
@@ -167,7 +168,7 @@ def _of_factory(named: str, factory: Callable[[], Any]) -> Iterator[Pool]:
     made = factory()
     if not callable(getattr(made, "submit", None)):
         what = f"{named} gives {type(made).__name__}, and no concurrent.futures.Executor"
-        raise UserError(what, Argument("executor"), "a factory that returns one")
+        raise UserError(what, EXECUTOR, "a factory that returns one")
     many = int(getattr(made, "_max_workers", 0) or cores())
     with made:
         yield Pool(made, lambda: many)

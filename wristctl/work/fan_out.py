@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument
-from wristctl.work.executors import Pool, Workers
+from wristctl.work.executors import EXECUTOR, Pool, Workers
 from wristctl.work.unit import Unit, read_unit, take_over, write_unit
 from wristctl.work.worker import Computed, Golden, WorkerDiffers, compute
 
@@ -124,7 +124,7 @@ class _Fan:
             return self._blame([])
         ended, _ = wait(self.running, timeout=_LOOK, return_when=FIRST_COMPLETED)
         if what := pool.lost():
-            raise UserError(what, Argument("executor"), RESUME, exit_code=3)
+            raise UserError(what, EXECUTOR, RESUME, exit_code=3)
         numbers = [(future, self.running.pop(future)) for future in ended]
         died = [number for future, number in numbers if not self._take(future, number, pool)]
         return bool(died) and self._blame(died)
@@ -144,12 +144,12 @@ class _Fan:
             computed: Computed = future.result()
         except WorkerDiffers as error:
             fix = ("workers of the same version and kind of processor; then ", *RESUME)
-            raise UserError(str(error), Argument("executor"), fix, exit_code=3) from error
+            raise UserError(str(error), EXECUTOR, fix, exit_code=3) from error
         except BrokenProcessPool:
             return False
         except CancelledError as error:
             what = pool.lost() or "the executor has dropped a unit"
-            raise UserError(what, Argument("executor"), RESUME, exit_code=3) from error
+            raise UserError(what, EXECUTOR, RESUME, exit_code=3) from error
         except Exception as error:
             notes = " ".join(getattr(error, "__notes__", ()))
             self._failed(number, f"{type(error).__name__}: {error} {notes}", type(error).__name__ in _FINAL)
@@ -179,5 +179,5 @@ class _Fan:
             self.alone.extend(suspects)
         self.breaks += not suspects
         if self.breaks >= _TRIES:
-            raise UserError("worker processes die as they begin", Argument("executor"), "fewer of them, or serial", 3)
+            raise UserError("worker processes die as they begin", EXECUTOR, "fewer of them, or serial", 3)
         return True

@@ -63,7 +63,9 @@ class SlurmProfile:
         try:
             cluster: Any = _jobqueue().SLURMCluster(**self.keywords)
         except (OSError, ValueError) as error:
-            raise UserError(f"no Slurm cluster: {error}", Argument("slurm"), "start it on a login node") from error
+            raise UserError(
+                f"no Slurm cluster: {error}", Argument("slurm", metavar="FILE"), "start it on a login node"
+            ) from error
         with cluster, Client(cluster, set_as_default=False) as client:
             cluster.scale(jobs=self.jobs)
             yield client
@@ -73,7 +75,7 @@ def _jobqueue() -> Any:
     try:
         import dask_jobqueue
     except ImportError as error:
-        raise UserError("dask-jobqueue is not installed", Argument("slurm"), _INSTALL) from error
+        raise UserError("dask-jobqueue is not installed", Argument("slurm", metavar="FILE"), _INSTALL) from error
     return dask_jobqueue
 
 

@@ -1,0 +1,164 @@
+"""What rollouts cost here, by law and world, and what a cluster adds: `python docs/cost.py` writes docs/cost.md.
+
+Processor time of this process and its threads, which a busy machine changes little; the best of three.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wristctl.comparison.world_ranking import RANKED
+from wristctl.config.load import load_study
+from wristctl.config.study import Study
+from wristctl.control.table import CONTROLLERS, controller
+from wristctl.lanes.cores import cores
+from wristctl.simulation.cases import Case, measure
+from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.studies.fair_study import plan
+from wristctl.studies.fair_units import search_units
+from wristctl.studies.inputs import Inputs
+from wristctl.work.executors import Workers
+from wristctl.work.fan_out import perform_units
+from wristctl.work.unit import Unit
+
+HERE = Path(__file__).parent
+WORLDS, ROWS, TRIES, CORES = 40, 4, 3, cores()
+MANY = 1e9
+SLEEPS, TAKES = 40, 0.25
+"""Units without work, and the seconds that each takes."""
+
+
+def cost(law: str, cases: list[Case], study: Study) -> float:
+    """Seconds of one core for a rollout of a law, as a study measures it."""
+    chosen = controller(law)
+    gains = np.array([chosen.values(list(chosen.presets.values())[-1])] * ROWS)
+    measure(chosen, gains[:1], cases[:20], study.wrist, RANKED)
+    return min(_processor(lambda: measure(chosen, gains, cases, study.wrist, RANKED)) for _ in range(TRIES)) / (
+        ROWS * len(cases)
+    )
+
+
+def _processor(work: Callable[[], object]) -> float:
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+def nothing(spec: dict[str, Any]) -> dict[str, np.ndarray]:
+    """A unit that waits."""
+    time.sleep(spec["takes"])
+    return {"done": np.array(spec["number"])}
+
+
+def overheads() -> dict[str, float]:
+    """Seconds that an executor adds to a unit, on one worker: of units that wait, the rest of what they take."""
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
+    units = [Unit("cost:nothing", {"number": k, "takes": TAKES}) for k in range(SLEEPS)]
+    return {named: _overhead(Workers.of(named), units) for named in ("serial", "processes:1")} | _dask(units)
+
+
+def _overhead(workers: Workers, units: list[Unit]) -> float:
+    ends: list[float] = []
+    with tempfile.TemporaryDirectory() as folder:
+        perform_units(units, workers, None, Path(folder), told=lambda *_: ends.append(time.perf_counter()))
+    return (ends[-1] - ends[0]) / (len(ends) - 1) - TAKES
+
+
+def _dask(units: list[Unit]) -> dict[str, float]:
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        return {}
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        address = str(cluster.scheduler_address).removeprefix("tcp://")
+        return {"Dask, one worker": _overhead(Workers.of(f"dask://{address}"), units)}
+
+
+def main() -> None:
+    """Measure, and write the page."""
+    study = load_study([HERE.parent / "experiments" / "fair_study.yaml"], ["study.budget=full"])
+    families = study.study.families
+    laws = [name for name in CONTROLLERS if name == "feedforward" or name in study.study.laws]
+    known = {each: drawn_cases(study.families[each], each, "test", 0, WORLDS, study.wrist) for each in families}
+    costs = {family: {law: cost(law, cases, study) for law in laws} for family, cases in known.items()}
+    lines = [f"| law | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
+    for law in laws:
+        lines.append(f"| {law} | {' | '.join(f'{1.0 / costs[family][law]:.0f}' for family in families)} |")
+    means = {family: float(np.mean(list(own.values()))) for family, own in costs.items()}
+    lines.append(f"| mean | {' | '.join(f'{1.0 / means[family]:.0f}' for family in families)} |")
+    added = overheads()
+    unit = 8000 * means["camera"]
+    dearest = max(added.values())
+    many = [
+        f"| {family} | {MANY * each / 3600.0:.0f} | {MANY * each / 3600.0 / CORES / 24.0:.1f} "
+        f"| {MANY * each / 3600.0 / 1000.0 * (1.0 + dearest / unit):.2g} |"
+        for family, each in means.items()
+    ]
+    page = _BEGIN + lines + _MANY + many + _over(added, unit) + _study(study, costs)
+    (HERE / "cost.md").write_text("\n".join(page).rstrip() + "\n")
+
+
+def _over(added: dict[str, float], unit: float) -> list[str]:
+    rows = [f"| {named} | {1e3 * each:.1f} | {100.0 * each / unit:.2g} |" for named, each in added.items()]
+    return [
+        "", "## What an executor adds", "",
+        f"To a unit of work, measured on {SLEEPS} units that only wait, the file written and synced included; beside a",
+        f"unit of judgements on `camera`, 8,000 rollouts or {unit:.1f} s of one core.", "",
+        "| executor | ms a unit | % of a unit |", "| --- | --- | --- |", *rows,
+    ]  # fmt: skip
+
+
+def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
+    """What the full study takes, from the costs measured above."""
+    from wristctl.comparison.judge_unit import noises_of
+
+    budget = study.study.budgets["full"]
+    searched = sum(unit.size * costs[at.family][at.law] for at, unit in search_units(study).items())
+    judged = 0.0
+    for family in study.study.families:
+        known = study.families[family]
+        each = len(known.references) * noises_of(known, budget.noises) * budget.worlds
+        laws = [*study.study.laws, *(row.controller for row in study.study.presets)]
+        judged += sum(each * costs[family][law] for law in laws)
+    minutes = (searched + judged) / 60.0 / CORES
+    return [
+        "", "## The full study", "",
+        f"`--budget full`: {plan(study, Inputs())}.", "",
+        f"By the costs above {searched / 60.0:.0f} core-minutes of searches and",
+        f"{judged / 60.0:.0f} of judgements: {minutes:.0f} minutes on {CORES} cores, an estimate and not a run.",
+    ]  # fmt: skip
+
+
+def _cpu() -> str:
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+_BEGIN = [
+    "# What rollouts cost", "",
+    "Made by `python docs/cost.py`.", "",
+    "## Rollouts per core-second", "",
+    f"Of 3 s each, with all metrics of a ranking, {ROWS} gains on {WORLDS} worlds of each family at once; {_cpu()},",
+    "processor time, the best of three. `ideal` is a loop of 1 kHz; the others are of 200 Hz with steps of 1 ms on",
+    "elastic tendons.", "",
+]  # fmt: skip
+_MANY = [
+    "", f"## {MANY:.0e} rollouts", "",
+    "At the mean of all laws, with the dearest executor's share on the cluster.", "",
+    f"| family | core-hours | days on these {CORES} cores | hours on 1,000 cores |", "| --- | --- | --- | --- |",
+]  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(HERE))
+    main()
