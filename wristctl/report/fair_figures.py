@@ -127,6 +127,7 @@ def _front(axes: Axes, cost: Array, rmse: Array, found: WorldRanking) -> None:
                   linestyle="none", label=found.rows[at].label)  # fmt: skip
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
+    axes.tick_params(axis="x", which="both", labelrotation=45)  # within a decade powers of ten stand close
     if sound.any():
         axes.set_xlim(cost[sound].min() / 1.5, cost[sound].max() * 1.5)
         axes.set_ylim(rmse[sound].min() / 1.3, rmse[sound].max() * 1.3)
