@@ -91,8 +91,8 @@ def tune(
     `.searches`; `.frame()` is a row per candidate. Raises UserError for an unknown controller, one without gains, or a
     network that is missing.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
-    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
+    `progress` as above.
     """
     given = {"network": network, "from_identified": from_identified}
     return carry_out(TUNE, study, given, out, label, progress, executor)
@@ -112,8 +112,8 @@ def compare(
     settling [s], tensions [N], ... Raises UserError for unknown controllers or gains, inputs that are missing, or
     controllers that would be judged on what they were tuned on.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
-    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
+    `progress` as above.
     """
     return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress, executor)
 
@@ -147,8 +147,8 @@ def simulate(
     table, SI units) and `.failed`, whether the wrist left its range. Raises UserError for unknown controllers
     or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. With a folder `out` it
-    is also a sealed run directory there, `label` part of its name; `progress(what, count, total, figures)` is called.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
+    `progress` as above.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return carry_out(SIMULATE, study, given, out, label, progress, executor)
@@ -164,8 +164,7 @@ def analyse(
 
     `network`, `tuned` and `from_identified` are as in `simulate`. The result has `.answer`, `.found` about each of
     `.angles`, `.locus`, `.portrait`; `.frame()` is a row per angle. Raises UserError as `simulate` does, and where the
-    loop cannot rest. With a folder `out` it is a sealed run directory there too, `label` part of its name;
-    `progress(what, count, total, figures)` is called as it goes on.
+    loop cannot rest. `out`, `label` and `progress` as above.
     """
     inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return carry_out(ANALYSE, study, inputs, out, label, progress)
@@ -179,9 +178,7 @@ def hysteresis(
 
     The result has `.loops`, `.dead_bands` and, of a measured loop, `.fit` (coefficient, sheath and presliding with 95 %
     intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
-    and for a measured file that is none, with its line.
-
-    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    and for a measured file that is none, with its line. `out`, `label` and `progress` as above.
     """
     return carry_out(HYSTERESIS, study, {}, out, label, progress)
 
