@@ -20,11 +20,12 @@ from wristctl.report.class_figures import error_against_variation, tension_rows
 from wristctl.report.compare_figures import rmse_map, variation_dots
 from wristctl.report.disturbance_figure import error_over_disturbance
 from wristctl.report.loop_figures import angles, errors, tensions
+from wristctl.report.sliding_figure import sliding
 from wristctl.report.track_figures import angle
 from wristctl.report.trial_figures import DIRECTIONS, LoggedTrial, desired_and_obtained, lateness
 from wristctl.report.trial_figures import errors as trial_errors
 from wristctl.report.trial_figures import tensions as trial_tensions
-from wristctl.report.tuning_figures import convergence, gain_history
+from wristctl.report.tuning_figures import convergence, gain_history, gain_sensitivity
 from wristctl.report.wrist_drawing import directions, stroboscope
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
@@ -120,6 +121,8 @@ def sightings() -> list[Sighting]:
     ]
 
 
+assert SMC.surface is not None
+SURFACE = SMC.surface
 PUSHES = ("disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0})
 
 FIGURES: dict[str, Callable[[], Figure]] = {
@@ -137,6 +140,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         pushed(), "disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0}
     ),
     "variation": lambda: variation_dots(results(), "Loop default"),
+    "sliding": lambda: sliding(course("smc/stepper"), SURFACE, SMC.presets["stepper"]),
+    "sensitivity of gains": lambda: gain_sensitivity("pid", ["Kp", "Ki"], 1.5, np.array([1.0, 1.5, 0.9, 1.2, 1.1])),
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
     "gain history of pid": lambda: gain_history(search("pid"), PID.gains),

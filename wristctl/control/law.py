@@ -89,6 +89,8 @@ class Surface(NamedTuple):
 
     weights: Callable[[Mapping[str, float]], tuple[float, float, float]]
     layer: Callable[[Mapping[str, float]], float]
+    of_error: bool = True
+    """Whether de/dt is the rate of the error, and not, as in the paper's law, that of the angle (C9)."""
 
 
 @dataclass(frozen=True)

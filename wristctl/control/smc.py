@@ -47,5 +47,5 @@ SMC = Controller(
         "initial": Conditions((1e-3, 1e-2), (5e3, 1e5)),
         "stepper": Conditions((1e-3, 1e-2), (5e3, 1e5)),
     },
-    surface=Surface(lambda gains: (gains["P1"], gains["P2"], 0.0), lambda gains: 1.0),
+    surface=Surface(lambda gains: (gains["P1"], gains["P2"], 0.0), lambda gains: 1.0, of_error=False),
 )

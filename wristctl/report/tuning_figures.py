@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.control.law import Gain
-from wristctl.report.style import BLACK, colour, figure, legend_below, logarithmic, title
+from wristctl.report.style import BLACK, ORANGE, SKY, colour, figure, legend_below, logarithmic, title
 from wristctl.tuning.search import Search
 
 
@@ -64,3 +64,23 @@ def _best_so_far(search: Search) -> Array:
     better = np.concatenate([[True], least[1:] < least[:-1]])
     found: Array = each[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]
     return found
+
+
+def gain_sensitivity(name: str, gains: Sequence[str], factor: float, values: Array) -> Figure:
+    """A tornado: the objective [decades beside feedforward] where one gain is `factor` times less or more.
+
+    `values` (1 + 2 g,) are of the gains found, then of each gain less and more; the most sensitive is on top.
+    """
+    found, less, more = values[0], values[1::2], values[2::2]
+    order = np.argsort(np.maximum(np.abs(less - found), np.abs(more - found)))
+    made, ((axes,),) = figure(height=1.5 + 0.35 * len(gains))
+    for side, own, shade in (("less", less, SKY), ("more", more, ORANGE)):
+        axes.barh(
+            range(len(gains)), own[order] - found, left=found, color=shade, label=f"{factor:g} times {side}", alpha=0.85
+        )
+    axes.axvline(found, color=BLACK, linewidth=0.8)
+    axes.set_yticks(range(len(gains)), [gains[at] for at in order])
+    axes.set_xlabel("objective [decades beside feedforward]")
+    title(axes, f"{name}: what one gain by itself does to the objective")
+    legend_below(made, 2)
+    return made

@@ -87,6 +87,8 @@ def _about(section: Any) -> str:
 
 
 def _law(row: Any) -> str:
+    if not hasattr(row, "controller"):
+        return str(row.name)
     return f"{row.controller}/{row.gains if isinstance(row.gains, str) else 'given'}"
 
 

@@ -94,9 +94,11 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it."""
+    from wristctl.control.table import controller, gains_of
     from wristctl.report.loop_figures import angles, errors, tensions
     from wristctl.report.observer_figures import consistency
     from wristctl.report.repetition_figures import error_sizes
+    from wristctl.report.sliding_figure import sliding
     from wristctl.report.truth_table import truth_heading, truth_tables
     from wristctl.report.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
@@ -132,6 +134,11 @@ def simulate(session: Session) -> Simulated:
         findings.figure("tensions", tensions, course)
         if course.load is not None and course.expected > 0.0:
             findings.figure("observer", consistency, course, heading=world)
+        law = controller(settings.controller)
+        if law.surface is not None and not failed:
+            gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
+            caption = "How the motion comes to the law's sliding surface: phase plane, and sigma over time"
+            findings.figure("sliding", sliding, course, law.surface, gains, caption=caption)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network)
     return Simulated(session.study, findings, tables, repeated, failed, short_of)

@@ -33,6 +33,7 @@ from wristctl.studies.sweep import sweepable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
 
@@ -146,7 +147,7 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
                 law, known = controller(name), _known(session, name)
                 found[name] = search(study, law, session.findings.stream, (judge, choose), so_far, known)
     finally:
-        _keep(session.findings, found)
+        _keep(session.findings, found, choose or judge)
     return found
 
 
@@ -188,10 +189,11 @@ def _told(gains: Mapping[str, float]) -> str:
     return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
 
 
-def _keep(findings: Findings, found: dict[str, Search]) -> None:
+def _keep(findings: Findings, found: dict[str, Search], judge: Judge) -> None:
     """Keep what was found, also of a search that was cut short."""
     from wristctl.control.table import controller
     from wristctl.report.tuning_figures import convergence, gain_history
+    from wristctl.studies.tornado import tornado
     from wristctl.tuning.gains_file import write_gains
     from wristctl.tuning.search_tables import finalists, history
 
@@ -210,9 +212,11 @@ def _keep(findings: Findings, found: dict[str, Search]) -> None:
         findings.metric(f"{name}_objective", result.objective, unit="", better="lower", n=result.evaluations)
         for gain, value in result.gains.items():
             findings.metric(f"{name}_{gain}", value, unit=gains[gain].unit, better="", meaning=gains[gain].meaning)
-        findings.figure(f"gains-{name}", gain_history, result, gains)
+        findings.figure(f"gains-{name}", gain_history, result, gains, caption=f"Gains of {name} over the search")
+        caption = f"What one gain of {name} by itself does to the objective"
+        findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
     findings.headline(*(f"{name}_objective" for name in sorted(found, key=lambda name: found[name].objective)))
-    findings.figure("convergence", convergence, list(found.values()))
+    findings.figure("convergence", convergence, list(found.values()), caption="Best objective against the budget")
 
 
 TUNE = sweepable(
