@@ -159,12 +159,7 @@ def drawn(found: list[BestCase], moves: list[Move], weights: list[Weighed]) -> F
 
 
 def _left(panel: Any, found: list[BestCase]) -> None:
-    rows = [
-        ("smc/exchanged", "strict"),
-        ("smc/exchanged", "usual"),
-        ("pid/printed", "strict"),
-        ("pid/printed", "usual"),
-    ]
+    rows = list(dict.fromkeys((each.row, each.reading) for each in found if each.setting is not None))
     marks = (("o", "RMSE"), ("s", "settling"), ("^", "steady state"))
     panel.axvspan(1.0 / FACTOR, FACTOR, color=LIGHT, lw=0, zorder=0)
     for place, (name, reading) in enumerate(reversed(rows)):

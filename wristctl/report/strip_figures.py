@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from wristctl.comparison.paper import FACTOR
 from wristctl.comparison.robust import Strip
-from wristctl.report.style import BLUE, GREEN, GREY, SILVER, VERMILLION, figure, legend_below, logarithmic, title
+from wristctl.report.style import BLUE, GREEN, GREY, SILVER, VERMILLION, WIDTH, figure, legend_below, logarithmic, title
 
 _COLOURS = {
     "reproduced": (GREEN, "holds"),
@@ -24,7 +24,7 @@ _FURTHEST = 1e4
 
 def shares(found: Sequence[Strip], heading: str = "") -> Figure:
     """For each claim the shares of drawn settings with each verdict; beside it the unknown that decides it most."""
-    made, axes = figure(height=1.2 + 0.24 * len(found))
+    made, axes = figure(width=1.2 * WIDTH, height=1.2 + 0.24 * len(found))
     panel = axes[0, 0]
     places = np.arange(len(found))[::-1]
     left = np.zeros(len(found))
@@ -35,15 +35,15 @@ def shares(found: Sequence[Strip], heading: str = "") -> Figure:
         left += width
     for place, each in zip(places, found, strict=True):
         held = each.share("reproduced")
-        panel.text(1.16, place, f"{100 * held.value:.1f} %", va="center", ha="right", fontsize=8.0)
+        panel.text(1.24, place, f"{100 * held.value:.1f} %", va="center", ha="right", fontsize=8.0)
         said, shade = (each.told, "k") if each.told else ("none alone", GREY)
-        panel.text(1.22, place, said, va="center", fontsize=8.0, color=shade)
+        panel.text(1.28, place, said, va="center", fontsize=7.0, color=shade)
     panel.set_yticks(places, [each.claim.id for each in found], fontsize=8.0)
     panel.set_xlim(0.0, 1.0)
     panel.set_ylim(-0.6, len(found) - 0.4)
     panel.grid(False, axis="y")
-    panel.text(1.16, len(found) - 0.35, "holds in", fontsize=8.0, va="bottom", ha="right")
-    panel.text(1.22, len(found) - 0.35, "by what decides most", fontsize=8.0, va="bottom")
+    panel.text(1.24, len(found) - 0.35, "holds in", fontsize=8.0, va="bottom", ha="right")
+    panel.text(1.28, len(found) - 0.35, "by what decides most", fontsize=8.0, va="bottom")
     panel.set_xlabel(f"share of {len(found[0].verdicts)} settings", fontsize=10.0)
     made.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
     legend_below(made, 2)
