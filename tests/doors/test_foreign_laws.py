@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from wristctl.control.vetting import call_law
 from wristctl.lanes.frozen_values import frozen_values
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.studies.adopted import adopted
+from wristctl.studies.adopted import adopt, adopted, adoption, sources_in
 
 QUICK = "horizon: 0.3, loop: {plant_segments: 1}"
 
@@ -38,6 +39,18 @@ def answer(name: str, count: int = 3) -> np.ndarray:
     states[:, 5:8] = -2.0, 2.0, 1e-3
     gains = np.tile(law.values(law.presets["default"]), (count, 1))
     return call_law(law, states, gains)
+
+
+def test_a_worker_elsewhere_knows_the_same_law_and_refuses_another_text_of_it(stranger: Path) -> None:
+    study = adopted(Study.model_validate({"study": {"laws": (f"{stranger}/strange.py:STRANGE",)}}), "study").study
+    assert study.study.laws == ("strange",) and set(sources_in(study)) == {"strange/strange.py", "strange/helper.py"}
+    told, known = json.loads(json.dumps(adoption(study, "study"))), answer("strange")
+    del CONTROLLERS["strange"]
+    adopt(told)
+    assert np.array_equal(answer("strange"), known)
+    (stranger / "helper.py").write_text((stranger / "helper.py").read_text().replace("k * e", "2.0 * k * e"))
+    with pytest.raises(UserError, match=r"strange/helper\.py is another text here"):
+        adopt(told)
 
 
 def test_a_law_by_its_place_is_simulated_tuned_and_compared_under_its_own_name(stranger: Path) -> None:

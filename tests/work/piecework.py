@@ -19,6 +19,19 @@ def walk(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return {"walk": rng.standard_normal(spec["steps"]).cumsum(), "at": np.array(spec["seed"])}
 
 
+_furnished: list[int] = []
+
+
+def furnish(spec: Mapping[str, Any]) -> None:
+    """Leave in this process what `fetched` needs."""
+    _furnished.append(spec["left"])
+
+
+def fetched(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """What was left there, and how often."""
+    return {"left": np.array(_furnished), "asked": np.array(spec["asked"])}
+
+
 def fail(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Never comes to an end; notes each try."""
     with Path(spec["tries"]).open("a") as file:

@@ -14,12 +14,19 @@ from wristctl.work import unit as units_of_work
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
 from wristctl.work.unit import Unit, file_of, read_unit, take_over, write_unit
-from wristctl.work.worker import Computed, Golden
+from wristctl.work.worker import Computed, Furnish, Golden
 
 
 def same(one: UnitsDone, other: UnitsDone) -> bool:
     pairs = zip(one.arrays, other.arrays, strict=True)
     return all(a is not None and b is not None and np.array_equal(a["walk"], b["walk"]) for a, b in pairs)
+
+
+def test_a_worker_furnishes_itself_once_before_its_units() -> None:
+    units = [Unit("tests.work.piecework:fetched", {"asked": k}) for k in range(5)]
+    left = Furnish("tests.work.piecework:furnish", {"left": 7})
+    done = perform_units(units, Workers.of("processes:1"), golden(), furnish=left)
+    assert [each["left"].tolist() for each in done.arrays if each] == [[7]] * 5
 
 
 def test_serial_processes_and_an_executor_of_ones_own_give_the_same_bytes(tmp_path: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import logging
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
@@ -76,6 +78,30 @@ def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
 
     sections = {name: getattr(study, name) for name in type(study).model_fields}
     return study.model_copy(update={name: renamed(each, place) for name, each in sections.items()})
+
+
+def sources_in(study: Study) -> dict[str, str]:
+    """What is from elsewhere in a study that calls it by its own name: each source's hash, by its name and file's."""
+    found: dict[str, str] = {}
+    for table, name in named_in(tuple(getattr(study, field) for field in type(study).model_fields)):
+        if origin := table.origin(name):
+            found |= {f"{name}/{file.name}": digest for file, digest in origin.files.items()}
+    return found
+
+
+def adoption(study: Study, command: str) -> dict[str, Any]:
+    """What `adopt` is given elsewhere, as JSON has it, to know the same laws."""
+    content = with_places(study).model_dump_json(by_alias=True, include=names_read(command))
+    return {"study": json.loads(content), "command": command, "sources": sources_in(study)}
+
+
+def adopt(spec: Mapping[str, Any]) -> None:
+    """Load what a study names from elsewhere, in a process that has not. UserError where it is another text there."""
+    study = Study.model_validate_json(json.dumps(spec["study"]))
+    found = sources_in(adopted(study, spec["command"]).study)
+    changed = [name for name, digest in spec["sources"].items() if found.get(name) != digest]
+    if changed:
+        raise UserError(f"{', '.join(changed)} is another text here than where the study began", "study")
 
 
 def _loaded(table: Choices[Any], name: str) -> tuple[Any, Foreign] | None:

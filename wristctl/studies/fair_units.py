@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.config.control import TuneSettings
@@ -91,17 +92,27 @@ def golden_of(study: Study) -> Golden:
     return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
 
 
-def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden | None) -> UnitsDone:
-    """Compute units with the session's workers, into the run where there is one, and show how far they have come."""
+def performed(
+    session: Session, what: str, units: Sequence[Unit], golden: Golden | None, command: str = "study"
+) -> UnitsDone:
+    """Compute units with the session's workers, into the run where there is one, and show how far they have come.
+
+    The hashes of laws from elsewhere are part of the units' specifications.
+    """
+    from wristctl.studies.adopted import adoption, sources_in
     from wristctl.work.executors import Workers
     from wristctl.work.fan_out import perform_units
     from wristctl.work.unit import UNITS
-    from wristctl.work.worker import Computed
+    from wristctl.work.worker import Computed, Furnish
 
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
     folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
     if folder is not None:
         folder.mkdir(exist_ok=True)
+    furnish = None
+    if sources := sources_in(session.study):
+        units = [replace(each, spec={**each.spec, "sources": sources}) for each in units]
+        furnish = Furnish("wristctl.studies.adopted:adopt", adoption(session.study, command))
     count, counted = 0, "rollouts" if golden else "points"
     with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
 
@@ -113,7 +124,7 @@ def performed(session: Session, what: str, units: Sequence[Unit], golden: Golden
                 spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
                 session.findings.event("unit", name=unit.name, key=unit.key, rollouts=unit.size, **spent)
 
-        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told)
+        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
     for each in found.poisoned:
         session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
     return found

@@ -82,7 +82,7 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
     from wristctl.control.table import controller, gains_of
 
     if "network" in inputs:
-        fix = "leave it out: inverse: exact follows tips without one"
+        fix = "leave it out: inverse: closed-form follows tips without one"
         raise UserError("a sweep runs without a network", Argument("network"), fix)
     by_gain = any(".gains." in f".{each}" for each in study.sweep)
     study, tuned = study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
@@ -129,7 +129,7 @@ def _swept(session: Session, command: str) -> Swept:
     units = sweep_units(base, command, axes, points)
     golden = None if session.executor == "serial" else _golden(base, command)
     assert golden is None or isinstance(golden, Golden)
-    done = performed(session, f"{command} at {len(points)} points", units, golden)
+    done = performed(session, f"{command} at {len(points)} points", units, golden, command)
     parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
     for unit, arrays in zip(units, done.arrays, strict=True):
         if arrays is not None:

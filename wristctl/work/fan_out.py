@@ -12,18 +12,21 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument
 from wristctl.work.executors import EXECUTOR, Pool, Workers
 from wristctl.work.unit import Unit, read_unit, take_over, write_unit
-from wristctl.work.worker import Computed, Golden, WorkerDiffers, compute
+from wristctl.work.worker import Computed, Furnish, Golden, WorkerDiffers, compute
 
 if TYPE_CHECKING:
     import numpy as np
 
 _TRIES = 3
+_TOLD = 300
+"""Characters of an error that a table has room for."""
 _FINAL = ("KilledWorker",)
 """Errors after which no worker is risked again: several have died of it, since Dask tries by itself."""
 _LOOK = 0.5
@@ -62,8 +65,11 @@ def perform_units(
     folder: Path | None = None,
     earlier: Path | None = None,
     told: Told = lambda unit, computed: None,
+    furnish: Furnish | None = None,
 ) -> UnitsDone:
     """Compute units, those left out that are in `folder` or in the folder of an `earlier` run.
+
+    Workers elsewhere `furnish` themselves before.
 
     UserError, with exit code 3, where the workers compute other numbers or are gone; all that was done by then is in
     `folder`.
@@ -78,7 +84,7 @@ def perform_units(
             done.taken_over += 1
             told(unit, None)
     if waiting:
-        _Fan(units, workers, golden, folder, told, done, waiting).run()
+        _Fan(units, workers, golden, folder, told, done, waiting, furnish).run()
     return done
 
 
@@ -100,6 +106,7 @@ class _Fan:
     told: Told
     done: UnitsDone
     waiting: deque[int]
+    furnish: Furnish | None
     alone: deque[int] = field(default_factory=deque)
     """Units that were under way when a worker died."""
     failures: Counter[int] = field(default_factory=Counter)
@@ -134,7 +141,8 @@ class _Fan:
             if len(self.running) >= (1 if self.alone else pool.width()):
                 return
             unit = self.units[source[0]]
-            future = pool.executor.submit(compute, unit.does, dict(unit.spec), self.golden if pool.apart else None)
+            first = (self.golden, self.furnish) if pool.apart else (None, None)
+            future = pool.executor.submit(compute, unit.does, dict(unit.spec), *first)
             self.running[future] = source.popleft()
 
     def _take(self, future: Future[Any], number: int, pool: Pool) -> bool:
@@ -167,7 +175,7 @@ class _Fan:
         if self.failures[number] < _TRIES and not final:
             self.alone.append(number)
         else:
-            self.done.poisoned.append(Poisoned(self.units[number], " ".join(why.split())))
+            self.done.poisoned.append(Poisoned(self.units[number], shorten(why, _TOLD, placeholder=" ...")))
 
     def _blame(self, died: Sequence[int]) -> bool:
         """Of the units that were under way when a worker died: one alone has failed, several are tried alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import tempfile
@@ -41,6 +42,13 @@ class Golden(NamedTuple):
         return cls(does, spec, str(function_at(does)(spec)), __version__, code_digest())
 
 
+class Furnish(NamedTuple):
+    """What a worker does once before all units, such as loading laws that are not the package's."""
+
+    does: str
+    spec: Mapping[str, Any]
+
+
 class Computed(NamedTuple):
     """What a unit gave, where, and how long that took [s], by the clock and of the processor."""
 
@@ -54,9 +62,11 @@ class WorkerDiffers(Exception):
     """A worker that would compute other numbers."""
 
 
-def compute(does: str, spec: Mapping[str, Any], golden: Golden | None) -> Computed:
+def compute(does: str, spec: Mapping[str, Any], golden: Golden | None, furnish: Furnish | None = None) -> Computed:
     """Compute a unit. Raises WorkerDiffers before, where this worker is not of the same code or numbers."""
     host = platform.node()
+    if furnish is not None:
+        _furnish(furnish)
     if golden is not None and (golden.expected, golden.code) not in _passed:
         with _ONE, locked(_turn()):
             _check(golden, host)
@@ -67,6 +77,15 @@ def compute(does: str, spec: Mapping[str, Any], golden: Golden | None) -> Comput
         error.add_note(f"on {host}")
         raise
     return Computed(arrays, host, time.perf_counter() - start, time.process_time() - processor)
+
+
+def _furnish(furnish: Furnish) -> None:
+    """Once in a process."""
+    known = furnish.does, json.dumps(furnish.spec, sort_keys=True)
+    with _ONE:
+        if known not in _passed:
+            function_at(furnish.does)(furnish.spec)
+            _passed.add(known)
 
 
 def _check(golden: Golden, host: str) -> None:
