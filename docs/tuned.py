@@ -44,8 +44,8 @@ class Tuning(NamedTuple):
 
 
 def preset_of(law: Controller, family: str) -> str:
-    """The preset that a law is used with there."""
-    return next(name for name in CONDITIONS[family] if name in law.presets)
+    """The preset that a law is used with there; empty where it has none for such conditions."""
+    return next((name for name in CONDITIONS[family] if name in law.presets), "")
 
 
 def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str) -> Tuning:
@@ -72,8 +72,9 @@ def lines_of(family: str) -> tuple[list[str], list[str]]:
     searched, chosen = tuning_cases(study)
     judges = Judge(searched, study.wrist, given.objective), Judge(chosen, study.wrist, given.objective)
     rows = []
-    for name in given.controllers:
-        rows.append(tuned(study, controller(name), judges, family))
+    for law in map(controller, given.controllers):
+        if preset_of(law, family):
+            rows.append(tuned(study, law, judges, family))
     rows.sort(key=lambda each: each.rmse)
     table = [
         f"| {each.law} | {np.degrees(each.rmse):.3f} | {each.chosen} | {each.preset} | {each.ratio.value:.2f} "

@@ -24,11 +24,13 @@ DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 LONGEST_STEP = 1e-3
 """Integration step [s] below which elastic tendons and their friction cost no accuracy (docs/accuracy.md)."""
+STIFF = 50e3
+"""Stiffness [N/m] beyond which tendons take half that step."""
 
 
-def steps_within(period: float) -> int:
-    """How many steps of at most LONGEST_STEP a period has."""
-    return max(1, math.ceil(period / LONGEST_STEP * (1.0 - 1e-9)))
+def longest_step(actuator: Actuator) -> float:
+    """The integration step [s] that is short enough for elastic tendons of an actuator's stiffness."""
+    return LONGEST_STEP if actuator.tendon_stiffness <= STIFF else 0.5 * LONGEST_STEP
 
 
 class Loop(Section):
@@ -42,7 +44,7 @@ class Loop(Section):
     control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
     substeps: int | None = choice(
         None,
-        "integration steps within one control period; null: of 1 ms at most where tendons are elastic, else one",
+        "integration steps in a period; null: of 1 ms at most for elastic tendons (0.5 ms above 50 kN/m), else one",
         ge=1,
         le=1000,
     )
@@ -51,7 +53,12 @@ class Loop(Section):
     @property
     def steps(self) -> int:
         """Integration steps within one control period."""
-        return self.substeps or (steps_within(self.control_period) if self.actuator.level == "tendon" else 1)
+        return self.substeps or (self.fewest_steps if self.actuator.level == "tendon" else 1)
+
+    @property
+    def fewest_steps(self) -> int:
+        """How many steps short enough for its elastic tendons a control period has."""
+        return max(1, math.ceil(self.control_period / longest_step(self.actuator) * (1.0 - 1e-9)))
 
     @model_validator(mode="after")
     def _a_frame_lasts_a_tick(self) -> Self:

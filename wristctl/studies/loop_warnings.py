@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from wristctl.config.control import Row, SimulateSettings
-from wristctl.config.loop import LONGEST_STEP, Loop, steps_within
+from wristctl.config.loop import Loop, longest_step
 from wristctl.config.wrist import WristParameters
 from wristctl.studies.findings import Findings
 
@@ -73,7 +73,6 @@ def warn_if_coarse(loops: Iterable[Loop]) -> None:
     """Warn where configured substeps are longer than elastic tendons allow."""
     for loop in loops:
         step = loop.control_period / loop.steps
-        if loop.actuator.level == "tendon" and step > LONGEST_STEP * (1.0 + 1e-9):
-            fewest = steps_within(loop.control_period)
+        if loop.actuator.level == "tendon" and step > longest_step(loop.actuator) * (1.0 + 1e-9):
             told = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
-            log.warning(told, 1e3 * step, fewest)
+            log.warning(told, 1e3 * step, loop.fewest_steps)
