@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @in_python()
 def load_study(file: str | Path | None = None, *overrides: str) -> Study:
-    """The study of a YAML file, or of defaults only.
+    """The study of a YAML file, of an experiment by its name ("quick"), or of defaults only.
 
     `overrides` such as "wrist.length=0.09" win over the file, later ones over earlier ones; quantities are in the units
     that `wristctl <command> --dry-run` shows: SI, but for suffixes such as _deg. Raises UserError for an unknown key or

@@ -21,7 +21,7 @@ def test_what_is_included_is_read_first_from_where_the_file_stands(tmp_path: Pat
 @pytest.mark.parametrize(
     "text, told",
     [
-        ("include: [missing.yaml]\n", r"there is no .*missing.yaml to include - .*b.yaml:1"),
+        ("include: [missing.yaml]\n", r"there is no .*missing.yaml to include, nor such .* - .*b.yaml:1"),
         ("seed: 1\ninclude: b.yaml\n", r"include should be a list of study files - .*b.yaml:2"),
         ("seed: 1\ninclude: [b.yaml]\n", r"b.yaml includes itself - .*b.yaml:2"),
         ("include: [c.yaml]\n", r"unknown key 'sed' - .*c.yaml:2: sed - fix: did you mean 'seed'"),

@@ -126,7 +126,15 @@ def mutate(mutant: Mutant, folder: Path) -> None:
     for name in ("wristctl", "tests", "experiments", "docs", "benchmarks"):
         ignored = shutil.ignore_patterns("__pycache__", "results", "*.avi")
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
-    for name in ("pyproject.toml", "README.md", "CONTRIBUTING.md", "Makefile"):
+    for name in (
+        "pyproject.toml",
+        "README.md",
+        "CONTRIBUTING.md",
+        "Makefile",
+        "LICENSE",
+        "constraints.txt",
+        ".gitignore",
+    ):
         shutil.copy(ROOT / name, folder / name)
     if (ROOT / "build").is_dir():
         os.symlink(ROOT / "build", folder / "build")

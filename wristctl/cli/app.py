@@ -21,6 +21,7 @@ from wristctl.interrupt import again, interrupts
 _REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
 
 COMMANDS = {
+    "init": ("wristctl.cli.init", _REPRODUCE, "Lay out the study files in a folder, for you to change."),
     "gen-data": (
         "wristctl.cli.gen_data",
         _REPRODUCE,

@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from wristctl.config.choices import CONTROLLERS
+from wristctl.config.shipped import shipped_names
 
 MOST = 200
 """Runs offered: of many thousands nobody reads the list, and a shell asks at every key."""
@@ -27,15 +28,16 @@ def run_ids(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def study_files(incomplete: str) -> list[str]:
-    """Folders and YAML files; those of experiments/ where nothing is typed yet."""
+    """Folders and YAML files, those of experiments/ where nothing is typed yet; else names of experiments."""
     typed = Path(incomplete or "experiments/")
     folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
     try:
         found = [path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") or path.is_dir()]
     except OSError:
-        return []
+        found = []
     names = sorted(f"{path}/" if path.is_dir() else str(path) for path in found)
-    return [name for name in names if name.startswith(incomplete)]
+    fitting = [name for name in names if name.startswith(incomplete)]
+    return fitting or [name for name in shipped_names() if name.startswith(incomplete)]
 
 
 def controllers(incomplete: str) -> list[str]:

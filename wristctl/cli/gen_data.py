@@ -13,6 +13,6 @@ app = study_command(
         "wristctl gen-data --samples 5000 --label large",
         "wristctl gen-data --source plant --set segments=4",
         "wristctl gen-data --source run --run latest:hw-run",
-        "wristctl gen-data --source csv --set 'files=\\[monday.csv,tuesday.csv]'",
+        "wristctl gen-data --source csv --set 'files=[monday.csv,tuesday.csv]'",
     ),
 )

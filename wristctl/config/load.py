@@ -14,6 +14,7 @@ from wristctl.config.foreign import placed
 from wristctl.config.former import leave_out_former
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.keys import field_at, home_of, keys_of, section_keys
+from wristctl.config.shipped import shipped_name, shipped_names, study_file
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Phrase, Setting
@@ -25,9 +26,9 @@ INCLUDE = "include"
 def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None) -> Study:
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
 
-    A sequence is one leaf. An override's key is first looked for in the section of `command`: for train, `epochs=5` is
-    `train.epochs=5`. Raises UserError with file and line (or override), key path, and nearest key or what is
-    expected.
+    A file may be an experiment by its name, `quick`. A sequence is one leaf. An override's key is first looked for in
+    the section of `command`: for train, `epochs=5` is `train.epochs=5`. Raises UserError with file and line (or
+    override), key path, and nearest key or what is expected.
     """
     return read_study(files, overrides, command)[0]
 
@@ -39,7 +40,11 @@ def read_study(
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
     for file in files:
-        _merge_file(data, file, origins, ())
+        found = study_file(file)
+        if found is None:
+            what = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
+            raise UserError(what, str(file), meant(shipped_name(file), shipped_names()))
+        _merge_file(data, found, origins, ())
     leave_out_former(data, origins)
     for override in overrides:
         _merge(data, _whole(_override(override, command), None), Setting(override), origins)
@@ -58,11 +63,12 @@ def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase]
     if not isinstance(included, tuple) or not all(isinstance(each, str) for each in included):
         raise UserError(f"{INCLUDE} should be a list of study files", where, f"{INCLUDE}: [scenarios/camera.yaml]")
     for name in included:
-        inner = file.parent / name
+        inner = study_file(Path(name), file.parent)
+        if inner is None or not inner.is_file():
+            what = f"there is no {file.parent / name} to include, nor such an experiment of wristctl"
+            raise UserError(what, where, "paths are from the file that includes")
         if inner.resolve() in [each.resolve() for each in (*outer, file)]:
             raise UserError(f"{inner} includes itself", where, "leave one of them out")
-        if not inner.is_file():
-            raise UserError(f"there is no {inner} to include", where, "paths are from the file that includes")
         _merge_file(data, inner, origins, (*outer, file))
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
     _merge(data, _whole(Document(content, lines), file), str(file), origins)

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from wristctl.config.shipped import EXPERIMENTS
 from wristctl.records.files import files_below, sha256_of, sha256_of_list
 from wristctl.records.manifest import Code
 from wristctl.version import __version__
@@ -39,7 +40,8 @@ def tree_digest() -> str:
 
 
 def _sources() -> list[tuple[str, str]]:
-    return [(name, sha256_of(_PACKAGE / name)) for name in files_below(_PACKAGE) if "__pycache__" not in name]
+    names = [name for name in files_below(_PACKAGE) if not {"__pycache__", EXPERIMENTS} & set(Path(name).parts)]
+    return [(name, sha256_of(_PACKAGE / name)) for name in names]  # a wheel has the experiments within, a clone beside
 
 
 def _patch() -> bytes:
