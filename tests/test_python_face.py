@@ -17,9 +17,9 @@ import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
-    "__main__", "cli", "__init__", "api", "studies", "report", "comparison", "tuning", "learning", "identification",
-    "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work", "lanes", "records",
-    "config", "arrays", "interrupt", "seeds", "version",
+    "__main__", "cli", "__init__", "api", "gym", "studies", "report", "comparison", "tuning", "learning",
+    "identification", "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work",
+    "lanes", "records", "config", "arrays", "interrupt", "seeds", "version",
 )  # fmt: skip
 
 

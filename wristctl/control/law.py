@@ -200,6 +200,7 @@ def _refused(law: Law, error: NumbaError) -> UserError:
     return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
 
 
+@cache
 def _signature(lanes: int, gains: tuple[str, ...] = ()) -> Any:
     number = LaneType(lanes)
     now, wrist, named = (RowsType(number, None, fields=fields) for fields in (NOW, Segments._fields, gains))

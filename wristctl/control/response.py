@@ -48,6 +48,22 @@ def _continued(control: Any, first: int, since: float) -> None:
 
 
 @compiled
+def perceive(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
+    """Put what a law sees into its signals; the least and the largest torque [N m] in reach. Arguments as `respond`."""
+    low, high = bounds
+    signals = rows_of(control.signals)
+    torque_low, torque_high = reach(seen.theta, known, low, high)
+    signals[_THETA] = seen.theta
+    signals[_RATE] = seen.rate
+    signals[_LOAD] = seen.load
+    _continued(control, _THETA_REF, since)
+    signals[_LOW] = torque_low
+    signals[_HIGH] = torque_high
+    signals[_PERIOD] = period + 0.0 * low
+    return torque_low, torque_high
+
+
+@compiled
 def respond(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
@@ -55,17 +71,8 @@ def respond(control: Any, known: Any, seen: Any, bounds: Any, since: float, peri
     are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
     """
     low, high = bounds
-    angle = seen.theta
-    signals = rows_of(control.signals)
-    torque_low, torque_high = reach(angle, known, low, high)
-    signals[_THETA] = angle
-    signals[_RATE] = seen.rate
-    signals[_LOAD] = seen.load
-    _continued(control, _THETA_REF, since)
-    signals[_LOW] = torque_low
-    signals[_HIGH] = torque_high
-    signals[_PERIOD] = period + 0.0 * low
+    torque_low, torque_high = perceive(control, known, seen, bounds, since, period)
     gains, memory = rows_of(control.gains), rows_of(control.memory)
     wanted = control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
-    plus, minus = allocate(angle, known, wanted, low, high)
+    plus, minus = allocate(seen.theta, known, wanted, low, high)
     return wanted, torque_low, torque_high, plus, minus

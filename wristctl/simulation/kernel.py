@@ -132,7 +132,7 @@ def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sp
 def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, first: int, last: int) -> None:
     cut, period, ticks = setup.coordinates, setup.period, setup.ticks
     undisturbed = parameters_of(setup.plant, rows_of(world.plant))
-    known, drive = load_segments(rows_of(world.model)), _drive(setup.level, world.motor)
+    known, drive = load_segments(rows_of(world.model)), drive_in(setup.level, world.motor)
     tendons = _tendons(world.tendons, world.nonideal, state.tendons)
     winding = read_winding(rows_of(world.winding))
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
@@ -146,7 +146,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     targets, acts = scratch.target.reshape(3, len(state.which)), scratch.acting.reshape(2, len(state.case))
     acting = rows_of(scratch.acting)
     for sample in range(first, last):
-        _gather(course.references, state.which, sample, targets)
+        gather_lanes(course.references, state.which, sample, targets)
         plant = _under(course.acting, state.case, sample, acts, acting, undisturbed)
         for tick in range(ticks):
             now_tick = sample * ticks + tick
@@ -154,10 +154,10 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             seen = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
             for ahead in range(1, setup.preview + 1):
                 to_come = min((now_tick + ahead) // ticks, course.references.shape[1] - 1)
-                _gather(course.references, state.which, to_come, targets)
+                gather_lanes(course.references, state.which, to_come, targets)
                 look_ahead(control, ahead, (now_tick + ahead - to_come * ticks) * period)
             if setup.preview > 0:
-                _gather(course.references, state.which, sample, targets)
+                gather_lanes(course.references, state.which, sample, targets)
             wanted, torque_low, torque_high, plus, minus = respond(
                 control, known, seen, (low, high), tick * period, period
             )
@@ -190,7 +190,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
 
 
 @compiled
-def _drive(level: Any, motor: Any) -> Any:
+def drive_in(level: Any, motor: Any) -> Any:
+    """The Drive of these motors' rows; None where the actuator is ideal."""
     if level is None:
         return None
     return Drive(level, read_motor(rows_of(motor)))
@@ -218,7 +219,7 @@ def _rows(state: Any) -> Any:
 
 
 @compiled
-def _gather(tables: Any, which: Any, sample: int, out: Any) -> None:
+def gather_lanes(tables: Any, which: Any, sample: int, out: Any) -> None:
     """Each lane's own values of one sample, from tables [case, sample, value] into [value, lane]."""
     for value in range(out.shape[0]):
         for lane in range(len(which)):
@@ -230,5 +231,5 @@ def _under(tables: Any, which: Any, sample: int, out: Any, acting: Any, plant: A
     """The plant under one sample's disturbances, which are gathered into `out`, the memory of the rows `acting`."""
     if tables is None:
         return plant
-    _gather(tables, which, sample, out)
+    gather_lanes(tables, which, sample, out)
     return disturbed(plant, acting[0], acting[1])

@@ -78,9 +78,9 @@ def rollout(
     has raised; such rollouts run one by one.
     """
     count = len(gains)
-    worlds, world = _worlds(loop, wrist, count)
+    worlds, world = worlds_of(loop, wrist, count)
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
-    groups = _by_frames(worlds, world, motions[0].horizon)
+    groups = by_frames(worlds, world, motions[0].horizon)
     if controller.plain:
         groups = [np.array([each]) for each in range(count)]
     done: list[Outcome] = []
@@ -91,7 +91,7 @@ def rollout(
             if progress is not None:
                 progress((before + share * size) / count)
 
-        done.append(_run(controller, gains[own], motions, *_of(worlds, lanes, own), start, record, threads, so_far))
+        done.append(_run(controller, gains[own], motions, *part_of(worlds, lanes, own), start, record, threads, so_far))
     if len(done) == 1:
         return done[0]
     back = np.argsort(np.concatenate(groups), kind="stable")
@@ -102,7 +102,7 @@ def rollout(
     return Outcome(metrics, failed, until, np.concatenate(samples)[back] if samples else None)
 
 
-def _worlds(
+def worlds_of(
     loop: Loop | Sequence[Loop], wrist: WristParameters | Sequence[WristParameters], count: int
 ) -> tuple[list[World], NDArray[np.int64]]:
     """The worlds that there are, and which of them each rollout has, (count,)."""
@@ -129,7 +129,7 @@ def structure(loop: Loop) -> tuple[object, ...]:
     return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
 
 
-def _by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float) -> list[NDArray[np.intp]]:
+def by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float) -> list[NDArray[np.intp]]:
     """Rollouts whose cameras take frames at the same ticks run together."""
     if len(worlds) == 1 or worlds[0].loop.sensor.level == "ideal":
         return [np.arange(len(world))]
@@ -140,7 +140,7 @@ def _by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float
     return [np.flatnonzero(group == number) for number in range(len(numbers))]
 
 
-def _of(worlds: Sequence[World], lanes: Lanes, own: NDArray[np.intp]) -> tuple[list[World], Lanes]:
+def part_of(worlds: Sequence[World], lanes: Lanes, own: NDArray[np.intp]) -> tuple[list[World], Lanes]:
     """Worlds and lanes of some of the rollouts."""
     there, which = np.unique(lanes.world[own], return_inverse=True)
     return [worlds[each] for each in there], Lanes(lanes.motion[own], which, [lanes.streams[each] for each in own])

@@ -1,0 +1,169 @@
+"""Closed loops that are run a sample at a time, with torques from outside in the place of a law.
+
+They are the loops of `rollout`, in its kernel: the law there reads the torque that has been given. What a law would see
+next is looked up between two samples by what the kernel itself calls; a frame is taken and fused once, whoever asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.choices import PLANTS
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import NOW, Controller, Gain
+from wristctl.control.response import Controlled, perceive
+from wristctl.lanes.blocks import to_rows
+from wristctl.lanes.compiled import kernel, spelled_out
+from wristctl.lanes.lane import where
+from wristctl.lanes.parts import block_of
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.batch import Batch, Lanes, Start, batch
+from wristctl.simulation.cases import Case
+from wristctl.simulation.kernel import Span, drive_in, gather_lanes, run_blocks
+from wristctl.simulation.observer import sense
+from wristctl.simulation.rollout import by_frames, part_of, worlds_of
+from wristctl.simulation.sums import SUMS
+from wristctl.simulation.worlds import bending_limit
+from wristctl.wrist.allocation import reach
+from wristctl.wrist.plant import kernel_of, parameters_of, tip_angle
+from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+_ALIVE = SUMS.index("alive")
+_SIDE = float(TENDONS_PER_SIDE)
+_TRUE, _WELL, _LIMIT = len(NOW), len(NOW) + 1, len(NOW) + 2
+_ROWS = len(NOW) + 3
+
+
+def _given(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """The torque that stands in the place of a gain."""
+    return gains.torque
+
+
+GIVEN = Controller(
+    name="given",
+    law=_given,
+    source="whoever steps the loops",
+    gains={"torque": Gain("N m", "torque of the next sample", -100.0, 100.0)},
+    presets={},
+)
+
+
+class Sight(NamedTuple):
+    """Of `count` loops at a sample: what their laws see, and what is true."""
+
+    signals: Array
+    """(count, NOW): behind a camera the observer's."""
+    theta: Array
+    """Bending angle [rad], (count,)."""
+    reference: Array
+    """That it should have [rad], (count,)."""
+    failed: NDArray[np.bool_]
+    """Whose wrist has left its range, (count,); it stays where it was."""
+    limit: Array
+    """Bending angle beyond which a wrist has failed [rad], (count,)."""
+
+
+class _Group(NamedTuple):
+    """Loops whose cameras take frames together: their numbers, and they as blocks."""
+
+    own: NDArray[np.intp]
+    batch: Batch
+    scratch: Any
+    found: Array
+
+
+class SteppedLoops:
+    """`count` loops at their first sample, one for each case, at rest where `start` says or straight.
+
+    A step is a sample: a control period, or as many as are in 1 ms, over which the torques are held. The cases' worlds
+    have one structure (ValueError where they do not) and their motions one length.
+    """
+
+    def __init__(self, cases: Sequence[Case], wrist: WristParameters, start: Start | None = None) -> None:
+        motions = list({id(each.motion): each.motion for each in cases}.values())
+        numbers = {id(each): number for number, each in enumerate(motions)}
+        which = np.array([numbers[id(each.motion)] for each in cases], np.int64)
+        loops, count = [each.loop for each in cases], len(cases)
+        one = all(each is loops[0] for each in loops)
+        worlds, world = worlds_of(loops[0] if one else loops, wrist, count)
+        lanes = Lanes(which, world, [each.stream for each in cases])
+        model = PLANTS[loops[0].plant.model]
+        self.count, self.sample, self.samples = count, 0, len(motions[0].time)
+        self._run: Callable[..., None] = kernel_of(run_blocks, model)
+        self._look: Callable[..., None] = kernel_of(_look_blocks, model)
+        self._groups = list[_Group]()
+        for own in by_frames(worlds, world, motions[0].horizon):
+            made = batch(GIVEN, np.zeros((len(own), 1)), motions, *part_of(worlds, lanes, own), model, start, False)
+            self._groups.append(_Group(own, made, made.scratch(), np.empty((made.blocks, _ROWS, *made.wide))))
+
+    @property
+    def done(self) -> bool:
+        """Whether the last sample of the motions has come."""
+        return self.sample + 1 >= self.samples
+
+    def step(self, torques: Array) -> None:
+        """Hold torques (count,) [N m] until the next sample."""
+        for own, made, scratch, _ in self._groups:
+            values, given = made.world.gains.reshape(-1), torques[own]
+            values[: len(own)] = given
+            values[len(own) :] = given[-1]
+            span = Span(0, made.blocks, self.sample, self.sample + 1)
+            self._run(made.setup, made.course, made.world, made.state, scratch, span)
+        self.sample += 1
+
+    def look(self) -> Sight:
+        """What laws see now, before they answer, and what is true."""
+        rows = np.empty((self.count, _ROWS))
+        for own, made, scratch, found in self._groups:
+            self._look(made.setup, made.course, made.world, made.state, scratch, self.sample, found)
+            rows[own] = to_rows(found, len(own))
+        signals = rows[:, : len(NOW)]
+        wanted = signals[:, NOW.index("theta_ref")]
+        return Sight(signals, rows[:, _TRUE], wanted, rows[:, _WELL] <= 0.0, rows[:, _LIMIT])
+
+
+def _look_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, found: Any) -> None:
+    for block in range(len(found)):
+        _look_block(setup, course, block_of(world, block), block_of(state, block), scratch, sample, found[block])
+
+
+@spelled_out
+def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, found: Any) -> None:
+    cut, period = setup.coordinates, setup.period
+    n = len(cut)
+    plant = parameters_of(setup.plant, rows_of(world.plant))
+    known, drive = load_segments(rows_of(world.model)), drive_in(setup.level, world.motor)
+    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
+    q, rates = part(rows_of(state.coordinates), 0, cut), part(rows_of(state.coordinates), n, cut)
+    bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(found)
+    gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
+    angle, rate = tip_angle(plant, q, rates)
+    seen = sense(course.schedule, state.watch, drive, known, sample * setup.ticks, angle, rate, period)
+    perceive(control, known, seen, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
+    for i in range(_TRUE):
+        out[i] = signals[i]
+    out[_TRUE] = angle
+    out[_WELL] = where(abs(angle) < bound[2], rows_of(state.sums)[_ALIVE], 0.0 * angle)
+    out[_LIMIT] = bound[2]
+
+
+@kernel
+def _reach_along(model: Any, theta: Any, low: float, high: float, found: Any) -> None:
+    known, angles, out = load_segments(rows_of(model)), rows_of(theta), rows_of(found)
+    for k in range(theta.shape[0]):
+        zero = 0.0 * angles[k]
+        out[2 * k], out[2 * k + 1] = reach(angles[k], known, low + zero, high + zero)
+
+
+def largest_torque(wrist: WristParameters) -> float:
+    """Largest torque [N m] that the tendons of a wrist can give anywhere in its range, by the one-segment model."""
+    angles = np.linspace(-1.0, 1.0, 101) * bending_limit(wrist)
+    found: Array = np.empty(2 * len(angles))
+    _reach_along(segments(wrist, 1), angles, _SIDE * wrist.pretension, _SIDE * wrist.tension_limit, found)
+    return float(np.abs(found).max())
