@@ -47,7 +47,7 @@ def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(c
     code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
     assert code == 0 and err.splitlines()[0].startswith("all emulated, in virtual time")
-    assert "paper: pushed, flexion" in out and "0.157" in out and run.problems() == []
+    assert "paper" not in out and run.problems() == []  # its numbers stand beside its law only
     (trial,) = run.data("trials").to_dict("records")
     assert trial["outcome"] == "ok" and trial["rmse"] == run.metrics["rmse"]["value"] < 0.01
     assert trial["true_rmse"] < 0.01

@@ -21,6 +21,7 @@ MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
 LOOPS = ("--set", "ranges_deg=[[0, 5]]", "--set", "frequencies=[5]", "--set", "angles_deg=[]", "--set", "sheaths=[1]")
 QUICK = ("--epochs", "5", "--set", "hidden=[8]", "--set", "gen-data.samples=100")
 GRID = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
+BUDGET = "{candidates: 3, iterations: 1, finalists: 1, draws: 1, validation: 1, worlds: 8, noises: 1}"
 CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
 QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     "gen-data": (("--samples", "1000"), ("--source", "plant", "--samples", "50")),
@@ -32,6 +33,7 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     "simulate": (("--set", "horizon=0.5"),),
     "analyse": (("--controller", "gvsc", "--gains", "default"),),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
+    "study": (("scenarios/ideal", "--set", "laws=[pd-ff]", "--set", f"budgets.small={BUDGET}"),),
     "hysteresis": (LOOPS,),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip

@@ -28,7 +28,7 @@ from wristctl.studies.loop_warnings import warn_outside_conditions
 from wristctl.studies.session import Session
 from wristctl.studies.unattended import Unattended
 
-PAPERS = ("smc", "pid")
+PAPERS = ("smc", "pid", "pid-angle")
 STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).conditions]
 
 

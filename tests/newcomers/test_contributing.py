@@ -87,7 +87,7 @@ def run(copy: Path, *arguments: str) -> tuple[Run, str]:
 
 
 def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
-    compared, said = run(copy, "compare", "study.yaml")
+    compared, said = run(copy, "compare", "study.yaml", "--all")
     table = compared.data("comparison").set_index(["loop", "gains"])
     assert set(table["controller"]) == {"pd"} and set(table["reference"]) == {"approach 0.1 s 10 deg"}
     tuned, default = (table.xs(gains, level="gains") for gains in ("tuned", "default"))

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.unstated import Box
 
-VerdictName = Literal[
-    "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
+VerdictName = Annotated[
+    Literal[
+        "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
+    ],
+    BeforeValidator(lambda given: "contradicted" if given == "contradictory" else given),
 ]
+"""Older ledgers say contradictory."""
 SenseName = Literal["about", "exactly", "at least", "at most"]
 
 _NEEDED = {

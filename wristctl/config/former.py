@@ -13,6 +13,7 @@ log = logging.getLogger(__name__)
 
 FORMER = {
     ("sensor", "seed"): "a camera's noise now comes from `seed`, the root of every random stream (--seed)",
+    ("claims", "exact"): "each loop has a verdict of its own now, and `sense` says how a value is meant",
 }
 """The end of a key path, and what has come in its place."""
 
@@ -29,7 +30,7 @@ def leave_out_former(data: dict[str, Any], origins: Mapping[KeyPath, Phrase]) ->
 def _take_out(node: Any, path: KeyPath, found: dict[tuple[str, str], KeyPath]) -> None:
     if isinstance(node, dict):
         for key in list(node):
-            former = (str(path[-1]) if path else "", str(key))
+            former = (next((each for each in reversed(path) if isinstance(each, str)), ""), str(key))
             if former in FORMER:
                 del node[key]
                 found.setdefault(former, (*path, key))

@@ -40,7 +40,7 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
     law = controller(row.controller)
     if row.gains == "tuned" and law.name not in (tuned or {}):
         looked = f" in {run.id}, which tuned {', '.join(tuned or ()) or 'nothing'}" if run else ""
-        fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), " --kind tune` shows them")
+        fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), "` shows the runs")
         raise UserError(f"no tuned gains of {law.name}{looked}", "gains", fix)
     gains_of(law, row.gains, tuned)
 
