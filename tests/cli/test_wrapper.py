@@ -93,7 +93,7 @@ def test_files_options_overrides_and_shortcuts_reach_the_study(probe: Command, t
         (["gen-data", "--set", "wrist.mass=-1"], "-1 should be greater than 0 - --set wrist.mass=-1: wrist.mass"),
         (["gen-data", "--set", "wrist.mass=.nan"], "nan should be a finite number"),
         (["gen-data", "bad.yaml"], "unknown key 'lenght' - bad.yaml:2: wrist.lenght - fix: did you mean 'length'?"),
-        (["gen-data", "absent.yaml"], "No such file or directory - absent.yaml"),
+        (["gen-data", "absent.yaml"], "there is no study file"),
         (["gen-data", "--out", "bad.yaml"], "cannot create a run directory"),
         (["gen-data", "--label", "a/b"], "a label holds"),
         (["gen-data", "--seed", "x"], "fix: wristctl gen-data --help"),

@@ -42,7 +42,7 @@ def test_tuned_gains_must_be_there_for_the_controller_that_asks_for_them() -> No
         with pytest.raises(UserError) as caught:
             check_row(asked, tuned)
         assert (caught.value.what, caught.value.where) == ("no tuned gains of pid", "gains")
-        assert caught.value.fix == "--tuned RUN, a tune run that tuned pid: `wristctl runs ls --kind tune` shows them"
+        assert caught.value.fix == "--tuned RUN, a tune run that tuned pid: `wristctl runs ls` shows the runs"
     with pytest.raises(UserError) as caught:
         check_row(asked, gains | {"pid": {"nonsense": 1.0}})
     assert "no tuned gains" not in caught.value.what

@@ -11,12 +11,10 @@ from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.unstated import Box
 
-VerdictName = Annotated[
-    Literal[
-        "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
-    ],
-    BeforeValidator(lambda given: "contradicted" if given == "contradictory" else given),
+VerdictName = Literal[
+    "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
 ]
+_Written = Annotated[VerdictName, BeforeValidator(lambda given: "contradicted" if given == "contradictory" else given)]
 """Older ledgers say contradictory."""
 SenseName = Literal["about", "exactly", "at least", "at most"]
 
@@ -60,7 +58,7 @@ class Claim(Section):
     """The paper derives it from its equations, which contradict it where, solved as they stand, they do not give it."""
     unspecified: str = ""
     """What the paper leaves open, so that no number of ours can decide: ours then stands beside."""
-    verdict: VerdictName | None = None
+    verdict: _Written | None = None
     reason: str = ""
 
     @property
