@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import inverse_dynamics, one_segment_terms
-from wristctl.control.pid_ff import held, integrated
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import sqrt
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.law import Controller, Gain
-from wristctl.lanes.lane import where
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """-(Kp e + Ki int(e) + Kd de/dt) (E22, sign C7); the integral holds while it would drive a saturated tendon on."""
     kp, ki, kd = gains.Kp, gains.Ki, gains.Kd
     error = now.theta - now.theta_ref
-    integral = memory[0] + now.period * error
+    integral = integrated(now, memory[0])
     torque = -(kp * error + ki * integral + kd * (now.rate - now.rate_ref))
-    held = ((torque > now.torque_high) & (error < 0.0)) | ((torque < now.torque_low) & (error > 0.0))
-    memory[0] = where(held, memory[0], integral)
+    memory[0] = held(now, torque, memory[0], integral)
     return torque
 
 

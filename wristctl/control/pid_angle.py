@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.law import Controller
 from wristctl.control.model import one_segment
 from wristctl.control.pid import PID
 from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import where
 
 _FURTHEST = 3.141592653589793
 
@@ -20,12 +20,11 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """
     kp, ki, kd = gains.Kp, gains.Ki, gains.Kd
     error = now.theta - now.theta_ref
-    integral = memory[0] + now.period * error
+    integral = integrated(now, memory[0])
     angle = -(kp * error + ki * integral + kd * (now.rate - now.rate_ref))
     angle = -maximum(-maximum(angle, -_FURTHEST + 0.0 * angle), -_FURTHEST + 0.0 * angle)
     _, torque = one_segment(wrist, angle, 0.0 * angle)
-    held = ((torque > now.torque_high) & (error < 0.0)) | ((torque < now.torque_low) & (error > 0.0))
-    memory[0] = where(held, memory[0], integral)
+    memory[0] = held(now, torque, memory[0], integral)
     return torque
 
 

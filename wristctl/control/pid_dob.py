@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control import pid_ff
+from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.pd_ff import fed_forward_pd
@@ -17,9 +18,9 @@ GAINS = pid_ff.GAINS | {"wo": Gain("rad/s", "bandwidth of the disturbance observ
 def rung(now: Any, wrist: Any, gains: Any, memory: Any, more: Any) -> Any:
     """The law's torque less `more` [N m], what the rung above adds."""
     found = disturbance(now, wrist, gains.wo, memory, 1)
-    integral = pid_ff.integrated(now, memory[0])
+    integral = integrated(now, memory[0])
     torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found - more
-    memory[0] = pid_ff.held(now, torque, memory[0], integral)
+    memory[0] = held(now, torque, memory[0], integral)
     remember(now, wrist, found, torque, memory, 1)
     return torque
 

@@ -5,25 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.control import pd_ff
+from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
-from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import where
 
 GAINS = pd_ff.GAINS | {"Ki": Gain("N m/(rad s)", "integral gain", 1e-2, 1e4)}
-
-
-@compiled
-def integrated(now: Any, integral: Any) -> Any:
-    """The integral of the error with this period's [rad s]."""
-    return integral + now.period * (now.theta - now.theta_ref)
-
-
-@compiled
-def held(now: Any, torque: Any, old: Any, new: Any) -> Any:
-    """The new integral, or the old one where the new would drive a saturated tendon on."""
-    error = now.theta - now.theta_ref
-    stays = ((torque > now.torque_high) & (error < 0.0)) | ((torque < now.torque_low) & (error > 0.0))
-    return where(stays, old, new)
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
