@@ -131,6 +131,7 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> 
         (("analyse", "--set", "horizn=1.0"), "did you mean 'horizon'?"),
         (("analyse", "--gains", "initial", "--set", "wrist.tension_limit=3.0"), "in a tendon that bears 3"),
         (("tune", "--set", "controllers=[feedforward]"), "no gains to tune"),
+        (("tune", "--set", "optimiser=differential-evolution", "--candidates", "2"), "at least 3 candidates, not 2"),
         (("tune", "--set", "scenarios=[{loop: defalt}]"), "did you mean 'default'?"),
         (("compare", "--set", "rows=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
         (("compare",), "--network RUN"),

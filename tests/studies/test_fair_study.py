@@ -152,6 +152,7 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
         ("study.presets=[{controller: smc, gains: tuned}]", r"no tuned gains of smc - study.presets.0"),
         ("study.terms={x: [pd-ff/tuned, pid-ff/tunes]}", r"no row 'pid-ff/tunes' is judged - study.terms.x - fix: did"),
         ("study.variants={x: {optimiser: psoo}}", r"unknown optimiser 'psoo'.*did you mean 'pso'"),
+        ("study.budgets.small.candidates=2", r"at least 3 candidates, not 2 - study.budgets.small.candidates - fix"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_studied_is_named_before_anything_is_computed(file: Path, override: str, told: str) -> None:

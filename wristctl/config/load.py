@@ -104,7 +104,7 @@ def _override(text: str, command: str | None) -> Document:
     if command and keys[0] in own:
         keys.insert(0, home_of(command, keys[0]))
     elif keys[0] not in top:
-        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], [*own, *top]))
+        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*own, *top])))
     try:
         data = parse_yaml(value, "").data
     except UserError as error:

@@ -20,6 +20,8 @@ from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing
 
+NETWORK = "models/network.safetensors"
+"""Where a train run keeps its network."""
 ENTRY = "wristctl"
 """The one entry of the file's metadata: of several, safetensors writes the order at random."""
 

@@ -110,7 +110,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):
         if settings.worlds.family:
-            family = family_of(study.families, settings.worlds, "worlds")
+            family = family_of(study.families, settings.worlds.family, "worlds.family")
             count, horizon = len(settings.rows) * settings.worlds.draws * len(family.references), family.horizon
         else:
             count, horizon = count_rollouts(settings), settings.horizon

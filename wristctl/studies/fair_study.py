@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import UserError, meant, under
 from wristctl.config.study import Study
 from wristctl.studies.fair_outputs import written
-from wristctl.studies.fair_units import budget_of, families_of, golden_of, judge_all, performed, search_units
+from wristctl.studies.fair_units import budget_of, families_of, golden_of, judge_all, search_units, ways_to_tune
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
 from wristctl.studies.studied import Studied
+from wristctl.studies.units_in_run import performed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,8 +27,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.comparison.judge_unit import noises_of
     from wristctl.control.table import controller
     from wristctl.simulation.size import check_size
-    from wristctl.studies.loop_inputs import check_inverses, check_row, inverses_of
-    from wristctl.tuning.search import check_tunable
+    from wristctl.studies.loop_inputs import check_inverses, check_row, family_of, inverses_of
+    from wristctl.tuning.search import check_optimiser, check_tunable
 
     settings = study.study
     with under("study"):
@@ -35,8 +36,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         if not families_of(study):
             raise UserError("no families of worlds", "families", "include some of experiments/scenarios")
         for name in (*families_of(study), *filter(None, [settings.varied])):
-            if name not in study.families:
-                raise UserError(f"unknown family of worlds '{name}'", "families", meant(name, study.families))
+            family_of(study.families, name, "families")
         for number, name in enumerate(settings.laws):
             with under(f"laws.{number}"):
                 check_tunable(controller(name))
@@ -48,6 +48,14 @@ def plan(study: Study, inputs: Inputs) -> str:
             for label in pair:
                 if label not in labels:
                     raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
+        for name, _, way in ways_to_tune(study):
+            try:
+                check_optimiser(way)
+            except UserError as error:
+                key = str(error.where).rpartition(".")[2]
+                place = f"variants.{name}" if name and study.study.variants[name].optimiser else ""
+                at = f"budgets.{settings.budget}.{key}" if key == "candidates" else f"{place}.{key}".lstrip(".")
+                raise error.at(at) from error
         families = {name: study.families[name] for name in families_of(study)}
         for family in families.values():
             check_size([family.loop], family.horizon)
@@ -80,14 +88,14 @@ def fair_study(session: Session) -> Studied:
         golden = golden_of(study)
     session.findings.numerics(golden=golden.expected, executor=session.executor)
     wanted = search_units(study)
-    tuned = performed(session, "tuning", list(wanted.values()), golden)
+    tuned = performed(session, "study", "tuning", list(wanted.values()), golden)
     searches = {
         place: search_of(arrays, place.law, 1)
         for place, arrays in zip(wanted, tuned.arrays, strict=True)
         if arrays is not None
     }
     pieces = judge_all(study, {place: found.gains for place, found in searches.items()})
-    judged = performed(session, "judging", [unit for units in pieces.values() for unit in units], golden)
+    judged = performed(session, "study", "judging", [unit for units in pieces.values() for unit in units], golden)
     poisoned = [*tuned.poisoned, *judged.poisoned]
     return written(session, _whole(pieces, judged.arrays), searches, poisoned)
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.config.control import TuneSettings
 from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVariant
 from wristctl.config.families import TuningWorlds
 from wristctl.config.study import Study
-from wristctl.studies.session import Session
 
 if TYPE_CHECKING:
-    from wristctl.work.fan_out import UnitsDone
     from wristctl.work.unit import Unit
     from wristctl.work.worker import Golden
 
@@ -44,17 +41,22 @@ def families_of(study: Study) -> tuple[str, ...]:
     return study.study.families or tuple(study.families)
 
 
+def ways_to_tune(study: Study) -> list[tuple[str, str, TuneSettings]]:
+    """Variant, family and settings of every search of a law: the study's own on each family, and variants on one."""
+    varied = study.study.varied or families_of(study)[0]
+    ways = [(BASE, family, StudyVariant()) for family in families_of(study)]
+    ways += [(name, varied, variant) for name, variant in study.study.variants.items()]
+    return [(name, family, _tune_settings(study, family, variant)) for name, family, variant in ways]
+
+
 def search_units(study: Study) -> dict[StudyPlace, Unit]:
     """A search for every law on every family, and for every variant on one."""
     from wristctl.tuning.search_unit import search_unit
 
-    settings, found = study.study, dict[StudyPlace, "Unit"]()
-    varied = settings.varied or families_of(study)[0]
-    ways = [(BASE, family, StudyVariant()) for family in families_of(study)]
-    ways += [(name, varied, variant) for name, variant in settings.variants.items()]
-    for name, family, variant in ways:
-        tuned = study.model_copy(update={"tune": _tune_settings(study, family, variant)})
-        for law in settings.laws:
+    found = dict[StudyPlace, "Unit"]()
+    for name, family, settings in ways_to_tune(study):
+        tuned = study.model_copy(update={"tune": settings})
+        for law in study.study.laws:
             found[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
     return found
 
@@ -90,44 +92,6 @@ def golden_of(study: Study) -> Golden:
     laws = dict.fromkeys([YARDSTICK, *settings.laws, *(each.controller for each in settings.presets)])
     loops = kinds_of_worlds(study.families, families_of(study), study.seed)
     return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
-
-
-def performed(
-    session: Session, what: str, units: Sequence[Unit], golden: Golden | None, command: str = "study"
-) -> UnitsDone:
-    """Compute units with the session's workers, into the run where there is one, and show how far they have come.
-
-    The hashes of laws from elsewhere are part of the units' specifications.
-    """
-    from wristctl.studies.adopted import adoption, sources_in
-    from wristctl.work.executors import Workers
-    from wristctl.work.fan_out import perform_units
-    from wristctl.work.unit import UNITS
-    from wristctl.work.worker import Computed, Furnish
-
-    run, stopped = session.findings.run, session.inputs.runs().get("resume")
-    folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
-    if folder is not None:
-        folder.mkdir(exist_ok=True)
-    furnish = None
-    if sources := sources_in(session.study):
-        units = [replace(each, spec={**each.spec, "sources": sources}) for each in units]
-        furnish = Furnish("wristctl.studies.adopted:adopt", adoption(session.study, command))
-    count, counted = 0, "rollouts" if golden else "points"
-    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
-
-        def told(unit: Unit, computed: Computed | None) -> None:
-            nonlocal count
-            count += unit.size
-            done(count)
-            if computed is not None:
-                spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
-                session.findings.event("unit", name=unit.name, key=unit.key, rollouts=unit.size, **spent)
-
-        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
-    for each in found.poisoned:
-        session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
-    return found
 
 
 def _tune_settings(study: Study, family: str, variant: StudyVariant) -> TuneSettings:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.control import CompareSettings, Row, SimulateSettings, TuneSettings
 from wristctl.config.errors import UserError, meant
-from wristctl.config.families import Family, TuningWorlds, Worlds
+from wristctl.config.families import Family
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
-
-NETWORK = "models/network.safetensors"
 
 
 def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None = None) -> None:
@@ -85,6 +83,8 @@ def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop]) -
 
     UserError where it learned a wrist of another number of segments than the loops simulate.
     """
+    from wristctl.learning.network_file import NETWORK
+
     network = inputs.read("network", _network)
     if network is None:
         return None
@@ -122,7 +122,7 @@ def _tune_settings(given: Run | Tuned) -> TuneSettings:
 
 
 def _network(given: Run | Trained) -> Network:
-    from wristctl.learning.network_file import load_network
+    from wristctl.learning.network_file import NETWORK, load_network
 
     return load_network(given.file(NETWORK)) if isinstance(given, Run) else given.network
 
@@ -133,18 +133,22 @@ def _identified_yaml(given: Run | Identified) -> str:
     return given.yaml
 
 
-def family_of(families: Mapping[str, Family], worlds: TuningWorlds | Worlds, where: str) -> Family:
-    """The family that is named; UserError with the nearest name if there is none."""
-    if worlds.family not in families:
-        fix = meant(worlds.family, families) if families else "give one in `families`: experiments/scenarios has some"
-        raise UserError(f"unknown family of worlds '{worlds.family}'", f"{where}.family", fix)
-    return families[worlds.family]
+def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:
+    """The family of this name; UserError with the nearest one if there is none."""
+    if name not in families:
+        fix = meant(name, families) if families else "give one in `families`: experiments/scenarios has some"
+        raise UserError(f"unknown family of worlds '{name}'", where, fix)
+    return families[name]
 
 
 def judged_loops(study: Study, settings: TuneSettings | CompareSettings) -> Mapping[str, Loop]:
     """The loops that gains are tuned or rows judged on, by name; of a family its loop before anything is drawn."""
     worlds = settings.worlds
-    return {worlds.family: family_of(study.families, worlds, "worlds").loop} if worlds.family else settings.loops
+    return (
+        {worlds.family: family_of(study.families, worlds.family, "worlds.family").loop}
+        if worlds.family
+        else settings.loops
+    )
 
 
 def compared_inverses(study: Study) -> Iterable[str]:

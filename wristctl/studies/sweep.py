@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.work.fan_out import Poisoned
+    from wristctl.work.worker import Golden
 
 Found = TypeVar("Found", bound=StudyResult)
 _CHECKED = 20_000
@@ -120,16 +121,14 @@ def _swept(session: Session, command: str) -> Swept:
     import pandas as pd
 
     from wristctl.report.sweep_figures import over_key
-    from wristctl.studies.fair_units import performed
-    from wristctl.work.worker import Golden
+    from wristctl.studies.units_in_run import performed
 
     study, findings = session.study, session.findings
     base, axes = _base(study, command, session.inputs), axes_of(study, command)
     points = points_of(axes)
     units = sweep_units(base, command, axes, points)
     golden = None if session.executor == "serial" else _golden(base, command)
-    assert golden is None or isinstance(golden, Golden)
-    done = performed(session, f"{command} at {len(points)} points", units, golden, command)
+    done = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
     parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
     for unit, arrays in zip(units, done.arrays, strict=True):
         if arrays is not None:
@@ -167,7 +166,7 @@ def _swept(session: Session, command: str) -> Swept:
     return Swept(study, findings, [Table(title + more, heads, lines)], table, done.poisoned)
 
 
-def _golden(study: Study, command: str) -> Any:
+def _golden(study: Study, command: str) -> Golden:
     """Of the loop of simulate, else of the built-in one: workers show by it that they compute the same."""
     from wristctl.config.loop import LOOPS
     from wristctl.simulation.golden import GOLDEN, golden_spec

@@ -46,9 +46,8 @@ def _losses(trials: list[TrainingResult]) -> list[float]:
 
 def keep_network(session: Session, network: Network, name: str, reason: str) -> None:
     """The network's file, with a record of its training; `reason` says why it was chosen."""
-    from wristctl.learning.network_file import save_network
+    from wristctl.learning.network_file import NETWORK, save_network
     from wristctl.records.files import sha256_of
-    from wristctl.studies.loop_inputs import NETWORK
 
     run, settings = session.findings.run, session.study.train
     if run is None:

@@ -80,16 +80,20 @@ def planned_search(settings: TuneSettings, families: Mapping[str, Family], wrist
     from wristctl.control.table import controller
     from wristctl.simulation.draws import is_random
     from wristctl.simulation.size import check_size
-    from wristctl.tuning.search import check_loops, check_tunable
+    from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
     for number, name in enumerate(settings.controllers):
         try:
             check_tunable(controller(name))
         except UserError as error:
             raise error.at(f"controllers.{number}") from error
+    try:
+        check_optimiser(settings)
+    except UserError as error:
+        raise error.at(str(error.where).removeprefix("tune.")) from error
     searched = settings.candidates * settings.iterations * settings.restarts
     if settings.worlds.family:
-        family = family_of(families, settings.worlds, "worlds")
+        family = family_of(families, settings.worlds.family, "worlds.family")
         check_size([family.loop], family.horizon)
         each, horizon = settings.worlds.draws * len(family.references), family.horizon
     else:

@@ -82,6 +82,11 @@ def check_loops(settings: TuneSettings) -> None:
             raise UserError(f"unknown loop '{scenario.loop}'", where, meant(scenario.loop, settings.loops))
 
 
+def check_optimiser(settings: TuneSettings) -> None:
+    """UserError where the optimiser needs more candidates, or a package that is not installed."""
+    OPTIMISERS[settings.optimiser](2, settings.candidates, np.full(2, 0.5), np.random.default_rng(0))
+
+
 def check_tunable(controller: Controller) -> None:
     """UserError if the controller has no gains."""
     if not controller.gains:

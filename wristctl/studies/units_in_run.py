@@ -1,0 +1,52 @@
+"""Units of work within a run: given to the session's workers, kept in the run, taken over from one that was stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from wristctl.studies.session import Session
+
+if TYPE_CHECKING:
+    from wristctl.work.fan_out import UnitsDone
+    from wristctl.work.unit import Unit
+    from wristctl.work.worker import Golden
+
+
+def performed(
+    session: Session, command: str, what: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
+) -> UnitsDone:
+    """Compute a command's units with the session's workers, into the run where there is one, and show how far they are.
+
+    Sizes are `counted` in these. The hashes of laws from elsewhere are part of the units' specifications.
+    """
+    from wristctl.studies.adopted import adoption, sources_in
+    from wristctl.work.executors import Workers
+    from wristctl.work.fan_out import perform_units
+    from wristctl.work.unit import UNITS
+    from wristctl.work.worker import Computed, Furnish
+
+    run, stopped = session.findings.run, session.inputs.runs().get("resume")
+    folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
+    if folder is not None:
+        folder.mkdir(exist_ok=True)
+    furnish = None
+    if sources := sources_in(session.study):
+        units = [replace(each, spec={**each.spec, "sources": sources}) for each in units]
+        furnish = Furnish("wristctl.studies.adopted:adopt", adoption(session.study, command))
+    count = 0
+    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
+
+        def told(unit: Unit, computed: Computed | None) -> None:
+            nonlocal count
+            count += unit.size
+            done(count)
+            if computed is not None:
+                spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
+                session.findings.event("unit", name=unit.name, key=unit.key, **{counted: unit.size}, **spent)
+
+        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
+    for each in found.poisoned:
+        session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
+    return found
