@@ -51,12 +51,13 @@ def test_tuned_gains_must_be_there_for_the_controller_that_asks_for_them() -> No
 def test_a_network_is_asked_for_where_a_reference_goes_through_one() -> None:
     references = [Reference(inverse="network"), Reference(inverse="closed-form"), Reference(inverse="closed-form")]
     assert inverses_of(references) == {"network", "closed-form"}
-    some: Any = "a network"
+    network: Any = SimpleNamespace()
+    some = Inputs({"network": network})
     check_inverses(["network"], some)
-    check_inverses(["none", "closed-form"], None)
+    check_inverses(["none", "closed-form"], Inputs())
     check_inverses(["closed-form"], some)
     with pytest.raises(UserError, match="none is given"):
-        check_inverses(["closed-form", "network"], None)
+        check_inverses(["closed-form", "network"], Inputs())
 
 
 class Network:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,7 @@ from pydantic import Field
 from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 
-from wristctl.config.section import Section
-from wristctl.config.strict_yaml import KeyPath
+from wristctl.config.leaves import with_leaves
 
 
 def given_file(meaning: str, default: tuple[()] | None = None) -> Any:
@@ -31,44 +30,27 @@ def names_a_file(field: FieldInfo | None) -> bool:
     return isinstance(extra, dict) and bool(extra.get("file"))
 
 
-def files_of(section: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, str]]:
-    """Every file that is named in a section, at whatever depth, with its key path."""
-    if isinstance(section, Section):
-        for name, field in type(section).model_fields.items():
-            value, at = getattr(section, name), (*path, field.alias or name)
-            if names_a_file(field):
-                yield from ((at, each) for each in ((value,) if isinstance(value, str) else value or ()))
-            else:
-                yield from files_of(value, at)
-    elif isinstance(section, dict | tuple):
-        entries = section.items() if isinstance(section, dict) else enumerate(section)
-        for key, each in entries:
-            yield from files_of(each, (*path, key))
+def with_files(section: Any, name: Callable[[str], str]) -> Any:
+    """The section with each file that it names, at whatever depth, under another name."""
+
+    def leaf(field: FieldInfo, value: Any) -> Any:
+        if not value or not names_a_file(field):
+            return value
+        return name(value) if isinstance(value, str) else tuple(map(name, value))
+
+    return with_leaves(section, leaf)
 
 
-def renamed(section: Any, name: Callable[[str], str]) -> Any:
-    """The section with each file that it names under another name; the very same where it names none."""
-    if isinstance(section, Section):
-        changed = {}
-        for leaf, field in type(section).model_fields.items():
-            value = getattr(section, leaf)
-            new = _named(value, name) if names_a_file(field) else renamed(value, name)
-            if new is not value:
-                changed[leaf] = new
-        return section.model_copy(update=changed) if changed else section
-    if isinstance(section, dict):
-        entries = {key: renamed(each, name) for key, each in section.items()}
-        return entries if any(entries[key] is not section[key] for key in entries) else section
-    if isinstance(section, tuple):
-        items = tuple(renamed(each, name) for each in section)
-        return items if any(new is not old for new, old in zip(items, section, strict=True)) else section
-    return section
+def files_of(section: Any) -> list[str]:
+    """Every file that is named in a section, at whatever depth, in order."""
+    found: list[str] = []
 
+    def note(name: str) -> str:
+        found.append(name)
+        return name
 
-def _named(value: str | tuple[str, ...] | None, name: Callable[[str], str]) -> str | tuple[str, ...] | None:
-    if isinstance(value, str):
-        return name(value)
-    return tuple(map(name, value)) if value else value
+    with_files(section, note)
+    return found
 
 
 def beside(folder: Path, value: Any) -> Any:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, get_args
 
+from pydantic.fields import FieldInfo
+
 from wristctl.config.choices import Choices
-from wristctl.config.section import OneOf, Section
+from wristctl.config.leaves import with_leaves
+from wristctl.config.section import OneOf
 
 Rename = Callable[[Choices[Any], str], str]
 
@@ -20,26 +23,16 @@ def tables_of(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Choices
         yield from tables_of(part, getattr(part, "__metadata__", ()))
 
 
-def renamed(value: Any, rename: Rename) -> Any:
+def renamed(section: Any, rename: Rename) -> Any:
     """A section (or a list or mapping of some) with `rename(table, name)` for every name of a table in it."""
-    if isinstance(value, tuple):
-        return tuple(renamed(each, rename) for each in value)
-    if isinstance(value, dict):
-        return {key: renamed(each, rename) for key, each in value.items()}
-    if not isinstance(value, Section):
-        return value
-    update: dict[str, Any] = {}
-    for name, field in type(value).model_fields.items():
-        given, table = getattr(value, name), next(tables_of(field.annotation, field.metadata), None)
+
+    def leaf(field: FieldInfo, value: Any) -> Any:
+        table = next(tables_of(field.annotation, field.metadata), None)
         if table is None:
-            made = renamed(given, rename)
-        elif isinstance(given, tuple):
-            made = tuple(rename(table, each) for each in given)
-        else:
-            made = rename(table, given)
-        if made != given:
-            update[name] = made
-    return value.model_copy(update=update) if update else value
+            return value
+        return tuple(rename(table, each) for each in value) if isinstance(value, tuple) else rename(table, value)
+
+    return with_leaves(section, leaf)
 
 
 def named_in(value: Any) -> list[tuple[Choices[Any], str]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from wristctl.config.errors import UserError
-from wristctl.config.given_files import files_of, renamed
+from wristctl.config.given_files import files_of, with_files
 from wristctl.config.resolved import sections_read
 from wristctl.config.study import Study
 
@@ -31,14 +31,14 @@ def sealed_files(study: Study, kind: str) -> SealedFiles:
     sections = sections_read(kind)
     contents, names = dict[str, bytes](), dict[str, str]()
     for section in sections:
-        for _, name in files_of(getattr(study, section)):
+        for name in files_of(getattr(study, section)):
             content = _content(Path(name))
             digest = hashlib.sha256(content).hexdigest()
             names[name] = f"{INPUTS}/{digest[:12]}/{Path(name).name}"
             contents[names[name]] = content
     if not names:
         return SealedFiles(study)
-    own = {section: renamed(getattr(study, section), names.__getitem__) for section in sections}
+    own = {section: with_files(getattr(study, section), names.__getitem__) for section in sections}
     return SealedFiles(study.model_copy(update=own), contents, names)
 
 

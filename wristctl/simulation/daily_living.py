@@ -44,7 +44,6 @@ def _task(
     return ReferenceKind(
         f"{what}: {told} ({source})",
         course=course,
-        rest=lambda reference, begin, horizon: horizon,
         described=lambda reference: f"adl:{name} {reference.duration:g} s strokes" + _scaled(reference),
         targets="none",
         parameters={"scale": Parameter(1.0, "", "factor on the angles")},

@@ -75,7 +75,6 @@ def _with_phase(reference: Reference) -> str:
 TWO_SIDED_SINE = ReferenceKind(
     "offset + angle sin(2 pi `frequency` t + phase): to both sides",
     course=_two_sided,
-    rest=lambda reference, begin, horizon: horizon,
     described=lambda reference: f"two-sided sine {_with_phase(reference)}",
     targets="none",
     parameters={"offset_deg": _OFFSET, "phase_deg": Parameter(0.0, "deg", "where in its cycle it begins")},
@@ -83,7 +82,6 @@ TWO_SIDED_SINE = ReferenceKind(
 CHIRP = ReferenceKind(
     "a sine whose frequency rises from `frequency` by the same each second over `duration`, and then stays",
     course=_chirp,
-    rest=lambda reference, begin, horizon: horizon,
     described=lambda reference: (
         f"chirp {reference.frequency:g} to {reference.value('end_frequency'):g} Hz "
         f"in {reference.duration:g} s {_swing(reference)}"
@@ -94,7 +92,6 @@ CHIRP = ReferenceKind(
 SQUARE = ReferenceKind(
     "jumps between offset + angle and offset - angle, `frequency` times a second there and back",
     course=_square,
-    rest=lambda reference, begin, horizon: horizon,
     described=lambda reference: f"square {reference.frequency:g} Hz {_swing(reference)}",
     targets="none",
     parameters={"offset_deg": _OFFSET},
@@ -102,7 +99,6 @@ SQUARE = ReferenceKind(
 RANDOM_STEPS = ReferenceKind(
     "jumps to angles drawn evenly between offset - angle and offset + angle, one each `duration`",
     course=_random_steps,
-    rest=lambda reference, begin, horizon: horizon,
     described=lambda reference: (
         f"random steps {reference.duration:g} s {_swing(reference)} seed {reference.value('seed'):g}"
     ),

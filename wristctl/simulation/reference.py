@@ -20,6 +20,10 @@ from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse, arc_path, exact_arc, exact_inverse
 
 
+def _never(reference: Reference, begin: float, horizon: float) -> float:
+    return horizon
+
+
 @dataclass(frozen=True)
 class ReferenceKind:
     """A kind of reference: one or more moves, each from where the last one ended to its target."""
@@ -29,10 +33,10 @@ class ReferenceKind:
     """One move from 0 to 1 with two derivatives, (3, T), by the time (T,) since it began; 0 before.
 
     Without targets the angle itself [rad], or, as (2, 3, T), that and the length of the arc [m]."""
-    rest: Callable[[Reference, float, float], float]
-    """When the reference rests, by when its last move begins and the horizon (which means never) [s]."""
     described: Callable[[Reference], str]
     """A short name of the reference: kind, duration and target."""
+    rest: Callable[[Reference, float, float], float] = _never
+    """When the reference rests, by when its last move begins and the horizon (which means never) [s]."""
     targets: Literal["end", "angles_deg", "tips", "none"] = "end"
     """Where its targets stand: one angle or tip at the end, or the leaf with several, one every `duration`."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)

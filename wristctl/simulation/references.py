@@ -45,7 +45,6 @@ MINIMUM_JERK = ReferenceKind(
 SINE = ReferenceKind(
     "swinging between straight and the angle at `frequency`",
     course=_sine,
-    rest=lambda reference, begin, horizon: horizon,
     described=lambda reference: f"sine {reference.frequency:g} Hz {_target(reference)}",
 )
 MULTI_STEP = ReferenceKind(

@@ -87,6 +87,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     settings, chosen = study.analyse, study.simulate
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_inverses(inverses_of([chosen.reference]), inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:
@@ -115,7 +116,6 @@ def analyse(session: Session) -> Analysed:
     warn_outside_conditions([chosen], [chosen.loop])
     _warn_of_frames(chosen.loop)
     network = network_for(session.inputs, study.wrist, [chosen.loop])
-    check_inverses(inverses_of([chosen.reference]), network)
     row, angles = _row(study, session.inputs), _angles(study, network)
     found = []
     with session.progress("linearising the loop", len(angles), "angles") as done:

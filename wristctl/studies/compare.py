@@ -102,7 +102,7 @@ def plan(study: Study, inputs: Inputs) -> str:
                 check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
     if settings.tuning is not None:
         with under("compare.tuning"):
-            searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist)}\n"
+            searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist, inputs)}\n"
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
@@ -114,6 +114,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             count, horizon = len(settings.rows) * settings.worlds.draws * len(family.references), family.horizon
         else:
             count, horizon = count_rollouts(settings), settings.horizon
+        check_inverses(compared_inverses(study), inputs)
         check_size(judged_loops(study, study.compare).values(), horizon)
     told = truth_told(study.wrist, judged_loops(study, study.compare))
     return f"{searched}{count} rollouts of {horizon:g} s{told}"
@@ -137,7 +138,6 @@ def compare(session: Session) -> Compared:
     warn_if_coarse(loops)
     warn_outside_conditions(settings.rows, loops)
     network = network_for(session.inputs, study.wrist, loops)
-    check_inverses(compared_inverses(study), network)
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}

@@ -59,7 +59,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         families = {name: study.families[name] for name in families_of(study)}
         for family in families.values():
             check_size([family.loop], family.horizon)
-            check_inverses(inverses_of(family.references), None)
+            check_inverses(inverses_of(family.references), inputs)
     searches = sum(unit.size for unit in search_units(study).values())
     each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
     judged = each * budget.worlds * len(labels)

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import under
 from wristctl.config.study import Study
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_row, identified, network_for, tuned_gains
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    check_reach,
+    check_row,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_gains,
+)
 from wristctl.studies.loop_warnings import outside_conditions, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rig_description import describe_rig
@@ -42,6 +50,9 @@ def plan(study: Study, inputs: Inputs) -> str:
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.rows.{number}"):
             check_row(row, tuned)
+    with under("hw-run"):
+        check_reach([settings.reference], identified(study, "hw-run", inputs).wrist, "reference")
+        check_inverses(inverses_of([settings.reference]), inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
     each = settings.horizon + settings.back + settings.rest

@@ -56,9 +56,9 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
             raise error.at(f"{where.format(number)}.{error.where.removeprefix('reference.')}") from error
 
 
-def check_inverses(inverses: Iterable[str], network: Inverse | None) -> None:
-    """UserError where a reference goes through a network and none is given."""
-    if network is None and "network" in inverses:
+def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
+    """UserError where a reference goes through a network and none is among the inputs."""
+    if "network" in inverses and "network" not in inputs:
         what = "the reference goes through a network, and none is given"
         raise UserError(what, "reference.inverse", Argument("network"))
 

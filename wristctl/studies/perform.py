@@ -12,7 +12,7 @@ from typing import Any, Generic
 
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import Foreign
-from wristctl.config.given_files import renamed
+from wristctl.config.given_files import with_files
 from wristctl.config.study import Study
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.foreign_code import sealed_references
@@ -102,7 +102,9 @@ def perform(
     """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
     work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
     if run is not None and run.files:  # what is read is what was sealed
-        study = renamed(study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name)
+        study = with_files(
+            study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name
+        )
     session = Session(study, prepared.inputs, findings, show, operator, executor)
     if run is None:
         return work(session)

@@ -85,6 +85,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
+        check_inverses(inverses_of([settings.reference]), inputs)
         check_size([settings.loop], settings.horizon)
 
     times = settings.repetitions if is_random(settings.loop) else 1
@@ -112,7 +113,6 @@ def simulate(session: Session) -> Simulated:
     warn_if_coarse([settings.loop])
     warn_outside_conditions([settings], [settings.loop])
     network = network_for(session.inputs, wrist, [settings.loop])
-    check_inverses(inverses_of([settings.reference]), network)
     with session.progress("compiling and simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
     scenario = scenario_of(settings.reference, settings.direction)

@@ -69,13 +69,16 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("tune"):
         wrist = identified(study, "tune", inputs).wrist
         told = truth_told(wrist, judged_loops(study, study.tune))
-        return planned_search(study.tune, study.families, wrist) + told
+        return planned_search(study.tune, study.families, wrist, inputs) + told
 
 
-def planned_search(settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters) -> str:
+def planned_search(
+    settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters, inputs: Inputs
+) -> str:
     """What a search costs. UserError, naming the key, for a controller or a scenario that it cannot have.
 
-    That is an unknown controller, one without gains, a scenario on an unknown loop, or an unknown family.
+    That is an unknown controller, one without gains, a scenario on an unknown loop, an unknown family, or a network
+    that none of the inputs is.
     """
     from wristctl.control.table import controller
     from wristctl.simulation.draws import is_random
@@ -103,6 +106,7 @@ def planned_search(settings: TuneSettings, families: Mapping[str, Family], wrist
         loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
         each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
         horizon = settings.horizon
+    check_inverses(inverses_of(_references(settings, families)), inputs)
     return f"{searched * each} rollouts of {horizon:g} s for each of {', '.join(settings.controllers)}"
 
 
@@ -133,7 +137,6 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
     from wristctl.tuning.search import search, tuning_cases
 
     settings = study.tune
-    check_inverses(inverses_of(_references(study)), network)
     _note_streams(session, study)
     searched, chosen = tuning_cases(study, network)
     judge = Judge(searched, study.wrist, settings.objective)
@@ -155,9 +158,9 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
     return found
 
 
-def _references(study: Study) -> list[Reference]:
-    family = study.tune.worlds.family
-    return list(study.families[family].references) if family else [each.reference for each in study.tune.scenarios]
+def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
+    family = settings.worlds.family
+    return list(families[family].references) if family else [each.reference for each in settings.scenarios]
 
 
 def _note_streams(session: Session, study: Study) -> None:
