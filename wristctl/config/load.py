@@ -10,27 +10,37 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
-from wristctl.config.foreign import placed
+from wristctl.config.foreign import check_trust, placed
 from wristctl.config.former import leave_out_former
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.keys import field_at, home_of, keys_of, section_keys
+from wristctl.config.renamed import named_in
 from wristctl.config.shipped import shipped_name, shipped_names, study_file
 from wristctl.config.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.config.study import Study
+from wristctl.config.trust import asking
 from wristctl.config.wording import Phrase, Setting
 
 INCLUDE = "include"
 """The key of a study file that names others, which are read before it."""
 
 
-def load_study(files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None) -> Study:
+def load_study(
+    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None, trust_code: bool = False
+) -> Study:
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
 
     A file may be an experiment by its name, `quick`. A sequence is one leaf. An override's key is first looked for in
-    the section of `command`: for train, `epochs=5` is `train.epochs=5`. Raises UserError with file and line (or
-    override), key path, and nearest key or what is expected.
+    the section of `command`: for train, `epochs=5` is `train.epochs=5`. With `trust_code` the code of runs that the
+    study names may be loaded, now and later. Raises UserError with file and line (or override), key path, and nearest
+    key or what is expected.
     """
-    return read_study(files, overrides, command)[0]
+    if not trust_code:
+        return read_study(files, overrides, command)[0]
+    with asking(lambda shown: True):
+        study = read_study(files, overrides, command)[0]
+        check_trust(name for _, name in named_in(study))
+    return study
 
 
 def read_study(
@@ -86,12 +96,13 @@ def _read(file: Path) -> Document:
             f"{file}:1",
             f"one of {', '.join(keys_of(Study))} at the top",
         )
-    return Document(_found_from(document.data, file.parent), document.lines)
+    return document
 
 
 def _whole(document: Document, file: Path | None) -> Document:
-    """With the code that it names by its whole path, which counts from the file."""
-    return Document(placed(document.data, file), document.lines)
+    """With the files and the code that it names by their whole paths, which count from the file, or else from here."""
+    folder = file.parent if file else Path()
+    return Document(placed(_found_from(document.data, folder), file), document.lines)
 
 
 def _override(text: str, command: str | None) -> Document:
@@ -111,7 +122,7 @@ def _override(text: str, command: str | None) -> Document:
         raise error.at((where, error.where)) from error
     for key in reversed(keys):
         data = {key: data}
-    return Document(_found_from(data, Path()), {})
+    return Document(data, {})
 
 
 def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:

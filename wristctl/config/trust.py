@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.machinery import all_suffixes
 from pathlib import Path
 
 from wristctl.config.errors import UserError
@@ -71,12 +72,14 @@ def agree(digest: str) -> None:
 
 
 def digest_of(root: Path) -> str:
-    """One hash over every source below a folder, by content and name."""
+    """One hash over every source and data file below a folder, by content and name."""
     return hashlib.sha256("\n".join(_listing(root, _sources(root))).encode()).hexdigest()
 
 
 def _sources(root: Path) -> dict[Path, str]:
-    found = sorted(each for each in root.rglob("*.py") if each.is_file())
+    """All below a folder but what Python would load in place of sources, and nothing here ever does."""
+    others = tuple(set(all_suffixes()) - {".py"})
+    found = sorted(each for each in root.rglob("*") if each.is_file() and not each.name.endswith(others))
     return {each: hashlib.sha256(each.read_bytes()).hexdigest() for each in found}
 
 

@@ -1,0 +1,96 @@
+"""What a law reads beside itself, such as weights, is part of it; and a run's own code is trusted from Python too."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wristctl as face
+from tests.doors.conftest import LAW, wristctl
+from wristctl.config.errors import UserError
+from wristctl.config.foreign import load
+from wristctl.records import Run
+
+READS = """
+import numpy as np
+from wristctl.config.sources import data_file
+SPRING = float(np.load(data_file(__file__, "{name}"))[0])
+"""
+STUDY = "simulate: {controller: strange.py:STRANGE, gains: default, horizon: 0.3, loop: {plant_segments: 1}}\n"
+
+
+@pytest.fixture
+def learned(stranger: Path) -> Path:
+    """A folder with a law whose spring stands in a file beside it, and a study of it."""
+    law = READS.format(name="nets/weights.npy") + LAW.replace("scaled(gains.Kp,", "scaled(SPRING * gains.Kp,")
+    (stranger / "strange.py").write_text(law)
+    (stranger / "nets").mkdir()
+    weigh(stranger, 1.0)
+    (stranger / "study.yaml").write_text(STUDY)
+    return stranger
+
+
+def weigh(folder: Path, spring: float) -> None:
+    np.save(folder / "nets" / "weights.npy", np.array([spring]))
+
+
+def rmse(study: Path, trust_code: bool = False) -> float:
+    found = face.simulate(face.load_study(study, trust_code=trust_code)).metrics["rmse"]
+    assert isinstance(found, float)
+    return found
+
+
+def run_of(folder: Path) -> Run:
+    """A run of the law, whose original is gone, and to whose code nobody has agreed."""
+    done = face.simulate(face.load_study(folder / "study.yaml"), out=folder / "results")
+    for name in ("strange.py", "helper.py", "nets/weights.npy"):
+        (folder / name).unlink()
+    os.environ.pop("WRISTCTL_TRUSTED_CODE")
+    assert done.run is not None
+    return Run(done.run.path)
+
+
+def test_weights_are_sealed_and_a_run_replays_when_they_are_gone(learned: Path) -> None:
+    run = run_of(learned)
+    assert {each for each in run.manifest.code.foreign if each.endswith(".npy")} == {"code/strange/nets/weights.npy"}
+    assert run.problems() == []
+    done = wristctl(learned, "runs", "replay", run.id, "--trust-code")
+    assert done.returncode == 0 and f"{run.id}: identical" in done.stdout, done.stderr
+    assert "nets/weights.npy" in done.stderr, "shown before it is loaded"
+
+
+def test_other_weights_are_another_law(learned: Path) -> None:
+    first, origin = rmse(learned / "study.yaml"), load(f"{learned}/strange.py:STRANGE")[1]
+    weigh(learned, 2.0)
+    assert rmse(learned / "study.yaml") < 0.8 * first, "a stiffer spring follows better"
+    assert load(f"{learned}/strange.py:STRANGE")[1].files != origin.files
+
+
+def test_weights_that_are_not_as_they_were_sealed_are_refused_even_to_who_trusts_them(learned: Path) -> None:
+    run = run_of(learned)
+    np.save(run.path / "code/strange/nets/weights.npy", np.array([3.0]))
+    with pytest.raises(UserError, match="not as it was sealed"):
+        rmse(run.path / "config.yaml", trust_code=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("wieghts.npy", "no file wieghts.npy beside strange.py"), ("../far.npy", "outside its folder")]
+)
+def test_data_that_is_not_beside_a_law_is_refused(learned: Path, name: str, told: str) -> None:
+    folder = learned / "laws"
+    folder.mkdir()
+    np.save(learned / "far.npy", np.array([1.0]))
+    (folder / "strange.py").write_text(READS.format(name=name) + LAW)
+    with pytest.raises(UserError, match=told):
+        load(f"{folder}/strange.py:STRANGE")
+
+
+def test_in_python_too_a_runs_code_runs_only_once_it_is_trusted(learned: Path) -> None:
+    expected, run = rmse(learned / "study.yaml"), run_of(learned)
+    with pytest.raises(UserError, match="nobody has said that it may run") as refused:
+        rmse(run.path / "config.yaml")
+    assert "trust_code" in str(refused.value)
+    assert rmse(run.path / "config.yaml", trust_code=True) == expected

@@ -1,0 +1,157 @@
+"""Sources from elsewhere: imported with the modules and data that stand beside them.
+
+What is loaded is the text of the sources as it was hashed: bytecode and libraries beside them are never looked at.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import sysconfig
+import traceback
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
+from importlib.util import spec_from_loader
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+from wristctl.config.errors import UserError
+from wristctl.config.trust import run_around, trusted
+
+_PREFIX = "wristctl_foreign_"
+_loading: list[tuple[Path, dict[Path, str], Mapping[Path, str] | None]] = []
+"""Of what is being imported, innermost last: the root of its sources, their hashes, and the agreed ones."""
+
+
+def data_file(source: str, name: str) -> Path:
+    """A file beside a law that it reads while it is imported, such as a policy's weights: `data_file(__file__, NAME)`.
+
+    It belongs to the law's sources then: hashed, copied into runs, shown before it is trusted. Raises UserError where
+    it is not there, lies outside the folder of the sources, or is not what was agreed to.
+    """
+    file = Path(os.path.abspath(Path(source).parent / name))
+    if not file.is_file():
+        raise UserError(f"no file {name} beside {Path(source).name}", str(file), "paths count from the law's file")
+    if _loading:
+        root, seen, agreed = _loading[-1]
+        if not file.resolve().is_relative_to(root.resolve()):
+            raise UserError("a law reads data from outside its folder", str(file), f"put it below {root}")
+        seen[file] = _checked(file, digest_now(file), agreed)
+    return file
+
+
+def digest_now(file: Path) -> str:
+    """SHA-256 of a file as it is; empty where it cannot be read."""
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def _checked(file: Path, digest: str, agreed: Mapping[Path, str] | None) -> str:
+    """The hash of what is loaded, which must be the agreed one where one is."""
+    if agreed is not None and agreed.get(file) != digest:
+        raise UserError("the code of a run changed after it was shown", str(file), "look at it again")
+    return digest
+
+
+class _Source(SourceFileLoader):
+    """Loads the text of a module itself; `seen` takes the hash of each, which must be the agreed one where one is."""
+
+    def __init__(self, name: str, path: str, seen: dict[Path, str], agreed: Mapping[Path, str] | None) -> None:
+        super().__init__(name, path)
+        self._seen, self._agreed = seen, agreed
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compiled from the source, never from bytecode."""
+        file = Path(self.path)
+        content = file.read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        self._seen[file] = _checked(file, digest, self._agreed)
+        code: CodeType = compile(content, self.path, "exec", dont_inherit=True)
+        return code
+
+
+class _Beside:
+    """Finds the modules beside a file, before those of the same name elsewhere; the standard library comes first."""
+
+    def __init__(
+        self, folder: Path, name: str, file: Path, seen: dict[Path, str], agreed: Mapping[Path, str] | None
+    ) -> None:
+        self._folder, self._name, self._file = folder, name, file
+        self._made: Any = lambda name, path: _Source(name, path, seen, agreed)
+
+    def find_spec(self, name: str, path: Sequence[str] | None = None, target: Any = None) -> ModuleSpec | None:
+        """The module's, where it stands beside the file or within a package there."""
+        if name == self._name and "." not in name:
+            made: ModuleSpec | None = spec_from_loader(name, self._made(name, str(self._file)))
+            return made
+        if name.partition(".")[0] in sys.stdlib_module_names:
+            return None
+        for folder in [str(self._folder)] if path is None else list(path):
+            if Path(folder).is_relative_to(self._folder):
+                found = FileFinder(folder, (self._made, [".py"])).find_spec(name)
+                if found is not None and found.loader is not None:
+                    return found
+        return None
+
+
+def root_of(file: Path) -> Path:
+    """The folder from which a file is imported: its own, or that of the outermost package it is in."""
+    home, root = run_around(file), file.parent
+    while (root / "__init__.py").is_file() and root.parent not in (root, home):
+        root = root.parent
+    return root
+
+
+def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
+    """The module of a file, imported anew, and the hashes of what it was made from. UserError where it cannot be."""
+    root, seen = root_of(file), dict[Path, str]()
+    agreed = trusted(file, root)
+    dotted = ".".join(file.relative_to(root).with_suffix("").parts)
+    where = hashlib.sha256(str(file).encode()).hexdigest()[:8]  # compiled code that is kept knows it by its name
+    name = dotted if "." in dotted else f"{_PREFIX}{dotted}_{where}"
+    others = _set_aside(root, name.partition(".")[0])
+    finder = _Beside(root, name, file, seen, agreed)
+    sys.meta_path.insert(0, finder)
+    _loading.append((root, seen, agreed))
+    try:
+        module = import_module(name)
+    except UserError:
+        raise
+    except (Exception, SystemExit) as error:
+        what = f"{file.name} cannot be loaded: {type(error).__name__}: {error}"
+        raise UserError(what, _place(error, seen), "mend it there; --debug shows the traceback") from error
+    finally:
+        _loading.pop()
+        sys.meta_path.remove(finder)
+        sys.modules.update(others)
+    return module, seen
+
+
+def _set_aside(root: Path, package: str) -> dict[str, ModuleType]:
+    """Take modules out of the way that have a name of what stands beside a file and were loaded from elsewhere, or
+    before it was changed; of what is installed only the package of which this is a copy. Those to be put back."""
+    names = {each.stem for each in root.iterdir()} - {"wristctl"}
+    installed_at = [sysconfig.get_path(each) for each in ("stdlib", "platstdlib", "purelib", "platlib")]
+    others: dict[str, ModuleType] = {}
+    for known, module in list(sys.modules.items()):
+        top, place = known.partition(".")[0], getattr(module, "__file__", None)
+        there = place and any(Path(place).is_relative_to(each) for each in installed_at)
+        if top == package or (top in names and place and not there):
+            del sys.modules[known]
+            if not isinstance(getattr(module, "__loader__", None), _Source):
+                others[known] = module
+    return others
+
+
+def _place(error: BaseException, seen: Mapping[Path, str]) -> str:
+    """The line of the sources in which it happened."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}:{error.lineno}"
+    places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
+    own = [each for each in places if Path(each.rpartition(":")[0]) in seen]
+    return (own or places)[-1]
