@@ -15,7 +15,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame, Image
-from wristctl.vision.detector import askew, square_angle
+from wristctl.vision.detector import askew, edges, square_angle
 from wristctl.vision.marker import MEANING, Sighting, SightingVerdict, Tracker
 from wristctl.vision.scene import Scene
 from wristctl.vision.view import View
@@ -40,6 +40,19 @@ def test_angle_scatters_by_less_than_a_tenth_of_a_degree_at_40_to_80_px(distance
     off = errors(scene, scene.view, np.linspace(-40.0, 40.0, COUNT))
     assert off.std() <= 0.1
     assert abs(off.mean()) <= 0.15  # the part that calibrating the straight wrist takes away
+
+
+def test_nearly_all_markers_of_20_px_are_found() -> None:
+    """The usual search alone finds both in seven of ten pictures."""
+    scene = Scene(SceneSettings(distance=0.57, height_above=0.019, noise=4.0), WristParameters(length=0.06))
+    degrees = np.linspace(-40.0, 40.0, COUNT)
+    tracker = Tracker(Markers(), scene.view, Gates())
+    seen = [tracker.see(frame) for frame in frames(scene, degrees)]
+    found = np.array([each.verdict is SightingVerdict.OK for each in seen])
+    off = np.degrees([each.theta for each in seen])[found] - degrees[found]
+    sides = [np.linalg.norm(edges(each.corners[1]), axis=1).mean() for each in seen if not np.isnan(each.theta)]
+    assert np.median(sides) == pytest.approx(20.0, abs=1.0)
+    assert found.mean() >= 0.95 and off.std() <= 0.7
 
 
 @pytest.mark.parametrize("pose", [{"tilt_deg": 10.0}, {"pan_deg": 10.0}], ids=str)

@@ -40,8 +40,8 @@ class Scripted:
         self.seen: dict[int, list[Array]] = {}
         self.whole = 0
 
-    def everywhere(self, _image: Any) -> dict[int, list[Array]]:
-        self.whole += 1
+    def everywhere(self, _image: Any, fine: bool = False) -> dict[int, list[Array]]:
+        self.whole += not fine
         return self.seen
 
     def around(self, _image: Any, corners: Array) -> dict[int, list[Array]]:

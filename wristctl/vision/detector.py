@@ -15,6 +15,8 @@ Found = dict[int, list[Array]]
 CELLS = 6
 """Cells along a marker's side, with the black border; one more on either side stays white."""
 DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+_WINDOWS = (15, 15), (5, 15)
+"""Least and largest threshold window [px] of the usual search and of a fine one."""
 _NEXT = [1, 2, 3, 0]
 _NEAR_SIDES = 3.0
 """Side of the part searched around the last place, in sides of the marker."""
@@ -53,35 +55,40 @@ class Detector:
     """Finds markers in the whole picture, or around where one was.
 
     One threshold window and a 3x3 blur: faster than the default passes and more accurate, as long as a marker has 40 px
-    or more. The corners are those of lines through the marker's sides.
+    or more. A fine search, of narrower windows and without the blur, finds smaller ones: nearly all of 20 px, where
+    AprilTags are found no more often and turn more (benchmarks/vision.py). The corners are those of lines through the
+    marker's sides.
     """
 
     def __init__(self) -> None:
-        self._whole = cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.03))
-        self._near = cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.5))  # of the part's own size
+        self._whole, self._whole_fine = (cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.03, w)) for w in _WINDOWS)
+        self._near, self._near_fine = (cv2.aruco.ArucoDetector(DICTIONARY, _parameters(0.5, w)) for w in _WINDOWS)
 
-    def everywhere(self, image: Image) -> Found:
+    def everywhere(self, image: Image, fine: bool = False) -> Found:
         """All markers of the picture."""
-        return _detect(self._whole, image, 0, 0)
+        return _detect(self._whole_fine if fine else self._whole, image, 0, 0, not fine)
 
     def around(self, image: Image, corners: Array) -> Found:
-        """The markers around the place where one had these corners (4, 2) [px]."""
+        """The markers around where one had these corners (4, 2) [px]; by a fine search where there is none."""
         half = 0.5 * _NEAR_SIDES * float(np.hypot(*edges(corners).T).mean())
         (x, y), (height, width) = corners.mean(axis=0), image.shape
         left, top = max(0, int(x - half)), max(0, int(y - half))
         part = image[top : min(height, int(y + half)), left : min(width, int(x + half))]
-        return _detect(self._near, part, left, top) if min(part.shape, default=0) > 0 else {}
+        if min(part.shape, default=0) == 0:
+            return {}
+        return _detect(self._near, part, left, top) or _detect(self._near_fine, part, left, top, blur=False)
 
 
-def _parameters(least_perimeter: float) -> cv2.aruco.DetectorParameters:
+def _parameters(least_perimeter: float, windows: tuple[int, int]) -> cv2.aruco.DetectorParameters:
+    """With a perimeter of this share of the picture's longer side, and least and largest threshold window [px]."""
     made = cv2.aruco.DetectorParameters()
-    made.adaptiveThreshWinSizeMin = made.adaptiveThreshWinSizeMax = 15
+    made.adaptiveThreshWinSizeMin, made.adaptiveThreshWinSizeMax = windows
     made.minMarkerPerimeterRate = least_perimeter
     return made
 
 
-def _detect(detector: cv2.aruco.ArucoDetector, image: Image, left: int, top: int) -> Found:
-    blurred = cv2.GaussianBlur(image, (3, 3), 0)
+def _detect(detector: cv2.aruco.ArucoDetector, image: Image, left: int, top: int, blur: bool = True) -> Found:
+    blurred = cv2.GaussianBlur(image, (3, 3), 0) if blur else image
     corners, ids, _ = detector.detectMarkers(blurred)
     found: Found = {}
     offset = np.array([left, top], float)

@@ -10,7 +10,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.vision import Gates, Markers
-from wristctl.vision.camera import Frame
+from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import Detector, edges, square_angle
 from wristctl.vision.view import View
 
@@ -84,7 +84,7 @@ class Tracker:
 
     The base is clamped, so its place is averaged over `base_memory` and believed for as long while it is not seen.
     Markers are looked for around their last place, and in the whole picture where they are not found there, and once a
-    second for others of the same id.
+    second for others of the same id: finely, which takes longer, as long as no usual search has found both.
     """
 
     def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
@@ -94,6 +94,7 @@ class Tracker:
         self._base: _Base | None = None
         self._used: tuple[float, float] | None = None
         self._look_round = -math.inf
+        self._small = True
 
     def see(self, frame: Frame) -> Sighting:
         """The angle in a frame; frames come in the order of time. Raises UserError for pictures of another size."""
@@ -118,15 +119,18 @@ class Tracker:
                 found[number] = near[number]
         if len(found) < 2 or frame.time >= self._look_round:
             self._look_round = frame.time + _LOOK_ROUND
-            everywhere = {
-                number: self._followed(number, each)
-                for number, each in self._detector.everywhere(frame.image).items()
-                if number in wanted
-            }
+            everywhere = self._everywhere(frame.image, wanted)
             twice = {number: each for number, each in everywhere.items() if len(each) > 1}
             found = {**found, **twice} if len(found) == 2 else everywhere
         self._last_seen = {number: each[0] for number, each in found.items()}
         return found
+
+    def _everywhere(self, image: Image, wanted: tuple[int, int]) -> dict[int, list[Array]]:
+        found = self._detector.everywhere(image)
+        self._small = self._small and not found.keys() >= set(wanted)
+        if self._small:
+            found = self._detector.everywhere(image, fine=True) | found
+        return {number: self._followed(number, each) for number, each in found.items() if number in wanted}
 
     def _followed(self, number: int, seen: list[Array]) -> list[Array]:
         """Those of this id, the one nearest to its last place first."""
