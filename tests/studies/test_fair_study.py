@@ -65,9 +65,13 @@ def test_its_answer_names_the_rig_a_law_with_its_interval_and_what_each_term_buy
     text = (run_of(done).path / "README.md").read_text()
     result = text[text.index("## Result") :]
     first = result.split("\n\n")[1]
-    assert first.startswith("**rig (a rig in small): run p") and "times less than feedforward" in first
+    assert first.startswith("```\nrig (a rig in small): run p") and "times less than feedforward" in " ".join(
+        first.split()
+    )
+    assert max(map(len, done.answer)) <= 100 and done.summary == done.answer
     assert "figures/laws.png" in result and (run_of(done).path / "figures" / "laws.png").is_file()
     assert "What an integral buys (pid-ff/tuned beside pd-ff/tuned): rig:" in result
+    assert result.count("run p") == 1, "said once"
     assert "Tuned otherwise (RMSE alone)" in result
     assert str(done).startswith("rig (a rig in small): run p"), "the terminal begins with it too"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -12,17 +13,20 @@ if TYPE_CHECKING:
     from wristctl.comparison.term_values import TermValue
     from wristctl.comparison.world_ranking import WorldRanking
 
-_NAMED = 4
-"""Rows of a tie, or of those that fail, that are named."""
+COLUMNS, _NAMED = 100, 4
+"""Width of a line; rows of a tie, or of those that fail, that are named."""
 
 
 def answer(rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue], shifts: Sequence[OrderShift]) -> list[str]:
-    """A sentence or two for each rig, then what each term buys, then how far the order can be relied on."""
+    """A sentence or two for each rig, then what each term buys, then how far the order can be relied on, in lines."""
     said = [f"{family} ({found.family.about}): {_rig(found)}" for family, found in rankings.items()]
     names = dict.fromkeys(value.term for value in terms)
     said += [_term(name, [value for value in terms if value.term == name]) for name in names]
     said += [_shift(each) for each in shifts]
-    return said
+    lines: list[str] = []
+    for each in said:
+        lines += ["", *textwrap.wrap(each, COLUMNS, break_long_words=False, break_on_hyphens=False)]
+    return lines[1:]
 
 
 def quietest(found: WorldRanking, rows: Sequence[int]) -> int:
@@ -87,7 +91,8 @@ def _shift(shift: OrderShift) -> str:
 
 
 def _times(gain: GeometricMean) -> str:
-    return f"{gain.value:.3g} [{gain.low:.3g}, {gain.high:.3g}]"
+    value, low, high = (f"{each:.3g}" if each < 1000.0 else f"{each:.0f}" for each in (gain.value, gain.low, gain.high))
+    return f"{value} [{low}, {high}]"
 
 
 def _percent(share: float) -> str:

@@ -36,19 +36,17 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
         terms = [value for found in rankings.values() for value in term_values(found, study.study.terms)]
         shifts = _shifts(study, judged)
     said = answer(rankings, terms, shifts)
-    session.findings.summary("**" + "**\n\n**".join(said[: len(rankings)]) + "**\n\n![laws](figures/laws.png)")
-    session.findings.summary("\n\n".join(said[len(rankings) :]))
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
     times = _step_times(session, searches)
     with session.progress("drawing"):
         _draw(session, rankings, terms)
-    shown = [Table("\n\n".join(said), *_best(rankings))]
+    shown = [Table("Which law for which rig", *_best(rankings))]
     shown += [_ranking_table(found, times) for found in rankings.values()]
     if poisoned:
         rows = [(each.unit.name, each.why) for each in poisoned]
         shown.append(Table("Given up, and left out", ("unit of work", "why"), rows))
-    return Studied(study, session.findings, shown, rankings, searches, terms, shifts, poisoned)
+    return Studied(study, session.findings, shown, said, rankings, searches, terms, shifts, poisoned)
 
 
 def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
@@ -164,6 +162,7 @@ def _draw(session: Session, rankings: Mapping[str, WorldRanking], terms: Sequenc
     findings = session.findings
     if rankings:
         findings.figure("laws", laws_by_rig, rankings)
+        findings.overview.figure = "laws"
     if terms:
         findings.figure("terms", terms_by_rig, terms)
     for family, found in rankings.items():

@@ -25,6 +25,8 @@ class Studied(StudyResult):
 
     kind = "study"
 
+    answer: list[str]
+    """Which law for which rig, what each term buys, and how far the order can be relied on: lines of 100 columns."""
     rankings: dict[str, WorldRanking]
     """By family."""
     searches: dict[StudyPlace, Search]
