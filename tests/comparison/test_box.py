@@ -160,7 +160,7 @@ def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None
     )  # fmt: skip
     (strip,) = strips([claim], react(rows_in_box([claim]), settings))
     assert strip.split is not None and 52.5 < strip.split.at < 55.0 and strip.leaves[0].share > 0.8
-    assert strip.told.startswith("wrist.tension_limit < 5")
+    assert strip.told.startswith("100 % where wrist.tension_limit < 5")
     frame = strips_frame([strip])
     held = np.array([each == "reproduced" for each in strip.verdicts])
     assert frame["reproduced"][0] == held.mean() and frame["reproduced_low"][0] < held.mean()
@@ -189,7 +189,7 @@ def test_a_mirrored_wrist_is_symmetrical_and_one_that_sags_is_not() -> None:
     rows = rows_in_box([claim])
     (strip,) = strips([claim], react(rows, settings), react(rows, settings, mirrored=True))
     assert [each == "reproduced" for each in strip.verdicts] == [each.values["pose"] == "upright" for each in settings]
-    assert strip.told == "pose upright 100 %, else 0 %"
+    assert strip.told == "100 % where pose is upright, 0 % elsewhere"
 
 
 def test_orderings_are_judged_draw_by_draw() -> None:

@@ -18,6 +18,7 @@ from wristctl.config.unstated import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
+from wristctl.lanes.cores import cores
 from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.kernel import RECORDED
@@ -26,8 +27,8 @@ from wristctl.simulation.rollout import rollout, structure
 
 CONTINUOUS = 1e-6
 """Control period that counts as none [s]."""
-_TOGETHER = 64
-"""Settings that are recorded at once."""
+_BLOCK = 8
+"""Settings that a core runs side by side, until the longest horizon among them."""
 
 
 @dataclass(frozen=True)
@@ -119,11 +120,13 @@ def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool) -> dict[str
 
 
 def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
-    """Settings that can run in one batch, the longest batches last."""
+    """Settings that can run in one batch, of horizons as alike as can be; the longest batches last."""
     groups: dict[tuple[object, ...], list[int]] = {}
-    for number, each in enumerate(settings):
+    for number in sorted(range(len(settings)), key=lambda each: settings[each].horizon):
+        each = settings[number]
         groups.setdefault((*structure(each.loop), each.measured), []).append(number)
-    found = [np.array(own[k : k + _TOGETHER]) for own in groups.values() for k in range(0, len(own), _TOGETHER)]
+    most = _BLOCK * cores()
+    found = [np.array(own[k : k + most]) for own in groups.values() for k in range(0, len(own), most)]
     return sorted(found, key=lambda own: -settings[own[0]].loop.control_period)
 
 

@@ -75,10 +75,11 @@ def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Thres
     if cut is None:
         shares = {each: float(yes[kept == each].mean()) for each in dict.fromkeys(values)}
         best = max(shares, key=lambda each: shares[each])
-        return f"{name} {best} {100 * shares[best]:.0f} %, else {100 * float(yes[kept != best].mean()):.0f} %"
-    parts = [f"{name} < {cut.at:.3g} {100 * cut.below:.0f} %", f"above {100 * cut.above:.0f} %"]
+        other = float(yes[kept != best].mean())
+        return f"{100 * shares[best]:.0f} % where {name} is {best}, {100 * other:.0f} % elsewhere"
+    parts = [f"{100 * cut.below:.0f} % where {name} < {cut.at:.3g}", f"{100 * cut.above:.0f} % above"]
     none = yes[kept == np.inf]
-    return ", ".join([*parts, f"none {100 * float(none.mean()):.0f} %"] if len(none) else parts)
+    return ", ".join([*parts, f"{100 * float(none.mean()):.0f} % where there is none"] if len(none) else parts)
 
 
 def _judged(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from wristctl.comparison.ledger import Judgement
@@ -16,6 +16,14 @@ LINES, COLUMNS = 12, 100
 _ORDER = ("reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open")
 
 
+class _Part(NamedTuple):
+    """A sentence of the answer; a list may lose what is beyond its last line, where others need the room."""
+
+    text: str
+    most: int = 1
+    is_list: bool = False
+
+
 def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list[str]:
     """At most LINES lines of at most COLUMNS columns; `strips` are the claims over the box."""
     claims = [j for j in judged if j.verdict is not None]
@@ -23,37 +31,52 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list
     counts = ", ".join(f"{counted[each]} {each}" for each in _ORDER if counted[each])
     settings = len(judged) - len(claims)
     beside = f" ({_many(settings, 'setting')} taken over.)" * bool(settings)
-    lines = _wrapped(f"{_many(len(claims), 'claim')} of the paper: {counts}.{beside}", 2)
+    parts = [_Part(f"{_many(len(claims), 'claim')} of the paper: {counts}.{beside}", 2)]
     for loop in dict.fromkeys(name for j in claims for name in j.found if name):
         own = {j.claim.id: j.found[loop] for j in claims if loop in j.found}
         kept = {name: each.mark for name, each in own.items() if each.verdict == "reproduced"}
         held = [name + f" ({mark})" * bool(mark) for name, mark in kept.items()]
-        lines += _wrapped(f"On {loop} {len(held)} of {len(own)} reproduced{_listed(held)}.", 2)
+        parts.append(_Part(f"On {loop} {len(held)} of {len(own)} reproduced{_listed(held)}.", 2, True))
     others = [j.claim.id for j in claims if j.verdict == "reproduced" and "" in j.found]
     if others:
-        lines += _wrapped(f"Beside rollouts reproduced{_listed(others)}.", 1)
+        parts.append(_Part(f"Beside rollouts reproduced{_listed(others)}.", 1, True))
     against = [j.claim.id for j in claims if any(each.verdict == "contradicted" for each in j.found.values())]
     if against:
-        lines += _wrapped(f"Contradicted by the paper's own equations or words{_listed(against)}.", 2)
-    lines += _over_the_box(strips)
+        parts.append(_Part(f"Contradicted by the paper's own equations or words{_listed(against)}.", 2, True))
+    parts += _over_the_box(strips)
     missing = [j for j in claims if j.verdict == "open"]
     if missing:
         wanted = [f"--{name}" for name in dict.fromkeys(j.claim.evidence for j in missing if j.claim.evidence in _RUNS)]
-        lines += _wrapped(f"{_many(len(missing), 'claim')} open: give {', '.join(wanted) or 'more seeds'}.")
-    return [*lines[: LINES - 1], "All claims with reasons: `wristctl audit ... --all`, or the run's README.md."]
+        parts.append(_Part(f"{_many(len(missing), 'claim')} open: give {', '.join(wanted) or 'more seeds'}."))
+    return [*_fitted(parts, LINES - 1), "All claims with reasons: `wristctl audit ... --all`, or the run's README.md."]
 
 
-def _over_the_box(strips: Sequence[Strip]) -> list[str]:
+def _over_the_box(strips: Sequence[Strip]) -> list[_Part]:
     """Where the laws arrive, and what decides the claims on the paper's own laws."""
     if not strips:
         return []
     arrive = [each for each in strips if each.claim.id.startswith("A-")]
-    said = [f"{each.claim.label} {100 * each.share('reproduced').value:.0f} % ({each.told})" for each in arrive]
+    said = [
+        f"{each.claim.label} in {100 * each.share('reproduced').value:.2g} %" + f" ({each.told})" * bool(each.told)
+        for each in arrive
+    ]
     begin = f"Over {len(strips[0].verdicts)} settings that the paper may have had, 30 deg are reached by"
-    lines = _wrapped(f"{begin} {', '.join(said)}.", 2)
+    parts = [_Part(f"{begin} {', '.join(said)}.", 3)]
     orders = [each for each in strips if each.claim.than and not each.claim.unspecified]
     most = [f"{each.claim.id} {100 * each.share('reproduced').value:.0f} %" for each in orders]
-    return lines + _wrapped(f"Its orderings of its own two laws hold in: {', '.join(most)}.", 2) * bool(orders)
+    return parts + [_Part(f"Its orderings of its own two laws hold in: {', '.join(most)}.", 2)] * bool(orders)
+
+
+def _fitted(parts: Sequence[_Part], room: int) -> list[str]:
+    """The lines of all parts, of which none goes for another: lists are cut, the longest first."""
+    lines = [_wrapped(*part[:2]) for part in parts]
+    while sum(map(len, lines)) > room:
+        long = [at for at, part in enumerate(parts) if part.is_list and len(lines[at]) > 1]
+        if not long:
+            break
+        at = max(long, key=lambda each: (len(lines[each]), each))
+        lines[at] = _wrapped(parts[at].text, len(lines[at]) - 1)
+    return [line for part in lines for line in part][:room]
 
 
 _RUNS = ("table1", "selection", "hardware")
