@@ -119,6 +119,15 @@ def test_usual_readings_hold_the_strict_one() -> None:
     assert numbers[0, names.index("angle within 2 %, last 10 %")] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("horizon", [4.0, 4.0002, 4.0005, 4.0008, 4.63328])
+def test_the_last_sample_is_one_whatever_the_horizon(horizon: float) -> None:
+    """A horizon is drawn, and no multiple of the period: half of them had no last sample, and no reading by it."""
+    error = 1e-3 * np.exp(-np.arange(6000) * 1e-3)
+    names, numbers = usual(courses_of(0.5 - error, horizon=horizon))
+    last = int(np.floor(horizon / 1e-3 + 0.5)) - 1
+    assert numbers[0, names.index("angle within 2 %, last sample"), 2] == pytest.approx(error[last], rel=1.1e-3)
+
+
 def test_the_unknown_that_decides_comes_first_and_noise_explains_nothing() -> None:
     rng = np.random.default_rng(0)
     limit, other = rng.uniform(10, 200, 600), rng.uniform(0, 1, 600)

@@ -81,7 +81,7 @@ def usual(of: Courses) -> tuple[list[str], Array]:
     ends = {
         "last 10 %": 0.1 * of.horizons,
         "last second": np.minimum(1.0, of.horizons),
-        "last sample": of.period + 0.0 * of.horizons,
+        "last sample": 1.5 * of.period + 0.0 * of.horizons,  # the last one before half a period ahead of the horizon
     }
     steady = {}
     for name, lasting in ends.items():
