@@ -122,5 +122,5 @@ def _weighed(panel: Any, weights: list[Weighed]) -> None:
     logarithmic(panel.yaxis)
     panel.set_xlabel("weight of chattering [rad s/N]", fontsize=9.0)
     panel.set_ylabel("best of 343 gains", fontsize=9.0)
-    panel.legend(fontsize=8.0, frameon=False, loc="center left")
+    panel.legend(fontsize=8.0, frameon=False, loc="upper left", bbox_to_anchor=(0.02, 0.92))
     title(panel, "d  what an optimiser returns")

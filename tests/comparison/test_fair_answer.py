@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -40,27 +42,42 @@ def ranked(*rows: RankedRow, tolerated: float = 0.0) -> WorldRanking:
 
 
 def said(*rows: RankedRow, tolerated: float = 0.0) -> str:
-    return answer({"bench": ranked(*rows, tolerated=tolerated)}, [], [])[0]
+    return " ".join(answer({"bench": ranked(*rows, tolerated=tolerated)}, [], []))
 
 
 def test_the_better_law_is_named_whichever_it_is() -> None:
     assert "run a/tuned: RMSE" in said(row("a/tuned", 1.0), row("bb/tuned", 1.5))
-    assert "run bb/tuned: RMSE" in said(row("a/tuned", 1.5), row("bb/tuned", 1.0))
+    text = said(row("a/tuned", 1.5), row("bb/tuned", 1.0))
+    assert "run bb/tuned: RMSE" in text and "Told apart, the nearest: a/tuned" in text
 
 
-def test_laws_that_cannot_be_told_apart_are_said_to_be_as_good_and_which_is_quieter() -> None:
+def test_laws_that_cannot_be_told_apart_are_named_with_their_errors_and_which_is_quieter() -> None:
     text = said(row("a/tuned", 1.0, 0.3, quiet=5.0), row("bb/tuned", 1.0, 0.3, quiet=2.0))
-    assert "As good by what could be told" in text and "bb/tuned moves the tendons least" in text
+    assert re.search(r"Not told apart from it: (a|bb)/tuned [\d.]+\.", text)
+    assert "Of all these bb/tuned moves the tendons least." in text
 
 
 def test_where_no_law_beats_feedforward_that_is_said() -> None:
-    assert "run feedforward: no law is better" in said(row("a/tuned", 4.0, 0.3), row("bb/tuned", 4.4))
+    text = said(row("a/tuned", 4.0, 0.3), row("bb/tuned", 4.4))
+    assert "run feedforward, " in text and "no law is told apart from it for the better" in text
+
+
+def test_what_the_papers_law_comes_to_is_said() -> None:
+    assert "The paper's law, tuned: " in said(row("a/tuned", 1.0), row("smc/tuned", 3.0))
+    assert ", 3 times the lowest." in said(row("a/tuned", 1.0, 0.0), row("smc/tuned", 3.0, 0.0))
+    assert "The paper's law" not in said(row("smc/tuned", 1.0), row("a/tuned", 3.0)), "where it is the lowest itself"
 
 
 def test_a_law_that_swings_is_not_recommended_unless_so_little_is_tolerated() -> None:
     text = said(row("a/tuned", 1.0, swings=1), row("bb/tuned", 1.5))
-    assert "run bb/tuned" in text and "Not to be relied on: a/tuned (swings in 2.5 [" in text
+    assert "run bb/tuned" in text and "Worlds lost, of 40: 1 in a/tuned." in text
     assert "run a/tuned" in said(row("a/tuned", 1.0, swings=1), row("bb/tuned", 1.5), tolerated=0.05)
+
+
+def test_every_law_that_is_lost_is_named_the_worst_first() -> None:
+    rows = [row(f"{name}/tuned", 1.0, swings=count) for name, count in (("a", 2), ("b", 7), ("c", 2), ("d", 1))]
+    text = said(*rows, row("e/tuned", 1.0, swings=3, failed=2), row("ff/tuned", 2.0))
+    assert "Worlds lost, of 40: 7 in b/tuned; 3 in e/tuned; 2 in a/tuned, c/tuned; 1 in d/tuned." in text
 
 
 def test_where_all_fail_none_is_recommended() -> None:
@@ -69,15 +86,15 @@ def test_where_all_fail_none_is_recommended() -> None:
 
 
 @pytest.mark.parametrize(
-    "factor, told", [(0.5, "2 times less error"), (2.0, "2 times more error"), (1.0, "nothing that")]
+    ("factor", "told"), [(0.5, "2 [2, 2]"), (2.0, "worse 0.5 [0.5, 0.5]"), (1.0, "undecided 1.000 [1.000, 1.000]")]
 )
 def test_a_term_buys_the_ratio_of_the_errors_with_and_without_it(factor: float, told: str) -> None:
     found = ranked(row("a/tuned", 1.0, 0.0), row("bb/tuned", factor, 0.0, swings=3, failed=1))
     (value,) = term_values(found, {"a term": ("a/tuned", "bb/tuned"), "another": ("a/tuned", "missing")})
     sound = ranked(row("a/tuned", 1.0, 0.0), row("bb/tuned", factor, 0.0))
     (exact,) = term_values(sound, {"a term": ("a/tuned", "bb/tuned")})
-    assert exact.times.value == pytest.approx(1.0 / factor) and exact.told.startswith(told)
-    assert value.swings == (0, 3), "worlds, each once"
+    assert exact.times.value == pytest.approx(1.0 / factor) and exact.told == told
+    assert value.swings == (0, 3) and value.told.endswith(", lost 0 -> 3"), "worlds, each once"
 
 
 def test_an_order_that_stays_and_one_that_turns_round() -> None:
@@ -85,7 +102,7 @@ def test_an_order_that_stays_and_one_that_turns_round() -> None:
     same = order_shift(
         "the same", before, [row(each.label, 2.0 * f) for each, f in zip(before, (1.0, 1.5, 2.0), strict=True)]
     )
-    assert (same.tau, same.resolved, same.reversed) == (1.0, 3, 0) and same.ratio == pytest.approx(2.0)
+    assert (same.tau, same.pairs, same.resolved, same.reversed) == (1.0, 3, 3, 0) and same.ratio == pytest.approx(2.0)
     turned = order_shift(
         "turned", before, [row(each.label, f) for each, f in zip(before, (2.0, 1.5, 1.0), strict=True)]
     )

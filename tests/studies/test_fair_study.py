@@ -64,15 +64,13 @@ def run_of(found: Studied) -> Run:
 def test_its_answer_names_the_rig_a_law_with_its_interval_and_what_each_term_buys(done: Studied) -> None:
     text = (run_of(done).path / "README.md").read_text()
     result = text[text.index("## Result") :]
-    first = result.split("\n\n")[1]
-    assert first.startswith("```\nrig (a rig in small): run p") and "times less than feedforward" in " ".join(
-        first.split()
-    )
+    first = " ".join(result.split("\n\n")[1].split())
+    assert first.startswith("``` rig (a rig in small): run p") and "times below feedforward's" in first
     assert max(map(len, done.answer)) <= 100 and done.summary == done.answer
     assert "figures/laws.png" in result and (run_of(done).path / "figures" / "laws.png").is_file()
-    assert "What an integral buys (pid-ff/tuned beside pd-ff/tuned): rig:" in result
+    assert "an integral (pd-ff/tuned -> pid-ff/tuned): rig " in result
     assert result.count("run p") == 1, "said once"
-    assert "Tuned otherwise (RMSE alone)" in result
+    assert "Tuned otherwise on rig (RMSE alone)" in result
     assert str(done).startswith("rig (a rig in small): run p"), "the terminal begins with it too"
 
 

@@ -20,6 +20,7 @@ class OrderShift(NamedTuple):
     variant: str
     tau: float
     """Kendall's rank correlation of the two orders (Biometrika 30 (1938) 81); nan for one law."""
+    pairs: int
     resolved: int
     """Pairs of laws that can be told apart under both."""
     reversed: int
@@ -41,7 +42,7 @@ def order_shift(variant: str, before: list[RankedRow], after: list[RankedRow]) -
     tau = float(kendalltau(*means).statistic) if len(known) > 1 else float("nan")
     ratio = float(np.exp(np.mean(means[1] - means[0])))
     return OrderShift(
-        variant, tau, int(np.sum(signs != 0)), int(np.sum(signs < 0)), (best[0], best[1]), ratio
+        variant, tau, len(signs), int(np.sum(signs != 0)), int(np.sum(signs < 0)), (best[0], best[1]), ratio
     )  # fmt: skip
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
-
-import numpy as np
 
 from wristctl.comparison.geometric_means import GeometricMean, paired_ratio, penalised
 from wristctl.comparison.world_ranking import FAILURE, WorldRanking
@@ -26,14 +25,17 @@ class TermValue(NamedTuple):
 
     @property
     def told(self) -> str:
-        """In words: 1.9 times less error; nothing that could be told; more error."""
-        times = self.times
-        interval = f"[{times.low:.3g}, {times.high:.3g}]"
-        if times.is_one:
-            return f"nothing that could be told ({times.value:.3g} {interval})"
-        if times.value > 1.0:
-            return f"{times.value:.3g} times less error {interval}"
-        return f"{1.0 / times.value:.3g} times more error [{1.0 / times.high:.3g}, {1.0 / times.low:.3g}]"
+        """The ratio with its interval; undecided where that holds 1, worse below; and the worlds that are lost."""
+        value, low, high = (_ratio(each) for each in self.times[:3])
+        word = "undecided " if self.times.is_one else "worse " if self.times.value < 1.0 else ""
+        lost = f", lost {self.swings[0]} -> {self.swings[1]}" if any(self.swings) else ""
+        return f"{word}{value} [{low}, {high}]{lost}"
+
+
+def _ratio(value: float) -> str:
+    if not math.isfinite(value):
+        return "any"
+    return f"{value:.3f}" if 0.9 <= value <= 1.1 else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
 
 
 def term_values(found: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:
@@ -46,12 +48,6 @@ def term_values(found: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> li
             scores, others = (penalised(found.rows[at].rmse, FAILURE) for at in pair)
             times = paired_ratio(scores, others, _STREAM)
             values.append(
-                TermValue(term, found.name, without, given, times, (_lost(found, pair[0]), _lost(found, pair[1])))
+                TermValue(term, found.name, without, given, times, (found.lost(pair[0]), found.lost(pair[1])))
             )
     return values
-
-
-def _lost(found: WorldRanking, at: int) -> int:
-    """Worlds in which a row fails or swings."""
-    row = found.rows[at]
-    return int(np.sum(~np.isfinite(row.rmse) | row.swings))

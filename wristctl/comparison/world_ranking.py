@@ -71,6 +71,11 @@ class WorldRanking:
         """The number of a row's group, from 1; None where it fails or swings."""
         return next((at for at, each in enumerate(self.standing.groups, start=1) if row in each.rows), None)
 
+    def lost(self, row: int) -> int:
+        """Worlds in which a row fails or swings."""
+        own = self.rows[row]
+        return int(np.sum(~np.isfinite(own.rmse) | own.swings))
+
 
 def seed_of(study: Study, worlds: Worlds) -> int:
     """What its split is drawn from."""

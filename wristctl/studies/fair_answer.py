@@ -8,21 +8,32 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wristctl.comparison.geometric_means import GeometricMean
     from wristctl.comparison.order_shifts import OrderShift
     from wristctl.comparison.term_values import TermValue
     from wristctl.comparison.world_ranking import WorldRanking
 
-COLUMNS, _NAMED = 100, 4
-"""Width of a line; rows of a tie, or of those that fail, that are named."""
+COLUMNS = 100
+PAPERS = "smc/tuned"
+"""The paper's law, with gains that were searched for as those of all others."""
 
 
-def answer(rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue], shifts: Sequence[OrderShift]) -> list[str]:
-    """A sentence or two for each rig, then what each term buys, then how far the order can be relied on, in lines."""
+def answer(
+    rankings: Mapping[str, WorldRanking],
+    terms: Sequence[TermValue],
+    shifts: Sequence[OrderShift],
+    varied: str = "",
+) -> list[str]:
+    """Which law for which rig, what each term buys, and how far the order can be relied on (on the rig `varied`)."""
     said = [f"{family} ({found.family.about}): {_rig(found)}" for family, found in rankings.items()]
-    names = dict.fromkeys(value.term for value in terms)
+    said += [_legend(found) for found in list(rankings.values())[:1]]
+    names = list(dict.fromkeys(value.term for value in terms))
+    if names:
+        said.append(
+            "What a term buys: RMSE without it over RMSE with it, above 1 the better; undecided where the interval "
+            "holds 1; lost are the worlds in which the law fails or swings, without -> with it."
+        )
     said += [_term(name, [value for value in terms if value.term == name]) for name in names]
-    said += [_shift(each) for each in shifts]
+    said += [_shift(each, varied) for each in shifts]
     lines: list[str] = []
     for each in said:
         lines += ["", *textwrap.wrap(each, COLUMNS, break_long_words=False, break_on_hyphens=False)]
@@ -37,67 +48,83 @@ def quietest(found: WorldRanking, rows: Sequence[int]) -> int:
 
 
 def _rig(found: WorldRanking) -> str:
-    stands = found.standing
-    lost = [_fate(found, at) for at in stands.unreliable]
-    more = f", and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
-    fates = f" Not to be relied on: {', '.join(lost[:_NAMED])}{more}." if lost else ""
-    if not stands.groups:
-        return f"run none of these.{fates}"
-    best = stands.groups[0].rows
-    first, gain, mean = best[0], found.gains[best[0]], found.means[best[0]]
-    error = f"RMSE {_deg(mean.value)} [{_deg(mean.low)}, {_deg(mean.high)}] deg"
-    if found.yardstick in best:
-        return f"run feedforward: no law is better by what could be told; {error}.{_floor(found)}{fates}"
-    said = f"run {found.rows[first].label}: {error}, {_times(gain)} times less than feedforward."
-    if len(best) > 1:
-        names = [found.rows[at].label for at in best[1 : 1 + _NAMED]]
-        names += [f"{len(best) - 1 - _NAMED} more"] if len(best) - 1 > _NAMED else []
-        said += f" As good by what could be told: {', '.join(names)}; of these all"
-        said += f" {found.rows[quietest(found, best)].label} moves the tendons least."
-    if len(stands.groups) > 1:
-        after = stands.groups[1].rows[0]
-        said += f" Next is {found.rows[after].label} with {_deg(found.means[after].value)} deg."
-    return f"{said}{_floor(found)}{fates}"
+    groups = found.standing.groups
+    if not groups:
+        return f"run none of these.{_lost(found)}"
+    best, known = groups[0].rows, found.yardstick
+    first, ties = best[0], [at for at in best[1:] if at != known]
+    if known in best:
+        said = f"run feedforward, {_interval(found, known)} deg: no law is told apart from it for the better."
+        said += f" The lowest is {_named(found, first)}." if first != known else ""
+    else:
+        gain = found.gains[first]
+        times = f"{_times(gain.value)} [{_times(gain.low)}, {_times(gain.high)}]"
+        said = f"run {found.rows[first].label}: RMSE {_interval(found, first)} deg, {times} times below feedforward's"
+        said += f" {_deg(found.means[known].value)}."
+    if ties:
+        said += f" Not told apart from it: {', '.join(_named(found, at) for at in ties)}."
+        said += f" Of all these {found.rows[quietest(found, best)].label} moves the tendons least."
+    if len(groups) > 1:
+        said += f" Told apart, the nearest: {_named(found, groups[1].rows[0])}."
+    papers = next((at for at, row in enumerate(found.rows) if row.label == PAPERS and at not in best), None)
+    if papers is not None:
+        ratio = found.means[papers].value / found.means[first].value
+        said += f" The paper's law, tuned: {_deg(found.means[papers].value)}, {_times(ratio)} times the lowest."
+    return f"{said}{_floor(found)}{_lost(found)}"
 
 
 def _floor(found: WorldRanking) -> str:
     floor = found.standing.floor
-    if not math.isfinite(floor):
-        return ""
-    return f" Differences below {100.0 * (floor - 1.0):.2g} % cannot be told in {found.worlds} worlds."
+    known = math.isfinite(floor)
+    return f" As a rule differences of {100.0 * (floor - 1.0):.2g} % or more are told apart." if known else ""
 
 
-def _fate(found: WorldRanking, at: int) -> str:
-    failures, swings = found.standing.failures[at], found.standing.swings[at]
-    told = [
-        f"{what} in {_percent(each.value)} [{_percent(each.low)}, {_percent(each.high)}] % of worlds"
-        for what, each in (("fails", failures), ("swings", swings))
-        if each.times
-    ]
-    return f"{found.rows[at].label} ({' and '.join(told)})"
+def _lost(found: WorldRanking) -> str:
+    """Every row that fails or swings too often to stand, by how often."""
+    by_count: dict[int, list[str]] = {}
+    for at in found.standing.unreliable:
+        by_count.setdefault(found.lost(at), []).append(found.rows[at].label)
+    each = [f"{count} in {', '.join(by_count[count])}" for count in sorted(by_count, reverse=True)]
+    return f" Worlds lost, of {found.worlds}: {'; '.join(each)}." if each else ""
+
+
+def _legend(found: WorldRanking) -> str:
+    sound = [share.high for share in found.standing.swings if not share.times]
+    still = f", though none in {found.worlds} can be {100.0 * min(sound):.2g} %" if sound else ""
+    return (
+        "RMSE is the geometric mean over worlds, with its 95 % interval. A world is a wrist and a rig drawn anew, on "
+        "which no gains were searched or chosen. A law is lost where the wrist leaves its range, or swings by more "
+        f"than 0.1 deg at rest; one that is lost in more than is tolerated stands nowhere{still}. Ties are with the "
+        "lowest: two of them may be told apart from each other."
+    )
 
 
 def _term(term: str, values: Sequence[TermValue]) -> str:
-    pair = f"{values[0].given} beside {values[0].without}"
-    return f"What {term} buys ({pair}): {'; '.join(f'{each.family}: {each.told}' for each in values)}."
+    pair = f"{values[0].without} -> {values[0].given}"
+    return f"{term} ({pair}): {'; '.join(f'{each.family} {each.told}' for each in values)}."
 
 
-def _shift(shift: OrderShift) -> str:
+def _shift(shift: OrderShift, varied: str) -> str:
     before, after = shift.best
-    same = f"{before} stays best" if before == after else f"best is {after}, not {before}"
-    told = f"of {shift.resolved} pairs of laws that are told apart both ways {shift.reversed} change places"
-    order = f"{told}, rank correlation {shift.tau:.2f}; {same}"
-    return f"Tuned otherwise ({shift.variant}): {order}; RMSE {shift.ratio:.3g} times."
+    where = f"on {varied} " if varied else ""
+    lowest = f"{after} stays lowest" if before == after else f"the lowest is {after}, not {before}"
+    told = f"{shift.resolved} of {shift.pairs} pairs of laws are told apart both times, {shift.reversed} of them"
+    order = f"{told} the other way round (Kendall's tau of all {shift.tau:.2f})"
+    return f"Tuned otherwise {where}({shift.variant}): {order}; {lowest}; all RMSE {shift.ratio:.2f} times."
 
 
-def _times(gain: GeometricMean) -> str:
-    value, low, high = (f"{each:.3g}" if each < 1000.0 else f"{each:.0f}" for each in (gain.value, gain.low, gain.high))
-    return f"{value} [{low}, {high}]"
+def _named(found: WorldRanking, at: int) -> str:
+    return f"{found.rows[at].label} {_deg(found.means[at].value)}"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f}" if share >= 0.1 else f"{100.0 * share:.2g}"
+def _interval(found: WorldRanking, at: int) -> str:
+    mean = found.means[at]
+    return f"{_deg(mean.value)} [{_deg(mean.low)}, {_deg(mean.high)}]"
+
+
+def _times(value: float) -> str:
+    return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
 
 
 def _deg(value: float) -> str:
-    return f"{math.degrees(value):.2g}"
+    return f"{math.degrees(value):.3g}"

@@ -35,7 +35,7 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
         rankings = _rankings(study, judged)
         terms = [value for found in rankings.values() for value in term_values(found, study.study.terms)]
         shifts = _shifts(study, judged)
-    said = answer(rankings, terms, shifts)
+    said = answer(rankings, terms, shifts, study.study.varied or families_of(study)[0])
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
     times = _step_times(session, searches)
