@@ -101,5 +101,5 @@ NN_MRAC = Controller(
         "published": "its reference model; the rest is not specified",
         "stepper": BY_TRIAL,
     },
-    conditions={"stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

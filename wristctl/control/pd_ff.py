@@ -36,5 +36,5 @@ PD_FF = Controller(
         "stepper": {"Kp": 6.0, "Kd": 0.4},
     },
     notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )
