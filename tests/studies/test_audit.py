@@ -108,8 +108,11 @@ def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: 
     assert list(done.comparisons) == list(LOOPS)
     frame = done.frame().set_index("claim")
     assert (frame.loc["C", "exact_low"], frame.loc["C", "exact_high"]) == (0.4, 0.6)
-    assert done.answer[0] == ("5 claims of the paper: 2 reproduced, 1 contradicted, 2 open. (1 setting taken over.)")
-    assert done.answer[1] == "On exact 1 of 1 reproduced: C."
+    assert " ".join(line.strip() for line in done.answer[:2]) == (
+        "5 claims of the paper, by what all loops agree on: 2 reproduced, 1 contradicted, 2 open. "
+        "1 more is a setting, taken over."
+    )
+    assert done.answer[2] == "On exact 1 of 1 reproduced: C."
 
 
 def test_trials_judge_the_experiment_and_say_that_the_rig_was_emulated(tmp_path: Path, asked: list[Any]) -> None:

@@ -39,10 +39,12 @@ def test_every_part_is_there_in_at_most_twelve_lines(count: int) -> None:
     said = " ".join(line.strip() for line in lines)
     assert len(lines) <= LINES and max(map(len, lines)) <= COLUMNS
     for part in (
-        f"{4 * count} claim", "On exact", "On sampled", "On default", "Beside rollouts reproduced: B-0",
-        "own equations or words: C-0", "Over 1133 settings that the paper may have had, 30 deg are reached by",
-        "smc/printed in 0 %, smc/exchanged in 61 % (46 % where wrist.tension_limit < 21.1, 81 % above).",
-        "orderings of its own two laws hold in: O-rmse-smc-pid 22 %.", "open: give --table1.", "wristctl audit",
+        f"{4 * count} claim", f"On exact {count} of {count} reproduced, {count} of these not physical: R-0",
+        "On sampled", "On default", "Without a rollout reproduced: B-0", "own equations or words: C-0",
+        "Over 1133 settings that the paper may have had, 30 deg are reached by smc/printed in 0 %,",
+        "smc/exchanged in 61 % (46 % where wrist.tension_limit < 21.1, 81 % above).",
+        "orderings of its own two laws hold in: O-rmse-smc-pid 22 %.", "open, for want of --table1 RUN (train).",
+        "wristctl audit",
     ):  # fmt: skip
         assert part in said, part
-    assert ("..." in said.replace("audit ...", "")) == (count > 1), "lists are cut, with a mark"
+    assert ("..." in said.replace("audit ...", "")) == (count == 60), "only then lists are cut, with a mark"

@@ -30,24 +30,25 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list
     counted = Counter(str(j.verdict) for j in claims)
     counts = ", ".join(f"{counted[each]} {each}" for each in _ORDER if counted[each])
     settings = len(judged) - len(claims)
-    beside = f" ({_many(settings, 'setting')} taken over.)" * bool(settings)
-    parts = [_Part(f"{_many(len(claims), 'claim')} of the paper: {counts}.{beside}", 2)]
+    beside = f" {_many(settings, 'more is a setting', 'more are settings')}, taken over." * bool(settings)
+    parts = [_Part(f"{_many(len(claims), 'claim')} of the paper, by what all loops agree on: {counts}.{beside}", 2)]
     for loop in dict.fromkeys(name for j in claims for name in j.found if name):
         own = {j.claim.id: j.found[loop] for j in claims if loop in j.found}
         kept = {name: each.mark for name, each in own.items() if each.verdict == "reproduced"}
-        held = [name + f" ({mark})" * bool(mark) for name, mark in kept.items()]
-        parts.append(_Part(f"On {loop} {len(held)} of {len(own)} reproduced{_listed(held)}.", 2, True))
+        marked = "".join(f", {times} of these {mark}" for mark, times in Counter(filter(None, kept.values())).items())
+        parts.append(_Part(f"On {loop} {len(kept)} of {len(own)} reproduced{marked}{_listed(list(kept))}.", 2, True))
     others = [j.claim.id for j in claims if j.verdict == "reproduced" and "" in j.found]
     if others:
-        parts.append(_Part(f"Beside rollouts reproduced{_listed(others)}.", 1, True))
+        parts.append(_Part(f"Without a rollout reproduced{_listed(others)}.", 1, True))
     against = [j.claim.id for j in claims if any(each.verdict == "contradicted" for each in j.found.values())]
     if against:
         parts.append(_Part(f"Contradicted by the paper's own equations or words{_listed(against)}.", 2, True))
     parts += _over_the_box(strips)
     missing = [j for j in claims if j.verdict == "open"]
     if missing:
-        wanted = [f"--{name}" for name in dict.fromkeys(j.claim.evidence for j in missing if j.claim.evidence in _RUNS)]
-        parts.append(_Part(f"{_many(len(missing), 'claim')} open: give {', '.join(wanted) or 'more seeds'}."))
+        named = dict.fromkeys(j.claim.evidence for j in missing if j.claim.evidence in _RUNS)
+        wanted = [f"--{name} RUN ({_RUNS[name]})" for name in named]
+        parts.append(_Part(f"{_many(len(missing), 'claim')} open, for want of {', '.join(wanted) or 'seeds'}."))
     return [*_fitted(parts, LINES - 1), "All claims with reasons: `wristctl audit ... --all`, or the run's README.md."]
 
 
@@ -79,11 +80,12 @@ def _fitted(parts: Sequence[_Part], room: int) -> list[str]:
     return [line for part in lines for line in part][:room]
 
 
-_RUNS = ("table1", "selection", "hardware")
+_RUNS = {"table1": "train", "selection": "train", "hardware": "hw-run"}
+"""The earlier runs that claims may want, and what leaves them."""
 
 
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
+def _many(count: int, what: str, several: str = "") -> str:
+    return f"{count} {what if count == 1 else several or f'{what}s'}"
 
 
 def _listed(names: Sequence[str]) -> str:

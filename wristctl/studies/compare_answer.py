@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
 PAPERS, PRINTED = "smc", "printed"
 """The paper's own law, and the gains that it prints."""
 _INDENT = 24
+_HELD = "\u00a0"
+"""A blank at which no line ends."""
 _WHERE = "every row and metric: --all prints them, the run's report.html sorts and filters them"
 
 
@@ -28,12 +31,16 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
         return []
     names = _names(found)
     cells = "motions" if found[0].loops else "worlds"
-    head = f"best first: RMSE [deg], geometric mean over {cells} [95 % interval]; = no worse (paired, Holm)"
-    end = [*wrapped([*_printed(found), *_papers_places(found, names)], 2), *wrapped(_papers_order(found), 1), _WHERE]
-    room = LINES - 1 - len(end)
+    head = [
+        f"RMSE [deg], geometric mean over {cells} [95 % interval], best first; = is a tie (paired, Holm);",
+        "no place: it fails or swings (limit cycle, > 0.1 deg at rest) somewhere; no count: everywhere",
+    ]
+    end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 1), *wrapped(_papers_order(found), 1)]
+    end.append(_WHERE)
+    room = LINES - len(head) - len(end)
     rooms = [max(2, room // len(found)) + (at < room % len(found)) for at in range(len(found))]
     blocks = [_block(each, names, own) for each, own in zip(found, rooms, strict=True)]
-    return [head, *[line for block in blocks for line in block][:room], *end]
+    return [*head, *[line for block in blocks for line in block][:room], *end]
 
 
 def head_with_the_best(findings: Findings, found: Sequence[ClassStanding]) -> None:
@@ -58,16 +65,12 @@ def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
 
 
 def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
-    """Groups in order, who cannot be relied on, and what the best one buys."""
+    """Groups in order, who cannot be relied on (of both as much as there is room for), and what the best one buys."""
     columns = COLUMNS - _INDENT
-    parts = [each_part for each_part in (_groups(each, names), _lost(each, names), _buys(each, names)) if each_part]
-    needed = [len(wrapped(part, room, columns)) for part in parts]
-    given = [1] * len(parts)
-    for _ in range(room - len(parts)):
-        short = [at for at in range(len(parts)) if given[at] < needed[at]]
-        if short:
-            given[min(short, key=lambda at: (given[at], at))] += 1
-    lines = [line for part, most in zip(parts, given, strict=True) for line in wrapped(part, most, columns)][:room]
+    groups, lost, bought = _groups(each, names), _lost(each, names), _buys(each, names)
+    lines = wrapped(lost, room - 1 if room < 3 else room - 2, columns)
+    ends = wrapped(bought, 1, columns) if len(lines) < room - 1 else []
+    lines = [*wrapped(groups, room - len(lines) - len(ends), columns), *lines, *ends]
     name = f"{each.name} ({each.cells.split()[0]})"
     return [f"{'' if at else name:<{_INDENT}}{line}" for at, line in enumerate(lines)]
 
@@ -81,7 +84,7 @@ def _groups(each: ClassStanding, names: dict[str, str]) -> list[str]:
         first, *ties = group.rows
         mean = each.means[first]
         ends = f" [{deg(mean.low)}, {deg(mean.high)}]" if number == 1 and math.isfinite(mean.high) else ""
-        shown = f"{number}. {names[each.labels[first]]} {deg(mean.value)}{ends}"
+        shown = f"{number}.{_HELD}{names[each.labels[first]]} {deg(mean.value)}{ends}"
         pieces.append(" = ".join([shown, *(f"{names[each.labels[row]]} {deg(each.means[row].value)}" for row in ties)]))
     return pieces
 
@@ -91,7 +94,7 @@ def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
     count = each.scores.shape[1]
 
     def among(times: int) -> str:
-        return "" if times == count else f" in {times} of {count}"
+        return "" if times == count else f" {times}/{count}"
 
     fails, swings = each.standing.failures, each.standing.swings
     kinds = {
@@ -112,21 +115,26 @@ def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
             f"{names[each.labels[row]]} {each.peak[row]:.2g} N" for row in each.order if each.peak[row] > 0.0
         ],
     }
-    return [f"{kind}: {', '.join(rows)}" for kind, rows in kinds.items() if rows]
+    pieces = []
+    for kind, rows in kinds.items():
+        pieces += [f"{'' if at else f'{kind}: '}{row}{',' * (at < len(rows) - 1)}" for at, row in enumerate(rows)]
+    return pieces
 
 
 def _buys(each: ClassStanding, names: dict[str, str]) -> list[str]:
-    """How many times less the best row errs than feedforward and the rungs of the ladder."""
-    if not each.standing.groups:
+    """Errors of the next place, of feedforward and of the rungs of the ladder, in those of the best row."""
+    groups = each.standing.groups
+    if not groups:
         return []
-    best = each.standing.groups[0].rows[0]
+    best = groups[0].rows[0]
     rungs = {name: row for name in LADDER if (row := each.best(name)) is not None and row != best}
-    ratios = {name: each.times_better(best, row) for name, row in rungs.items()}
-    bought = [f"x{two(ratio.value)} {name}" for name, ratio in ratios.items()]
-    if "feedforward" in ratios and math.isfinite(ratios["feedforward"].high):
-        ends = ratios["feedforward"]
-        bought[0] += f" [{two(ends.low)}, {two(ends.high)}]"
-    return [f"{names[each.labels[best]]} errs less: {', '.join(bought)}"] if bought else []
+    following = [groups[1].rows[0]] if len(groups) > 1 else []
+    pieces: list[str] = []
+    for row in dict.fromkeys([*following, *rungs.values()]):
+        ratio, name = each.times_better(best, row), names[each.labels[row]]
+        known = name == LADDER[0] and math.isfinite(ratio.high)
+        pieces.append(f"{name} x{two(ratio.value)}" + f" [{two(ratio.low)}, {two(ratio.high)}]" * known + ",")
+    return [f"errors beside {names[each.labels[best]]}'s: {pieces[0]}", *pieces[1:]] if pieces else []
 
 
 def _printed(found: Sequence[ClassStanding]) -> list[str]:
@@ -152,8 +160,10 @@ def _papers_places(found: Sequence[ClassStanding], names: dict[str, str]) -> lis
         for each in found:
             row = each.labels.index(label) if label in each.labels else None
             places.append("-" if row is None or each.group(row) is None else str(each.order.index(row) + 1))
-        said.append(f"{label} has place {', '.join(places)} of {len(found[0].labels)}")
-    return said
+        said.append(f"{label} {', '.join(places)}")
+    if not said:
+        return []
+    return [f"places of {len(found[0].labels)} rows, class by class (-: none): {said[0]}", *said[1:]]
 
 
 def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
@@ -168,25 +178,21 @@ def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
         return []
     holds = [name for name, order in ours.items() if order == printed]
     where = f" ({', '.join(holds)})" if holds else ""
-    return [f"the paper's order by RMSE, {' < '.join(printed)}, holds in {len(holds)} of {len(ours)} classes{where}"]
+    order = f"the paper's order (least RMSE first: {', '.join(printed)})"
+    return [f"{order} holds in {len(holds)} of {len(ours)} classes{where}"]
 
 
 def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS) -> list[str]:
-    """Pieces in lines, broken between words; where there is no room it ends with an ellipsis."""
+    """As many of the pieces as there is room for in lines, and how many more there are."""
     given = [piece for piece in pieces if piece]
-    words = [word for at, piece in enumerate(given) for word in f"{piece}{';' * (at < len(given) - 1)}".split(" ")]
-    found = [""]
-    for at, word in enumerate(words):
-        last = len(found) == lines
-        tail = " ..." if last and at < len(words) - 1 else ""
-        if len(f"{found[-1]} {word}{tail}".strip()) <= columns:
-            found[-1] = f"{found[-1]} {word}".strip()
-        elif last:
-            found[-1] += " ..."
-            break
-        else:
-            found.append(word)
-    return [line for line in found if line]
+    for kept in range(len(given), 0, -1):
+        text = "".join(f"{each} " if each.endswith(",") else f"{each}; " for each in given[:kept]).rstrip(" ,;")
+        text += f"; +{len(given) - kept} more" if kept < len(given) else ""
+        found = textwrap.wrap(text, columns, break_long_words=False, break_on_hyphens=False)
+        if len(found) <= lines:
+            return [line.replace(_HELD, " ") for line in found]
+    first = given[0] if given else ""
+    return textwrap.wrap(first, columns, max_lines=max(1, lines), placeholder=" ...", break_on_hyphens=False)
 
 
 def deg(value: float) -> str:
