@@ -19,7 +19,8 @@ LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
 """What each more of a law buys: a term is worth what it adds to the rung below."""
 PAPERS, PRINTED = "smc", "printed"
 """The paper's own law, and the gains that it prints."""
-_INDENT = 24
+_INDENT = "    "
+_WIDTH = COLUMNS - len(_INDENT)
 _HELD = "\u00a0"
 """A blank at which no line ends."""
 _WHERE = "every row and metric: --all prints them, the run's report.html sorts and filters them"
@@ -35,10 +36,12 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
         f"RMSE [deg], geometric mean over {cells} [95 % interval], best first; = is a tie (paired, Holm);",
         "no place: it fails or swings (limit cycle, > 0.1 deg at rest) somewhere; no count: everywhere",
     ]
-    end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 1), *wrapped(_papers_order(found), 1)]
+    end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 2), *wrapped(_papers_order(found), 1)]
     end.append(_WHERE)
     room = LINES - len(head) - len(end)
-    rooms = [max(2, room // len(found)) + (at < room % len(found)) for at in range(len(found))]
+    rooms = [max(2, room // len(found))] * len(found)
+    for at in sorted(range(len(found)), key=lambda at: -len(wrapped(_lost(found[at], names), LINES, _WIDTH))):
+        rooms[at] += sum(rooms) < room
     blocks = [_block(each, names, own) for each, own in zip(found, rooms, strict=True)]
     return [*head, *[line for block in blocks for line in block][:room], *end]
 
@@ -66,13 +69,12 @@ def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
 
 def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
     """Groups in order, who cannot be relied on (of both as much as there is room for), and what the best one buys."""
-    columns = COLUMNS - _INDENT
+    name = f"{each.name} ({each.cells.split()[0]}): "
     groups, lost, bought = _groups(each, names), _lost(each, names), _buys(each, names)
-    lines = wrapped(lost, room - 1 if room < 3 else room - 2, columns)
-    ends = wrapped(bought, 1, columns) if len(lines) < room - 1 else []
-    lines = [*wrapped(groups, room - len(lines) - len(ends), columns), *lines, *ends]
-    name = f"{each.name} ({each.cells.split()[0]})"
-    return [f"{'' if at else name:<{_INDENT}}{line}" for at, line in enumerate(lines)]
+    lines = wrapped(lost, room - 1 if room < 3 else room - 2, _WIDTH)
+    ends = wrapped(bought, 1, _WIDTH) if len(lines) < room - 1 else []
+    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH), *lines, *ends]
+    return [line if at == 0 else f"{_INDENT}{line}" for at, line in enumerate(lines)]
 
 
 def _groups(each: ClassStanding, names: dict[str, str]) -> list[str]:
@@ -133,19 +135,21 @@ def _buys(each: ClassStanding, names: dict[str, str]) -> list[str]:
     for row in dict.fromkeys([*following, *rungs.values()]):
         ratio, name = each.times_better(best, row), names[each.labels[row]]
         known = name == LADDER[0] and math.isfinite(ratio.high)
-        pieces.append(f"{name} x{two(ratio.value)}" + f" [{two(ratio.low)}, {two(ratio.high)}]" * known + ",")
+        times = f"{ratio.value:.2f}" if ratio.value < 10.0 else two(ratio.value)
+        pieces.append(f"{name} x{times}" + f" [{two(ratio.low)}, {two(ratio.high)}]" * known + ",")
     return [f"errors beside {names[each.labels[best]]}'s: {pieces[0]}", *pieces[1:]] if pieces else []
 
 
 def _printed(found: Sequence[ClassStanding]) -> list[str]:
     """What becomes of the gains that the paper prints."""
-    said = []
+    said: list[str] = []
     for label in dict.fromkeys(label for each in found for label in each.labels if label.endswith(f"/{PRINTED}")):
         own = [(each, each.labels.index(label)) for each in found if label in each.labels]
         away = sum(each.away[row] > 0.5 * each.scores.shape[1] for each, row in own)
         lost = sum(row in each.standing.unreliable for each, row in own)
         kinds = [f"does not arrive in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
-        said.append(f"{label} {' and '.join(kinds) or 'works in all'} of {len(own)} classes")
+        classes = "" if said else f" of {len(own)} classes"
+        said.append(f"{label} {' and '.join(kinds) or 'works in all'}{classes}")
     return said
 
 
