@@ -267,8 +267,8 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
         "compare", *SOFT, "--set", "worlds={family: soft, draws: 12}", "--set", rows, "--tuned", tuned.id
     )
     assert code == 0, err
-    best = out.splitlines()[1]
-    assert best.startswith("soft (12)") and "1. ct-dob" in best and "errs less: x" in out
+    best = out.splitlines()[2]
+    assert best.startswith("soft (12): 1. ct-dob") and "errors beside ct-dob's: pd-ff x" in out
     run = open_run("latest:compare")
     assert (run.path / "README.md").read_text().index("1. ct-dob") < 2000
     assert run.problems() == [] and len(run.data("worlds")) == 3 * 12
