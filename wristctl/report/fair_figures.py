@@ -18,6 +18,7 @@ from wristctl.report.style import (
     BLACK,
     BLUE,
     GREY,
+    LIGHT,
     SILVER,
     VERMILLION,
     colour,
@@ -64,12 +65,13 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     made, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
     undress(axes)
     most = max(2.0, float(np.nanmax(times)))
-    axes.pcolormesh(times[order], cmap=_COLOURS, norm=LogNorm(1.0 / most, most), edgecolors="white")
+    drawn = axes.pcolormesh(times[order], cmap=_COLOURS, norm=LogNorm(1.0 / most, most), edgecolors="white")
+    dark = drawn.to_rgba(times)[..., :3] @ np.array([0.299, 0.587, 0.114]) < 0.5
     for y, at in enumerate(order):
         for x in range(len(rankings)):
-            sound = "(" in marks[at, x]
+            ink = ("white" if dark[at, x] else BLACK) if "(" in marks[at, x] else LIGHT if dark[at, x] else GREY
             axes.text(x + 0.5, y + 0.5, marks[at, x], ha="center", va="center", fontsize=8.5,
-                      color=BLACK if sound else GREY, fontweight="bold" if "(1)" in marks[at, x] else None)  # fmt: skip
+                      color=ink, fontweight="bold" if "(1)" in marks[at, x] else None)  # fmt: skip
     axes.set_xticks(np.arange(len(rankings)) + 0.5, list(rankings))
     axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[at] for at in order])
     axes.invert_yaxis()
@@ -91,8 +93,13 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
     for panel, family in zip(axes[0], families, strict=True):
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
         logarithmic(panel.xaxis)
-        panel.xaxis.set_major_locator(LogLocator(numticks=4))
         panel.xaxis.set_minor_formatter(NullFormatter())
+        low, high = panel.get_xlim()
+        if high < 100.0 * low:
+            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            panel.xaxis.set_major_formatter("{x:g}")
+        else:
+            panel.xaxis.set_major_locator(LogLocator(numticks=4))
         title(panel, family)
     axes[0, 0].set_yticks(range(len(terms)), terms)
     axes[0, 0].invert_yaxis()

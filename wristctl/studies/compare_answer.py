@@ -148,8 +148,8 @@ def _printed(found: Sequence[ClassStanding]) -> list[str]:
         away = sum(each.away[row] > 0.5 * each.scores.shape[1] for each, row in own)
         lost = sum(row in each.standing.unreliable for each, row in own)
         kinds = [f"does not arrive in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
-        classes = "" if said else f" of {len(own)} classes"
-        said.append(f"{label} {' and '.join(kinds) or 'works in all'}{classes}")
+        begin, classes = ("", "") if said else ("printed gains: ", f" of {len(own)} classes")
+        said.append(f"{begin}{label.split('/')[0]} {', '.join(kinds) or 'works in all'}{classes}")
     return said
 
 
@@ -167,7 +167,7 @@ def _papers_places(found: Sequence[ClassStanding], names: dict[str, str]) -> lis
         said.append(f"{label} {', '.join(places)}")
     if not said:
         return []
-    return [f"places of {len(found[0].labels)} rows, class by class (-: none): {said[0]}", *said[1:]]
+    return [f"places of {len(found[0].labels)} rows, by class (-: none): {said[0]}", *said[1:]]
 
 
 def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
