@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
@@ -201,6 +202,7 @@ def fit(problem: Problem) -> Fit:
     """The coordinates of least squares, with what is known beforehand counting by its own standard deviation.
 
     Where the residuals are not of the size that they were weighed with, the search goes on from there with their own.
+    BLAS has one thread: on matrices this small its others only wait for each other, on cores that simulate.
     """
     weights, evaluations = problem.prior(), 0
     known = weights > 0.0
@@ -222,11 +224,12 @@ def fit(problem: Problem) -> Fit:
     def slopes(x: Array) -> Array:
         return np.concatenate([*(each / weighed for each in at(x).slopes), np.diag(weights)[known]])
 
-    while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
-        weighed = noise
-        found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST)
-        x = found.x
-        residuals = [trial.angle - each for trial, each in zip(problem.trials, at(x).expected, strict=True)]
-        count = sum(map(len, residuals))
-        noise = float(np.sqrt(sum(float(each @ each) for each in residuals) / max(1, count - len(problem.free))))
+    with threadpool_limits(limits=1, user_api="blas"):
+        while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
+            weighed = noise
+            found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST)
+            x = found.x
+            residuals = [trial.angle - each for trial, each in zip(problem.trials, at(x).expected, strict=True)]
+            count = sum(map(len, residuals))
+            noise = float(np.sqrt(sum(float(each @ each) for each in residuals) / max(1, count - len(problem.free))))
     return Fit(problem, x, noise, residuals, at(x).slopes, evaluations)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
@@ -130,7 +131,8 @@ def condition(slopes: Array) -> float:
     length = np.linalg.norm(slopes, axis=0)
     if not length.all():
         return float("inf")
-    values = np.linalg.svd(slopes / length, compute_uv=False)
+    with threadpool_limits(limits=1, user_api="blas"):
+        values = np.linalg.svd(slopes / length, compute_uv=False)
     return float(values[0] / max(values[-1], 1e-300))
 
 
