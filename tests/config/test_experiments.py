@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -148,11 +149,12 @@ def _all_mappings() -> dict[str, tuple[Mapped, KeyPath, Mapped]]:
 
 def _refusal(file: Path) -> UserError:
     """The error that keeps a command from running this study."""
+    network: Any = SimpleNamespace(run=None)
     with pytest.raises(UserError) as caught:
         study, origins = read_study([file])
         for plan in (compare.plan, simulate.plan):
             try:
-                plan(study, Inputs())
+                plan(study, Inputs({"network": network}))
             except UserError as error:
                 raise located(error, origins) from error
     return caught.value

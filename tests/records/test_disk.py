@@ -39,7 +39,7 @@ def test_whenever_the_disk_fills_the_run_fails_in_words_and_earlier_runs_stand(d
     said, states = set(), set()
     (earlier,) = list_runs(disk)
     needed = 512 + sum(file.stat().st_size for file in earlier.path.iterdir()) // 1024  # with its reserve
-    for free in (0, 40, 200, *range(needed - 32, needed + 32, 8), 1500):
+    for free in (0, 40, 200, *range(needed - 32, needed + 96, 8), 1500):
         _leave(disk, 1024 * free)
         known = {run.id for run in list_runs(disk)}
         try:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
 import wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument, Call
+from wristctl.studies.gen_data import GEN_DATA
+from wristctl.studies.in_python import carry_out, in_python
+from wristctl.studies.session import Session
 
 study, STEP = wristctl.load_study, "reference: {kind: step, angle_deg: 5.0, inverse: network}"
 CLAIM = "audit.claims=[{id: A, says: A, evidence: table1, value: 1.0, metric: r3}]"
@@ -88,8 +92,12 @@ def test_what_an_error_calls_is_there_to_be_called() -> None:
 
 def test_an_error_from_a_run_directory_keeps_the_command_lines_words_in_its_manifest(tmp_path: Path) -> None:
     """The directory is for those who repeat it at the shell."""
-    with pytest.raises(UserError) as caught:
-        wristctl.compare(study(), out=tmp_path)
+
+    def fails(_: Session) -> NoReturn:
+        raise UserError("a network is missing", "compare", Argument("network"))
+
+    with pytest.raises(UserError) as caught, in_python():
+        carry_out(replace(GEN_DATA, perform=fails), study(), {}, tmp_path, "", None)
     (run,) = tmp_path.iterdir()
     error = wristctl.open_run(run).manifest.error
     assert caught.value.fix == Argument("network").in_python and error is not None

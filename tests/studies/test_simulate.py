@@ -134,9 +134,9 @@ def test_a_plan_counts_the_rollouts() -> None:
     assert caught.value.where == "simulate.gains"
 
 
-def test_a_reference_through_a_network_needs_one(simulate: Simulate) -> None:
+def test_a_reference_through_a_network_needs_one() -> None:
     with pytest.raises(UserError, match="none is given"):
-        simulate(repeated("smc/exchanged"), "simulate.reference.inverse=network")
+        plan("simulate.reference.inverse=network")
     assert {(need.leaf, need.kind): need.optional for need in SIMULATE.needs} == {
         ("network", "train"): True, ("tuned", "tune"): True, ("from_identified", "identify"): True,
     }  # fmt: skip
