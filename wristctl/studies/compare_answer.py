@@ -34,7 +34,7 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
     cells = "motions" if found[0].loops else "worlds"
     head = [
         f"RMSE [deg], geometric mean over {cells} [95 % interval], best first; = is a tie (paired, Holm);",
-        "no place: it fails or swings (limit cycle, > 0.1 deg at rest) somewhere; no count: everywhere",
+        "no place: fails or swings (limit cycle, > 0.1 deg at rest) in some case there; without n/m: in all",
     ]
     end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 2), *wrapped(_papers_order(found), 1)]
     end.append(_WHERE)
@@ -73,7 +73,7 @@ def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
     groups, lost, bought = _groups(each, names), _lost(each, names), _buys(each, names)
     lines = wrapped(lost, room - 1 if room < 3 else room - 2, _WIDTH)
     ends = wrapped(bought, 1, _WIDTH) if len(lines) < room - 1 else []
-    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH), *lines, *ends]
+    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH, "places"), *lines, *ends]
     return [line if at == 0 else f"{_INDENT}{line}" for at, line in enumerate(lines)]
 
 
@@ -186,12 +186,12 @@ def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
     return [f"{order} holds in {len(holds)} of {len(ours)} classes{where}"]
 
 
-def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS) -> list[str]:
-    """As many of the pieces as there is room for in lines, and how many more there are."""
+def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS, rest: str = "more") -> list[str]:
+    """As many of the pieces as there is room for in lines, and how many more (places, say) there are."""
     given = [piece for piece in pieces if piece]
     for kept in range(len(given), 0, -1):
         text = "".join(f"{each} " if each.endswith(",") else f"{each}; " for each in given[:kept]).rstrip(" ,;")
-        text += f"; +{len(given) - kept} more" if kept < len(given) else ""
+        text += f"; +{len(given) - kept} {rest}" if kept < len(given) else ""
         found = textwrap.wrap(text, columns, break_long_words=False, break_on_hyphens=False)
         if len(found) <= lines:
             return [line.replace(_HELD, " ") for line in found]
