@@ -47,7 +47,7 @@ test-firmware: .venv/dev firmware
 
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
-	WRISTCTL_THOROUGH=1 $(BIN)/pytest -n auto -rP tests/identification
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -n auto --maxschedchunk 1 -rP tests/identification
 
 # Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
 test-statistics: .venv/dev
