@@ -12,7 +12,9 @@ import wristctl as face
 from tests.doors.conftest import LAW, wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import load
+from wristctl.config.load import load_study
 from wristctl.records import Run
+from wristctl.studies.adopted import adopt, adopted, adoption
 
 READS = """
 import numpy as np
@@ -86,6 +88,34 @@ def test_data_that_is_not_beside_a_law_is_refused(learned: Path, name: str, told
     (folder / "strange.py").write_text(READS.format(name=name) + LAW)
     with pytest.raises(UserError, match=told):
         load(f"{folder}/strange.py:STRANGE")
+
+
+def test_data_that_is_asked_for_only_later_is_refused_and_not_left_behind(learned: Path) -> None:
+    late = "\ndef later(name):\n    return data_file(__file__, name)\n"
+    (learned / "strange.py").write_text((learned / "strange.py").read_text() + late)
+    np.save(learned / "nets" / "more.npy", np.array([1.0]))
+    law, _ = load(f"{learned}/strange.py:STRANGE")
+    later = law.law.__globals__["later"]
+    assert later("nets/weights.npy") == learned / "nets" / "weights.npy", "which was named while it was imported"
+    with pytest.raises(UserError, match=r"more\.npy is asked for when strange.py has been imported"):
+        later("nets/more.npy")
+
+
+def test_a_worker_tells_files_of_one_name_apart(learned: Path) -> None:
+    more = READS.format(name="first/weights.npy").replace("SPRING", "FIRST")
+    (learned / "strange.py").write_text(more + (learned / "strange.py").read_text())
+    (learned / "first").mkdir()
+    np.save(learned / "first" / "weights.npy", np.array([1.0]))
+    spec = adoption(adopted(load_study([learned / "study.yaml"]), "simulate").study, "simulate")
+    assert {name for name in spec["sources"] if name.endswith("npy")} == {
+        "strange/first/weights.npy", "strange/nets/weights.npy"
+    }  # fmt: skip
+    for folder in ("first", "nets"):
+        before = (learned / folder / "weights.npy").read_bytes()
+        np.save(learned / folder / "weights.npy", np.array([4.0]))
+        with pytest.raises(UserError, match=rf"strange/{folder}/weights\.npy is another text here"):
+            adopt(spec)
+        (learned / folder / "weights.npy").write_bytes(before)
 
 
 def test_in_python_too_a_runs_code_runs_only_once_it_is_trusted(learned: Path) -> None:

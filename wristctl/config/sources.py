@@ -16,30 +16,50 @@ from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
 from importlib.util import spec_from_loader
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from wristctl.config.errors import UserError
 from wristctl.config.trust import run_around, trusted
 
 _PREFIX = "wristctl_foreign_"
-_loading: list[tuple[Path, dict[Path, str], Mapping[Path, str] | None]] = []
-"""Of what is being imported, innermost last: the root of its sources, their hashes, and the agreed ones."""
+
+
+class _Import(NamedTuple):
+    """Sources that are being imported: where they stand, the hash of each so far, and the agreed ones where one is."""
+
+    root: Path
+    seen: dict[Path, str]
+    agreed: Mapping[Path, str] | None
+
+    def note(self, file: Path, digest: str) -> None:
+        """Take a file's hash. Raises UserError where it is not the agreed one."""
+        if self.agreed is not None and self.agreed.get(file) != digest:
+            raise UserError("the code of a run changed after it was shown", str(file), "look at it again")
+        self.seen[file] = digest
+
+
+_under_way: list[_Import] = []
+"""The innermost last."""
+_imported: set[Path] = set()
 
 
 def data_file(source: str, name: str) -> Path:
     """A file beside a law that it reads while it is imported, such as a policy's weights: `data_file(__file__, NAME)`.
 
     It belongs to the law's sources then: hashed, copied into runs, shown before it is trusted. Raises UserError where
-    it is not there, lies outside the folder of the sources, or is not what was agreed to.
+    it is not there, lies outside the folder of the sources, is not what was agreed to, or is asked for only later.
     """
     file = Path(os.path.abspath(Path(source).parent / name))
     if not file.is_file():
         raise UserError(f"no file {name} beside {Path(source).name}", str(file), "paths count from the law's file")
-    if _loading:
-        root, seen, agreed = _loading[-1]
+    if _under_way:
+        root = _under_way[-1].root
         if not file.resolve().is_relative_to(root.resolve()):
             raise UserError("a law reads data from outside its folder", str(file), f"put it below {root}")
-        seen[file] = _checked(file, digest_now(file), agreed)
+        _under_way[-1].note(file, digest_now(file))
+    elif Path(source) in _imported and file not in _imported:
+        what = f"{name} is asked for when {Path(source).name} has been imported, and would not be kept with it"
+        raise UserError(what, source, "call data_file at the top of the file")
     return file
 
 
@@ -51,26 +71,18 @@ def digest_now(file: Path) -> str:
         return ""
 
 
-def _checked(file: Path, digest: str, agreed: Mapping[Path, str] | None) -> str:
-    """The hash of what is loaded, which must be the agreed one where one is."""
-    if agreed is not None and agreed.get(file) != digest:
-        raise UserError("the code of a run changed after it was shown", str(file), "look at it again")
-    return digest
-
-
 class _Source(SourceFileLoader):
-    """Loads the text of a module itself; `seen` takes the hash of each, which must be the agreed one where one is."""
+    """Loads the text of a module itself, and has its hash noted."""
 
-    def __init__(self, name: str, path: str, seen: dict[Path, str], agreed: Mapping[Path, str] | None) -> None:
+    def __init__(self, name: str, path: str, importing: _Import) -> None:
         super().__init__(name, path)
-        self._seen, self._agreed = seen, agreed
+        self._importing = importing
 
     def get_code(self, fullname: str) -> CodeType:
         """Compiled from the source, never from bytecode."""
         file = Path(self.path)
         content = file.read_bytes()
-        digest = hashlib.sha256(content).hexdigest()
-        self._seen[file] = _checked(file, digest, self._agreed)
+        self._importing.note(file, hashlib.sha256(content).hexdigest())
         code: CodeType = compile(content, self.path, "exec", dont_inherit=True)
         return code
 
@@ -78,11 +90,9 @@ class _Source(SourceFileLoader):
 class _Beside:
     """Finds the modules beside a file, before those of the same name elsewhere; the standard library comes first."""
 
-    def __init__(
-        self, folder: Path, name: str, file: Path, seen: dict[Path, str], agreed: Mapping[Path, str] | None
-    ) -> None:
-        self._folder, self._name, self._file = folder, name, file
-        self._made: Any = lambda name, path: _Source(name, path, seen, agreed)
+    def __init__(self, name: str, file: Path, importing: _Import) -> None:
+        self._folder, self._name, self._file = importing.root, name, file
+        self._made: Any = lambda name, path: _Source(name, path, importing)
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: Any = None) -> ModuleSpec | None:
         """The module's, where it stands beside the file or within a package there."""
@@ -109,27 +119,28 @@ def root_of(file: Path) -> Path:
 
 def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
     """The module of a file, imported anew, and the hashes of what it was made from. UserError where it cannot be."""
-    root, seen = root_of(file), dict[Path, str]()
-    agreed = trusted(file, root)
+    root = root_of(file)
+    importing = _Import(root, {}, trusted(file, root))
     dotted = ".".join(file.relative_to(root).with_suffix("").parts)
     where = hashlib.sha256(str(file).encode()).hexdigest()[:8]  # compiled code that is kept knows it by its name
     name = dotted if "." in dotted else f"{_PREFIX}{dotted}_{where}"
     others = _set_aside(root, name.partition(".")[0])
-    finder = _Beside(root, name, file, seen, agreed)
+    finder = _Beside(name, file, importing)
     sys.meta_path.insert(0, finder)
-    _loading.append((root, seen, agreed))
+    _under_way.append(importing)
     try:
         module = import_module(name)
     except UserError:
         raise
     except (Exception, SystemExit) as error:
         what = f"{file.name} cannot be loaded: {type(error).__name__}: {error}"
-        raise UserError(what, _place(error, seen), "mend it there; --debug shows the traceback") from error
+        raise UserError(what, _place(error, importing.seen), "mend it there; --debug shows the traceback") from error
     finally:
-        _loading.pop()
+        _under_way.pop()
         sys.meta_path.remove(finder)
         sys.modules.update(others)
-    return module, seen
+    _imported.update(importing.seen)
+    return module, importing.seen
 
 
 def _set_aside(root: Path, package: str) -> dict[str, ModuleType]:

@@ -81,11 +81,12 @@ def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
 
 
 def sources_in(study: Study) -> dict[str, str]:
-    """What is from elsewhere in a study that calls it by its own name: each source's hash, by its name and file's."""
+    """What is from elsewhere in a study that calls it by its own name: each source's hash, by its name and place."""
     found: dict[str, str] = {}
     for table, name in named_in(tuple(getattr(study, field) for field in type(study).model_fields)):
         if origin := table.origin(name):
-            found |= {f"{name}/{file.name}": digest for file, digest in origin.files.items()}
+            places = {f"{name}/{file.relative_to(origin.root)}": digest for file, digest in origin.files.items()}
+            found |= places
     return found
 
 
