@@ -110,7 +110,7 @@ def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: 
     assert (frame.loc["C", "exact_low"], frame.loc["C", "exact_high"]) == (0.4, 0.6)
     assert " ".join(line.strip() for line in done.answer[:2]) == (
         "5 claims of the paper, by what all loops agree on: 2 reproduced, 1 contradicted, 2 open. "
-        "1 more is a setting, taken over."
+        "1 setting is taken over."
     )
     assert done.answer[2] == "On exact 1 of 1 reproduced: C."
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from wristctl.studies.audit_answer import COLUMNS, LINES, answer_of
+from wristctl.studies.answer_lines import COLUMNS
+from wristctl.studies.audit_answer import LINES, answer_of
 
 LOOPS = ("exact", "sampled", "default")
 

@@ -14,7 +14,8 @@ from wristctl.comparison.class_standing import ClassStanding
 from wristctl.comparison.condition_classes import CLASSES
 from wristctl.comparison.geometric_means import geometric_mean
 from wristctl.comparison.tie_groups import standing
-from wristctl.studies.compare_answer import COLUMNS, LADDER, LINES, answer_lines, two, wrapped
+from wristctl.studies.answer_lines import COLUMNS
+from wristctl.studies.compare_answer import LADDER, LINES, answer_lines, two, wrapped
 
 ROWS = ("mrac/default", "smc/exchanged", "smc/printed", "pid/printed", "gvsc/default", "nc/default")
 RUNGS = tuple(f"{name}/default" for name in LADDER)
@@ -115,7 +116,7 @@ def test_what_does_not_fit_is_counted_and_nothing_else_is_lost() -> None:
     shown = " ".join(short).replace(";", "").split()
     assert len(short) == 2 and max(map(len, short)) <= 30
     assert shown[-2:] == [f"+{40 - len(shown[:-2])}", "more"] and shown[:-2] == words[: len(shown) - 2]
-    assert wrapped(["a b c d e f g h"], 1, 9) == ["a b c ..."]
+    assert wrapped(["a\u00a0b c d e f g h"], 1, 9) == ["a b c ..."], "held together, and shown as a blank"
 
 
 def test_whoever_swings_is_named_before_places_take_the_room() -> None:

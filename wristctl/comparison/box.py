@@ -19,6 +19,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.cores import cores
+from wristctl.lanes.types import LANES
 from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.kernel import RECORDED
@@ -27,8 +28,6 @@ from wristctl.simulation.rollout import rollout, structure
 
 CONTINUOUS = 1e-6
 """Control period that counts as none [s]."""
-_BLOCK = 8
-"""Settings that a core runs side by side, until the longest horizon among them."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,7 @@ def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
     for number in sorted(range(len(settings)), key=lambda each: settings[each].horizon):
         each = settings[number]
         groups.setdefault((*structure(each.loop), each.measured), []).append(number)
-    most = _BLOCK * cores()
+    most = LANES * cores()  # a core runs so many side by side, until the longest horizon among them
     found = [np.array(own[k : k + most]) for own in groups.values() for k in range(0, len(own), most)]
     return sorted(found, key=lambda own: -settings[own[0]].loop.control_period)
 

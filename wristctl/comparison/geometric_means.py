@@ -36,6 +36,11 @@ class GeometricMean(NamedTuple):
         return self.low <= 1.0 <= self.high
 
 
+def plain(ratio: float) -> str:
+    """A ratio to three digits, never as a power of ten: 0.347, 8.51, 8676."""
+    return f"{ratio:.3g}" if ratio < 1000.0 else f"{ratio:.0f}"
+
+
 def penalised(scores: ArrayLike, failure: float) -> Array:
     """Scores of any shape where a failure (inf or nan) counts as `failure`, and nothing counts as worse.
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from wristctl.comparison.geometric_means import GeometricMean, paired_ratio, penalised
+from wristctl.comparison.geometric_means import GeometricMean, paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import FAILURE, WorldRanking
 
 _STREAM = 20_032
@@ -35,7 +35,7 @@ class TermValue(NamedTuple):
 def _ratio(value: float) -> str:
     if not math.isfinite(value):
         return "any"
-    return f"{value:.3f}" if 0.9 <= value <= 1.1 else f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+    return f"{value:.3f}" if 0.9 <= value <= 1.1 else plain(value)
 
 
 def term_values(found: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:

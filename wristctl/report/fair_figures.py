@@ -12,6 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.comparison.geometric_means import plain
 from wristctl.comparison.term_values import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.report.style import (
@@ -59,8 +60,7 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
             place = labels.index(row.label), column
             times[place] = found.gains[at].value
             group = found.group(at)
-            shown = f"{times[place]:.0f}" if times[place] >= 1000.0 else f"{times[place]:.3g}"
-            marks[place] = f"{shown}  ({group})" if group else f"{shown}  -"
+            marks[place] = f"{plain(times[place])}  ({group})" if group else f"{plain(times[place])}  -"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
     made, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
     undress(axes)

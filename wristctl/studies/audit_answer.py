@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.studies.answer_lines import in_lines
 
 if TYPE_CHECKING:
     from wristctl.comparison.ledger import Judgement
     from wristctl.comparison.robust import Strip
 
-LINES, COLUMNS = 12, 100
+LINES = 12
 """What an answer may take of a terminal."""
 _ORDER = ("reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open")
 
@@ -25,12 +26,12 @@ class _Part(NamedTuple):
 
 
 def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list[str]:
-    """At most LINES lines of at most COLUMNS columns; `strips` are the claims over the box."""
+    """At most LINES lines; `strips` are the claims over the box."""
     claims = [j for j in judged if j.verdict is not None]
     counted = Counter(str(j.verdict) for j in claims)
     counts = ", ".join(f"{counted[each]} {each}" for each in _ORDER if counted[each])
     settings = len(judged) - len(claims)
-    beside = f" {_many(settings, 'more is a setting', 'more are settings')}, taken over." * bool(settings)
+    beside = f" {_many(settings, 'setting is', 'settings are')} taken over." * bool(settings)
     parts = [_Part(f"{_many(len(claims), 'claim')} of the paper, by what all loops agree on: {counts}.{beside}", 2)]
     for loop in dict.fromkeys(name for j in claims for name in j.found if name):
         own = {j.claim.id: j.found[loop] for j in claims if loop in j.found}
@@ -70,13 +71,13 @@ def _over_the_box(strips: Sequence[Strip]) -> list[_Part]:
 
 def _fitted(parts: Sequence[_Part], room: int) -> list[str]:
     """The lines of all parts, of which none goes for another: lists are cut, the longest first."""
-    lines = [_wrapped(*part[:2]) for part in parts]
+    lines = [in_lines(part.text, most=part.most, indent="  ") for part in parts]
     while sum(map(len, lines)) > room:
         long = [at for at, part in enumerate(parts) if part.is_list and len(lines[at]) > 1]
         if not long:
             break
         at = max(long, key=lambda each: (len(lines[each]), each))
-        lines[at] = _wrapped(parts[at].text, len(lines[at]) - 1)
+        lines[at] = in_lines(parts[at].text, most=len(lines[at]) - 1, indent="  ")
     return [line for part in lines for line in part][:room]
 
 
@@ -90,13 +91,3 @@ def _many(count: int, what: str, several: str = "") -> str:
 
 def _listed(names: Sequence[str]) -> str:
     return f": {', '.join(names)}" if names else ""
-
-
-def _wrapped(text: str, most: int = 1) -> list[str]:
-    """Lines of a text; what is beyond the last is left out, and a mark says so."""
-    lines = textwrap.wrap(text, COLUMNS, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    if len(lines) > most:
-        lines = textwrap.wrap(
-            text, COLUMNS, subsequent_indent="  ", max_lines=most, placeholder=" ...", break_on_hyphens=False
-        )
-    return lines

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from wristctl.studies.answer_lines import COLUMNS, in_lines
 from wristctl.studies.findings import Findings
 
 if TYPE_CHECKING:
     from wristctl.comparison.class_standing import ClassStanding
 
-LINES, COLUMNS = 24, 100
+LINES = 24
 """What an answer may take of a terminal."""
 LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
 """What each more of a law buys: a term is worth what it adds to the rung below."""
@@ -30,11 +30,13 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
     """At most LINES lines of at most COLUMNS columns; empty where nothing was judged."""
     if not found:
         return []
-    names = _names(found)
+    from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+    names, rest = _names(found), deg(LIMIT_CYCLE)
     cells = "motions" if found[0].loops else "worlds"
     head = [
         f"RMSE [deg], geometric mean over {cells} [95 % interval], best first; = is a tie (paired, Holm);",
-        "no place: fails or swings (limit cycle, > 0.1 deg at rest) in some case there; without n/m: in all",
+        f"no place: fails or swings (limit cycle, > {rest} deg at rest) in some case there; without n/m: in all",
     ]
     end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 2), *wrapped(_papers_order(found), 1)]
     end.append(_WHERE)
@@ -192,11 +194,12 @@ def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS, rest: str
     for kept in range(len(given), 0, -1):
         text = "".join(f"{each} " if each.endswith(",") else f"{each}; " for each in given[:kept]).rstrip(" ,;")
         text += f"; +{len(given) - kept} {rest}" if kept < len(given) else ""
-        found = textwrap.wrap(text, columns, break_long_words=False, break_on_hyphens=False)
+        found = in_lines(text, columns)
         if len(found) <= lines:
-            return [line.replace(_HELD, " ") for line in found]
-    first = given[0] if given else ""
-    return textwrap.wrap(first, columns, max_lines=max(1, lines), placeholder=" ...", break_on_hyphens=False)
+            break
+    else:
+        found = in_lines(given[0] if given else "", columns, max(1, lines))
+    return [line.replace(_HELD, " ") for line in found]
 
 
 def deg(value: float) -> str:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
+
+from wristctl.studies.answer_lines import in_lines
 
 if TYPE_CHECKING:
     from wristctl.comparison.order_shifts import OrderShift
     from wristctl.comparison.term_values import TermValue
     from wristctl.comparison.world_ranking import WorldRanking
 
-COLUMNS = 100
 PAPERS = "smc/tuned"
 """The paper's law, with gains that were searched for as those of all others."""
 
@@ -36,7 +36,7 @@ def answer(
     said += [_shift(each, varied) for each in shifts]
     lines: list[str] = []
     for each in said:
-        lines += ["", *textwrap.wrap(each, COLUMNS, break_long_words=False, break_on_hyphens=False)]
+        lines += ["", *in_lines(each)]
     return lines[1:]
 
 
@@ -48,6 +48,8 @@ def quietest(found: WorldRanking, rows: Sequence[int]) -> int:
 
 
 def _rig(found: WorldRanking) -> str:
+    from wristctl.comparison.geometric_means import plain
+
     groups = found.standing.groups
     if not groups:
         return f"run none of these.{_lost(found)}"
@@ -58,7 +60,7 @@ def _rig(found: WorldRanking) -> str:
         said += f" The lowest is {_named(found, first)}." if first != known else ""
     else:
         gain = found.gains[first]
-        times = f"{_times(gain.value)} [{_times(gain.low)}, {_times(gain.high)}]"
+        times = f"{plain(gain.value)} [{plain(gain.low)}, {plain(gain.high)}]"
         said = f"run {found.rows[first].label}: RMSE {_interval(found, first)} deg, {times} times below feedforward's"
         said += f" {_deg(found.means[known].value)}."
     if ties:
@@ -69,7 +71,7 @@ def _rig(found: WorldRanking) -> str:
     papers = next((at for at, row in enumerate(found.rows) if row.label == PAPERS and at not in best), None)
     if papers is not None:
         ratio = found.means[papers].value / found.means[first].value
-        said += f" The paper's law, tuned: {_deg(found.means[papers].value)}, {_times(ratio)} times the lowest."
+        said += f" The paper's law, tuned: {_deg(found.means[papers].value)}, {plain(ratio)} times the lowest."
     return f"{said}{_floor(found)}{_lost(found)}"
 
 
@@ -89,13 +91,15 @@ def _lost(found: WorldRanking) -> str:
 
 
 def _legend(found: WorldRanking) -> str:
+    from wristctl.simulation.oscillation import LIMIT_CYCLE
+
     sound = [share.high for share in found.standing.swings if not share.times]
     still = f", though none in {found.worlds} can be {100.0 * min(sound):.2g} %" if sound else ""
     return (
         "RMSE is the geometric mean over worlds, with its 95 % interval. A world is a wrist and a rig drawn anew, on "
         "which no gains were searched or chosen. A law is lost where the wrist leaves its range, or swings by more "
-        f"than 0.1 deg at rest; one that is lost in more than is tolerated stands nowhere{still}. Ties are with the "
-        "lowest: two of them may be told apart from each other."
+        f"than {_deg(LIMIT_CYCLE)} deg at rest; one that is lost in more than is tolerated stands nowhere{still}. "
+        "Ties are with the lowest: two of them may be told apart from each other."
     )
 
 
@@ -120,10 +124,6 @@ def _named(found: WorldRanking, at: int) -> str:
 def _interval(found: WorldRanking, at: int) -> str:
     mean = found.means[at]
     return f"{_deg(mean.value)} [{_deg(mean.low)}, {_deg(mean.high)}]"
-
-
-def _times(value: float) -> str:
-    return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
 
 
 def _deg(value: float) -> str:

@@ -49,13 +49,15 @@ def plan(study: Study, inputs: Inputs) -> str:
                 if label not in labels:
                     raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
         for name, _, way in ways_to_tune(study):
+            own = name in settings.variants and settings.variants[name].optimiser
+            places = {
+                "tune.candidates": f"budgets.{settings.budget}.candidates",
+                "tune.optimiser": f"variants.{name}.optimiser" if own else "optimiser",
+            }
             try:
                 check_optimiser(way)
             except UserError as error:
-                key = str(error.where).rpartition(".")[2]
-                place = f"variants.{name}" if name and study.study.variants[name].optimiser else ""
-                at = f"budgets.{settings.budget}.{key}" if key == "candidates" else f"{place}.{key}".lstrip(".")
-                raise error.at(at) from error
+                raise error.at(places.get(str(error.where), "optimiser")) from error
         families = {name: study.families[name] for name in families_of(study)}
         for family in families.values():
             check_size([family.loop], family.horizon)
