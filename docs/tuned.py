@@ -30,35 +30,24 @@ from wristctl.tuning.search import search, tuning_cases
 HERE = Path(__file__).parent
 EXPERIMENTS = HERE.parent / "experiments"
 TEST_WORLDS = 240
-CHANCE = 0.05 / 33.0
-"""That tuned gains which are no worse are called so: 5 % over all rows."""
+CHANCE = 0.05
+"""That any tuned gains which are no worse are called so: of each row its share (Bonferroni)."""
 CONDITIONS = {"ideal": ("default", "exchanged", "printed"), "camera": ("stepper", "camera", "default")}
 """The presets that a family is within the conditions of, the one for the hardest first; by family."""
 
 
 class Tuning(NamedTuple):
-    """What tuning did for a law on a family: its RMSE [rad] and the ratio of the preset's to it, over test worlds.
-
-    `surely` has the interval of that ratio at the level at which a row is called worse.
-    """
+    """What tuning did for a law on a family: its RMSE [rad] and the ratio of the preset's to it, over test worlds."""
 
     law: str
     preset: str
     chosen: str
     rmse: float
     ratio: GeometricMean
-    surely: GeometricMean
     swings: tuple[int, int]
     """Cases in which the tuned gains and the preset swing or fail."""
-    more: float
-    """How probable it is that one of the two swings or fails alone in so many more worlds, if neither is worse."""
-
-    @property
-    def worse(self) -> bool:
-        """Whether the tuned gains are the worse ones, beyond chance."""
-        if self.more < CHANCE and self.swings[0] != self.swings[1]:
-            return self.swings[0] > self.swings[1]
-        return self.surely.high < 1.0
+    worse: bool
+    """Whether the tuned gains are the worse ones, beyond chance."""
 
 
 def preset_of(law: Controller, family: str) -> str:
@@ -66,8 +55,8 @@ def preset_of(law: Controller, family: str) -> str:
     return next((name for name in CONDITIONS[family] if name in law.presets), "")
 
 
-def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str) -> Tuning:
-    """Tune a law, and compare on the test split."""
+def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str, chance: float) -> Tuning:
+    """Tune a law, and compare on the test split; worse is what is so beyond this chance."""
     found = search(study, law, lambda name: stream(study.seed, name), judges)
     preset = preset_of(law, family)
     gains = np.array([[found.gains[name] for name in law.gains], gains_of(law, preset)])
@@ -75,11 +64,13 @@ def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: st
     done = measure(law, gains, cases, study.wrist, ["rmse", "oscillation"])
     own, known = penalised(world_scores(done, TEST_WORLDS), FAILURE)
     bad = done.swings | done.failed
-    ratio, surely = (paired_ratio(known, own, 1, level) for level in (LEVEL, 1.0 - CHANCE))
+    ratio, surely = (paired_ratio(known, own, 1, level) for level in (LEVEL, 1.0 - chance))
     rmse = float(np.exp(np.log(own).mean()))
     swings = int(bad[0].sum()), int(bad[1].sum())
-    worlds, origin = np.any(bad.reshape(2, TEST_WORLDS, -1), axis=2), found.finalists[0].origin
-    return Tuning(law.name, preset, origin, rmse, ratio, surely, swings, chance_of(worlds[0], worlds[1]))
+    worlds = np.any(bad.reshape(2, TEST_WORLDS, -1), axis=2)
+    apart = swings[0] != swings[1] and chance_of(worlds[0], worlds[1]) < chance
+    worse = swings[0] > swings[1] if apart else surely.high < 1.0
+    return Tuning(law.name, preset, found.finalists[0].origin, rmse, ratio, swings, worse)
 
 
 def chance_of(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
@@ -88,19 +79,22 @@ def chance_of(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
     return float(binomtest(alone[0], sum(alone)).pvalue) if sum(alone) else 1.0
 
 
-def lines_of(family: str) -> tuple[list[str], list[str]]:
-    """The table of a family, and the laws whose tuned gains are worse."""
+def study_of(family: str) -> Study:
+    """The study that tunes all laws on a family, but for those without a preset for it."""
     study = load_study([EXPERIMENTS / "scenarios" / f"{family}.yaml", EXPERIMENTS / "rivals.yaml"])
     budget = study.compare.tuning
     assert budget is not None
-    given = budget.model_copy(update={"worlds": budget.worlds.model_copy(update={"family": family})})
-    study = study.model_copy(update={"tune": given})
+    laws = tuple(name for name in budget.controllers if preset_of(controller(name), family))
+    asked = {"worlds": budget.worlds.model_copy(update={"family": family}), "controllers": laws}
+    return study.model_copy(update={"tune": budget.model_copy(update=asked)})
+
+
+def lines_of(study: Study, family: str, chance: float) -> tuple[list[str], list[str]]:
+    """The table of a family, and the laws whose tuned gains are worse."""
+    given = study.tune
     searched, chosen = tuning_cases(study)
     judges = Judge(searched, study.wrist, given.objective), Judge(chosen, study.wrist, given.objective)
-    rows = []
-    for law in map(controller, given.controllers):
-        if preset_of(law, family):
-            rows.append(tuned(study, law, judges, family))
+    rows = [tuned(study, controller(name), judges, family, chance) for name in given.controllers]
     rows.sort(key=lambda each: each.rmse)
     table = [
         f"| {each.law} | {np.degrees(each.rmse):.3f} | {each.chosen} | {each.preset} | {each.ratio.value:.2f} "
@@ -120,7 +114,9 @@ _HEAD = [
 
 def main() -> None:
     """Tune, compare, write the page."""
-    both = [lines_of(family) for family in CONDITIONS]
+    studies = {family: study_of(family) for family in CONDITIONS}
+    chance = CHANCE / sum(len(each.tune.controllers) for each in studies.values())
+    both = [lines_of(study, family, chance) for family, study in studies.items()]
     worse = [name for _, names in both for name in names]
     said = f"Worse: {', '.join(worse)}." if worse else "None is worse than its preset beyond chance."
     begin = [

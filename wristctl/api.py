@@ -92,7 +92,7 @@ def tune(
     network that is missing.
 
     Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` as above.
+    `progress` are as in `gen_data`.
     """
     given = {"network": network, "from_identified": from_identified}
     return carry_out(TUNE, study, given, out, label, progress, executor)
@@ -113,7 +113,7 @@ def compare(
     controllers that would be judged on what they were tuned on.
 
     Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` as above.
+    `progress` are as in `gen_data`.
     """
     return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress, executor)
 
@@ -148,7 +148,7 @@ def simulate(
     or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
     Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` as above.
+    `progress` are as in `gen_data`.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return carry_out(SIMULATE, study, given, out, label, progress, executor)
@@ -164,7 +164,7 @@ def analyse(
 
     `network`, `tuned` and `from_identified` are as in `simulate`. The result has `.answer`, `.found` about each of
     `.angles`, `.locus`, `.portrait`; `.frame()` is a row per angle. Raises UserError as `simulate` does, and where the
-    loop cannot rest. `out`, `label` and `progress` as above.
+    loop cannot rest. `out`, `label` and `progress` are as in `gen_data`.
     """
     inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return carry_out(ANALYSE, study, inputs, out, label, progress)
@@ -178,7 +178,7 @@ def hysteresis(
 
     The result has `.loops`, `.dead_bands` and, of a measured loop, `.fit` (coefficient, sheath and presliding with 95 %
     intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
-    and for a measured file that is none, with its line. `out`, `label` and `progress` as above.
+    and for a measured file that is none, with its line. `out`, `label`, `progress`: as `gen_data`.
     """
     return carry_out(HYSTERESIS, study, {}, out, label, progress)
 
