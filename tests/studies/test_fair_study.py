@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import wristctl
@@ -34,7 +35,10 @@ study:
   laws: [pd-ff, pid-ff]
   presets: [{controller: feedforward}]
   terms: {feedback: [feedforward/default, pd-ff/tuned], an integral: [pd-ff/tuned, pid-ff/tuned]}
-  variants: {RMSE alone: {objective: {steady_state: 0.0, worst: 0.0}}}
+  variants:
+    RMSE alone: {objective: {steady_state: 0.0, worst: 0.0}}
+    random: {optimiser: random}
+    random again: {optimiser: random, beside: random}
   budgets: {small: {candidates: 4, iterations: 2, finalists: 2, draws: 2, validation: 2, worlds: 10, noises: 2}}
 """
 
@@ -71,6 +75,7 @@ def test_its_answer_names_the_rig_a_law_with_its_interval_and_what_each_term_buy
     assert "an integral (pd-ff/tuned -> pid-ff/tuned): rig " in result
     assert result.count("run p") == 1, "said once"
     assert "Tuned otherwise on rig (RMSE alone)" in result
+    assert "(random): " in result and "(random again beside random): " in result
     assert str(done).startswith("rig (a rig in small): run p"), "the terminal begins with it too"
 
 
@@ -80,6 +85,13 @@ def test_feedback_is_worth_what_the_worlds_say(done: Studied) -> None:
     (feedback,) = [each for each in done.terms if each.term == "feedback"]
     ratio = np.exp(np.mean(np.log(errors["feedforward/default"] / errors["pd-ff/tuned"])))
     assert feedback.times.value == pytest.approx(ratio) and feedback.times.low > 1.0
+
+
+def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
+    """The same search twice finds the same gains: nothing turns round, and no RMSE changes."""
+    table = pd.read_csv(run_of(done).path / "data" / "sensitivity.csv", comment="#").set_index("variant")
+    assert list(table.loc["random again beside random", ["tau", "reversed", "ratio"]]) == [1.0, 0, 1.0]
+    assert table.loc["random", "ratio"] != 1.0, "another search finds other gains"
 
 
 def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
@@ -154,6 +166,8 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
         ("study.presets=[{controller: smc, gains: tuned}]", r"no tuned gains of smc - study.presets.0"),
         ("study.terms={x: [pd-ff/tuned, pid-ff/tunes]}", r"no row 'pid-ff/tunes' is judged - study.terms.x - fix: did"),
         ("study.variants={x: {optimiser: psoo}}", r"unknown optimiser 'psoo'.*did you mean 'pso'"),
+        ("study.variants={x: {beside: y}, z: {}}", r"x beside 'y': one of RMSE alone, random, random again, z - "),
+        ("study.variants={x: {beside: x}}", r"x beside 'x': one of RMSE alone, random, random again - "),
         ("study.budgets.small.candidates=2", r"at least 3 candidates, not 2 - study.budgets.small.candidates - fix"),
     ],
 )  # fmt: skip

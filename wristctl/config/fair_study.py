@@ -29,6 +29,7 @@ class StudyVariant(Section):
     optimiser: str = choice("", "another optimiser; empty: the study's")
     objective: Objective | None = choice(None, "another objective; null: the study's")
     share: float = choice(1.0, "of the study's iterations", gt=0, le=10)
+    beside: str = choice("", "the variant that it is held against; empty: the study's own way")
 
     @model_validator(mode="after")
     def _a_known_optimiser(self) -> Self:
@@ -62,4 +63,12 @@ class FairStudySettings(Section):
         twice = sorted({each for each in self.laws if self.laws.count(each) > 1})
         if twice:
             raise ValueError(f"{twice[0]} is among the laws twice")
+        return self
+
+    @model_validator(mode="after")
+    def _held_against_another(self) -> Self:
+        for name, variant in self.variants.items():
+            others = sorted(self.variants.keys() - {name})
+            if variant.beside and variant.beside not in others:
+                raise ValueError(f"{name} beside '{variant.beside}': one of {', '.join(others) or 'no other'}")
         return self

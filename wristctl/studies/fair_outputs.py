@@ -70,16 +70,17 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
     from wristctl.comparison.order_shifts import order_shift
 
     found = []
-    for variant in study.study.variants:
+    for variant, way in study.study.variants.items():
         after = {place: each for place, each in judged.items() if place.variant == variant}
-        before = {place: judged.get(place._replace(variant=BASE)) for place in after}
+        before = {place: judged.get(place._replace(variant=way.beside or BASE)) for place in after}
         pairs = [(place, known, after[place]) for place, known in before.items() if known is not None]
         rows = [
             [row_of(place.label, pieces, noises=1) for place, pieces in side]
             for side in ([(p, b) for p, b, _ in pairs], [(p, a) for p, _, a in pairs])
         ]
         if pairs:
-            found.append(order_shift(variant, *rows))
+            name = f"{variant} beside {way.beside}" if way.beside else variant
+            found.append(order_shift(name, *rows))
     return found
 
 
