@@ -12,7 +12,7 @@ import pytest
 from tests.cli.conftest import Call
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.records import list_runs
-from wristctl.trial import rig_facts, testbeds
+from wristctl.trial import rig_facts, rig_strokes, testbeds
 
 SLOW_CAMERA = (
     "--set",
@@ -36,7 +36,8 @@ def _milliseconds(out: str, name: str) -> float:
 
 
 def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rig_facts, "COUNT", 8)
+    monkeypatch.setattr(rig_strokes, "COUNT", 8)
+    monkeypatch.setattr(rig_strokes, "MOST", 8)
     odd = ("--set", "bench.line.latency_timer=0.016")
     command = ("hw", "check", "--rig", "--port", "emulated", "--yes", *SLOW_CAMERA, *odd)
     code, out, err = call(*command)

@@ -18,7 +18,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 
-_DECODED = 1.5e-3
+_DECODED = 2.5e-3
 """Seconds that a viewer of the stream takes to read and decode a picture: a part of the camera's delay."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +15,8 @@ from wristctl.board.messages import LAYOUTS, Command, Rate
 from wristctl.board.usb_adapter import latency_timer, shorter
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.camera_pace import FIX, CameraPace
-from wristctl.trial.rig_strokes import COUNT, RigStrokes
-from wristctl.trial.step_latency import Latency, find_latency
+from wristctl.trial.rig_strokes import RigStrokes
+from wristctl.trial.step_latency import Latency, MotorStroke, find_latency
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
 from wristctl.trial.tick_timing import SCHEDULING
@@ -30,6 +30,8 @@ _TRIPS, _WATCHED, _SLEPT = 100, 2.0, 1.0
 _SLOW_CAMERA, _UNEVEN, _UNSTAMPED, _WOKEN = 0.9, 0.3, 5e-3, 0.2
 """What is worth a word: share of the expected pictures, scatter over their interval, seconds of age that stamps do not
 tell, share of a period by which one tick in a hundred begins late."""
+_SURE = 0.7e-3
+"""Standard deviation [s] of a camera's age that is enough: two of them, and 0.6 ms that are not noise, are 2 ms."""
 _SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
 """Of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's."""
 
@@ -87,10 +89,15 @@ def measure(
     usable = pace.verdicts[SightingVerdict.OK] > 0
     latency = None
     if axis is not None and usable:
-        latency = find_latency(RigStrokes(board, tracking, settings, axis).strokes(COUNT, told))
+        made = RigStrokes(board, tracking, settings, axis).strokes(_sure, told)
+        latency = find_latency(made)
     quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
     noise = float(np.std(angles)) if len(angles) > 2 else math.nan
     return RigFacts(trips, timer, pace, quality, noise, woken, latency)
+
+
+def _sure(made: Sequence[MotorStroke]) -> bool:
+    return find_latency(made).sd < _SURE
 
 
 def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,14 +12,18 @@ from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
 from wristctl.config.hw_run import RigSettings
 from wristctl.trial.patience import Patience
 from wristctl.trial.prepare import prepare
+from wristctl.trial.ramped_move import RampedMove
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.step_latency import MotorStroke
 from wristctl.trial.tracking import Tracking
 
-COUNT = 24
-_STROKE, _SPEED = 1e-3, 15e-3
-"""Tendon [m] reeled in by a stroke, about 4 deg of bend; how fast [m/s]."""
+COUNT, MOST = 24, 96
+"""Strokes after which it is asked whether they are enough; that are made at most."""
+_STROKE, _SPEED = math.radians(4.0), 40e-3
+"""Bend [rad] that a stroke makes; how fast the tendon is reeled in at most [m/s]."""
+_SAMPLED = 1e-3
+"""Seconds between two points of a stroke's course."""
 _TAKEN_UP, _FURTHEST = math.radians(1.0), math.radians(12.0)
 """Bend [rad] at which the tendon counts as taut; at which strokes end."""
 _MOVE, _REST = 0.12e-3, 0.15
@@ -43,22 +47,28 @@ class RigStrokes:
     ) -> None:
         self._furthest, self._taut = furthest, min(_TAKEN_UP, 0.5 * furthest)
         self._board, self._tracking, self._axis = board, tracking, axis
-        self._step, self._slack = spools_of(settings.actuator).step, settings.homing.slack
+        spools = spools_of(settings.actuator)
+        self._step, self._acceleration, self._slack = spools.step, spools.acceleration, settings.homing.slack
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
         prepare(board, settings.model_copy(update={"safety": patient}))
         board.home()
         self._straight = Patience(board).angle(tracking, 10)
 
-    def strokes(self, count: int = COUNT, told: Callable[[int], None] = lambda done: None) -> list[MotorStroke]:
-        """Do so many; the tendon is slack again in the end. Raises SafetyStop, BoardError and CameraError."""
-        low, _ = self.taken_up()
-        high = low + round(math.copysign(_STROKE / self._step, low))
-        found, rng = [], np.random.default_rng(0)
-        for k in range(count):
+    def strokes(
+        self, enough: Callable[[Sequence[MotorStroke]], bool], told: Callable[[int], None] = lambda done: None
+    ) -> list[MotorStroke]:
+        """Do COUNT, and so many more until they are enough, MOST in all; the tendon is slack again in the end.
+
+        Raises SafetyStop, BoardError and CameraError.
+        """
+        low, bent = self.taken_up()
+        high, _ = self._crept(low, 1 if low > 0 else -1, abs(bent) + _STROKE)
+        found, rng = list[MotorStroke](), np.random.default_rng(0)
+        while len(found) < MOST and (len(found) % COUNT or not found or not enough(found)):
             self._watch(low, JOG_RATE, _BACK)
             # at random, so that strokes begin anywhere between two pictures
             found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
-            told(k + 1)
+            told(len(found))
         self.let_go()
         return found
 
@@ -71,15 +81,22 @@ class RigStrokes:
 
         The position's sign is the motor's sense. Raises SafetyStop where the tendon bends nothing.
         """
-        move = max(1, round(_MOVE / self._step))
         for sense in (1, -1):
-            for reeled in range(move, round(self._slack / self._step) + move, move):
-                self._watch(sense * reeled, JOG_RATE, _REST)
-                if abs(bend := self._bend()) > self._taut:
-                    return sense * reeled, bend
+            position, bend = self._crept(0, sense, self._taut)
+            if abs(bend) > self._taut:
+                return position, bend
             self._watch(0, JOG_RATE, _REST)
         what = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
         raise SafetyStop(what, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
+
+    def _crept(self, begin: int, sense: int, wanted: float) -> tuple[int, float]:
+        """Where [steps] a slow reeling in from `begin` has bent the wrist so far [rad], or has used up the slack."""
+        move, bend = max(1, round(_MOVE / self._step)), 0.0
+        for reeled in range(move, round(self._slack / self._step) + move, move):
+            self._watch(begin + sense * reeled, JOG_RATE, _REST)
+            if abs(bend := self._bend()) > wanted:
+                break
+        return begin + sense * reeled, bend
 
     def _bend(self) -> float:
         bend = Patience(self._board).angle(self._tracking, 3) - self._straight
@@ -89,8 +106,12 @@ class RigStrokes:
         return bend
 
     def _stroke(self, low: int, high: int, before: float) -> MotorStroke:
-        rest, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(_SPEED / self._step), _AFTER)
-        (time, position), (stamped, angle) = (np.concatenate([rest[k], moved[k]]).T for k in range(2))
+        move = RampedMove(high - low, round(_SPEED / self._step), self._acceleration)
+        rest, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
+        stamped, angle = np.concatenate([rest[1], moved[1]]).T
+        time = np.arange(rest[0][0, 0], moved[0][-1, 0], _SAMPLED)
+        answered, steps = moved[0].T
+        position = low + move.course(time - move.began(answered, steps - low))
         if len(angle) and np.abs(angle - self._straight).max() > self._furthest:
             raise SafetyStop(f"a stroke of axis {self._axis} bends the wrist too far", fix="slacken all tendons")
         return MotorStroke(time, position, stamped, angle)
@@ -102,11 +123,12 @@ class RigStrokes:
         board.send(Target((one, two, three, four), (rate,) * 4))
         fed = clock.now()
         end, positions, angles = fed + seconds, [], []
-        status = board.read()
-        while (now := clock.now()) < end or Flag.MOVING in status.flags:
+        moving = True
+        while (now := clock.now()) < end or moving:
             status = board.read()
             if status.state is not State.ENABLED:
                 raise board.faulted(status)
+            moving = Flag.MOVING in status.flags
             positions.append((now + _UNDERWAY, status.position[self._axis]))
             if now - fed > 0.2 * _SILENCE:
                 board.ping()
