@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binomtest
 
 from wristctl.arrays import Array
 from wristctl.comparison.order_shifts import order_shift
@@ -60,6 +61,21 @@ def test_laws_that_cannot_be_told_apart_are_named_with_their_errors_and_which_is
 def test_where_no_law_beats_feedforward_that_is_said() -> None:
     text = said(row("a/tuned", 4.0, 0.3), row("bb/tuned", 4.4))
     assert "run feedforward, " in text and "no law is told apart from it for the better" in text
+
+
+def test_what_is_told_apart_as_a_rule_is_so_when_twice_as_large_and_is_not_when_a_third() -> None:
+    found = re.search(r"differences of ([\d.]+) % or more", said(row("a/tuned", 1.0, 0.2), row("bb/tuned", 1.0, 0.2)))
+    assert found
+    floor = float(found[1]) / 100.0
+    for factor, told in ((2.0, "Told apart, the nearest: bb/tuned"), (1.0 / 3.0, "Not told apart from it: bb/tuned")):
+        assert told in said(row("a/tuned", 1.0, 0.2), row("bb/tuned", 1.0 + factor * floor, 0.2))
+
+
+def test_how_many_swings_none_in_so_many_worlds_leaves_possible_is_said() -> None:
+    """0 of n: the upper end of a two-sided 95 % interval for a share, 3.7/n or a little less."""
+    found = re.search(r"though none in 40 can be ([\d.]+) %", said(row("a/tuned", 1.0), row("bb/tuned", 1.0, swings=9)))
+    exact = 100.0 * binomtest(0, WORLDS).proportion_ci(0.95).high
+    assert found and float(found[1]) == pytest.approx(exact, rel=0.05)
 
 
 def test_what_the_papers_law_comes_to_is_said() -> None:
