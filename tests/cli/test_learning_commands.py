@@ -35,7 +35,8 @@ def test_gen_data_leaves_samples_that_read_back_exactly(call: Call) -> None:
     assert len(table) == 200 and table[["x", "y"]].to_numpy().tobytes() == arrays["tip"].tobytes()
     assert run.metrics["exact_inverse_max_error_deg"]["value"] < 1e-13
     assert run.metrics["theta_max_deg"]["value"] == pytest.approx(50.0, abs=1.0)
-    assert {"coverage.png", "coverage.svg"} == {file.name for file in (run.path / "figures").iterdir()}
+    names = {f"{name}.{kind}" for name in ("coverage", "workspace") for kind in ("png", "svg")}
+    assert names == {file.name for file in (run.path / "figures").iterdir()}
 
 
 @pytest.fixture(scope="module")

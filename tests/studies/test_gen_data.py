@@ -85,7 +85,7 @@ def test_ranges_are_told_in_deg_mm_and_kg(generate: Generate) -> None:
         ("deg", "lower", 4),
         ("", "", 4),
     ]
-    assert list(done.figures) == ["coverage"]
+    assert list(done.figures) == ["coverage", "workspace"]
 
 
 def test_samples_without_other_inputs_name_none(generate: Generate) -> None:

@@ -76,6 +76,7 @@ def gen_data(session: Session) -> Generated:
     from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE
     from wristctl.report.learning_figures import coverage
     from wristctl.report.learning_tables import MEANING, UNITS, samples_table
+    from wristctl.report.workspace_figure import workspace
     from wristctl.wrist.kinematics import exact_angle
 
     findings = session.findings
@@ -92,6 +93,7 @@ def gen_data(session: Session) -> Generated:
             findings.table("data/samples.csv", table, UNITS, MEANING)
         findings.arrays("data/samples.npz", samples.arrays())
         findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
+        findings.figure("workspace", workspace, session.study.wrist)
 
     findings.metric("samples", count, meaning="number of samples")
     for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
