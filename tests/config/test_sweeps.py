@@ -64,7 +64,7 @@ def test_a_point_changes_its_leaf_and_nothing_else(key: str, value: object, unit
     (axis,) = axes_of(study, "simulate")
     at = study_at(study, [axis], [value])
     known = load_study(None or [], [f"{key}={value}"], "simulate")
-    assert at.model_copy(update={"sweep": ()}) == known and unit_at(study, axis) == unit
+    assert at.model_copy(update={"sweep": ()}) == known and unit_at(study, axis.path) == unit
 
 
 def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None:

@@ -93,11 +93,11 @@ def study_at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any]) -> 
     return study
 
 
-def unit_at(study: Study, axis: SweepAxis) -> str:
-    """The unit of a leaf; 1 where it has none."""
-    section: Any = study
+def unit_at(begin: Section, path: Sequence[str]) -> str:
+    """The unit of the leaf on this path from a section; 1 where it has none."""
+    section: Any = begin
     field = None
-    for part in axis.path:
+    for part in path:
         if not isinstance(section, Section):
             return "1"
         field = keys_of(type(section)).get(part)

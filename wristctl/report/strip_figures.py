@@ -24,7 +24,7 @@ _FURTHEST = 1e4
 
 def shares(found: Sequence[Strip], heading: str = "") -> Figure:
     """For each claim the shares of drawn settings with each verdict; beside it the unknown that decides it most."""
-    made, axes = figure(width=1.2 * WIDTH, height=1.2 + 0.24 * len(found))
+    made, axes = figure(width=1.2 * WIDTH, height=max(2.6, 1.2 + 0.24 * len(found)))
     panel = axes[0, 0]
     places = np.arange(len(found))[::-1]
     left = np.zeros(len(found))

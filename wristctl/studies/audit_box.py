@@ -15,8 +15,9 @@ def judged_in_box(session: Session) -> list[Strip]:
     """Every claim that draws can judge; none where the study names no unknowns."""
     from wristctl.comparison.box import continuous_settings, drawn_settings, react
     from wristctl.comparison.robust import draws_frame, rows_in_box, strips, strips_frame
+    from wristctl.config.sweeps import unit_at
     from wristctl.control.table import CONTROLLERS
-    from wristctl.report.strip_figures import shares
+    from wristctl.report.strip_figures import shares, strip
 
     study, findings, box = session.study, session.findings, session.study.audit.box
     claims = [claim for claim in study.audit.claims if claim.controller is None or claim.controller in CONTROLLERS]
@@ -36,6 +37,13 @@ def judged_in_box(session: Session) -> list[Strip]:
     own = [each for each in found if not each.claim.unspecified or each.claim.evidence == "symmetry"]
     heading = "In which of the settings that the paper may have had its claims hold"
     findings.figure("box", shares, own or found, heading)
+    for each in found:
+        if each.leaves:
+            name = each.leaves[0].name
+            within = study if name.startswith("wrist.") else study.simulate
+            unit = unit_at(within, name.split("."))
+            shown = "" if unit == "1" else unit
+            findings.figure(f"strip-{each.claim.id}", strip, each, drawn.values(name), shown, later=True)
     return found
 
 

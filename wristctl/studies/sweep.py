@@ -148,7 +148,7 @@ def _swept(session: Session, command: str) -> Swept:
     table = pd.concat([pd.DataFrame(keys), table], axis=1)
     metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until"}]
     findings.table(
-        "data/sweep.csv", table, {axis.key: unit_at(base, axis) for axis in axes} | _units(metrics, known_units)
+        "data/sweep.csv", table, {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
     )
     known = [name for name in metrics if table[name].notna().any()]
     said = [*(name for name in _FIRST if name in known), *(name for name in known if name not in _FIRST)][:_SAID]
@@ -156,7 +156,7 @@ def _swept(session: Session, command: str) -> Swept:
     with session.progress("drawing"):
         for axis in axes:
             others = [each.key for each in axes if each is not axis]
-            figure_units = {axis.key: unit_at(base, axis)} | _units(said, known_units)
+            figure_units = {axis.key: unit_at(base, axis.path)} | _units(said, known_units)
             findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, said, figure_units)
     title = _answer(command, table, axes, said, _units(said, known_units))
     findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
