@@ -62,8 +62,8 @@ def check_rig(
 
 def _agreed(axis: int, meanwhile: Any) -> bool:
     what = (
-        f"To see how old pictures are, axis {axis} will take its tendon up until the wrist bends by 1 deg\n"
-        "and bend it by 4 deg more, 24 to 96 times. All other tendons slack, emergency stop within reach."
+        f"To see how old pictures are, axis {axis} will take its tendon up until the wrist bends by 3 deg\n"
+        "and bend it to 6 deg, 24 to 96 times. All other tendons slack, emergency stop within reach."
     )
     typer.echo(what, err=True)
     typer.echo("Type yes to let it move, anything else to measure without: ", nl=False, err=True)

@@ -19,7 +19,6 @@ from wristctl.report.style import (
     BLACK,
     BLUE,
     GREY,
-    LIGHT,
     SILVER,
     VERMILLION,
     colour,
@@ -69,14 +68,15 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     dark = drawn.to_rgba(times)[..., :3] @ np.array([0.299, 0.587, 0.114]) < 0.5
     for y, at in enumerate(order):
         for x in range(len(rankings)):
-            ink = ("white" if dark[at, x] else BLACK) if "(" in marks[at, x] else LIGHT if dark[at, x] else GREY
+            weight, slant = "bold" if "(1)" in marks[at, x] else None, None if "(" in marks[at, x] else "italic"
             axes.text(x + 0.5, y + 0.5, marks[at, x], ha="center", va="center", fontsize=8.5,
-                      color=ink, fontweight="bold" if "(1)" in marks[at, x] else None)  # fmt: skip
+                      color="white" if dark[at, x] else BLACK, fontweight=weight, fontstyle=slant)  # fmt: skip
     axes.set_xticks(np.arange(len(rankings)) + 0.5, list(rankings))
     axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[at] for at in order])
     axes.invert_yaxis()
     axes.xaxis.tick_top()
-    made.suptitle("How many times less error than feedforward; (group of ties), - fails or swings", fontsize=10.0)
+    heading = "How many times less error than feedforward; (group of ties); - and slanted: fails or swings"
+    made.suptitle(heading, fontsize=10.0)
     return made
 
 

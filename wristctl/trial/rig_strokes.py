@@ -20,16 +20,19 @@ from wristctl.trial.tracking import Tracking
 
 COUNT, MOST = 24, 96
 """Strokes after which it is asked whether they are enough; that are made at most."""
-_STROKE, _SPEED = math.radians(4.0), 40e-3
-"""Bend [rad] that a stroke makes; how fast the tendon is reeled in at most [m/s]."""
+_BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(3.0), math.radians(6.0), 6e-3, 40e-3
+"""Bend [rad] between which strokes go, the tendon taut at both ends; how much of it [m] they reel in at most, and how
+fast [m/s]."""
 _SAMPLED = 1e-3
 """Seconds between two points of a stroke's course."""
 _TAKEN_UP, _FURTHEST = math.radians(1.0), math.radians(12.0)
 """Bend [rad] at which the tendon counts as taut; at which strokes end."""
 _MOVE, _REST = 0.12e-3, 0.15
 """Tendon [m] taken up by one move, and the pause [s] after it."""
-_BEFORE, _AFTER, _BACK = 0.15, 0.35, 0.6
-"""Seconds for which a stroke is watched before and after it begins; then for the way back."""
+_BEFORE, _AFTER, _BACK, _SETTLED = 0.15, 0.35, 0.4, 0.3
+"""Seconds for which a stroke is watched before and after it begins; for the way back, and up to where it begins."""
+_BELOW = 0.8e-3
+"""Tendon [m] by which the way back goes further."""
 _SILENCE = 0.5
 """Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer."""
 _UNDERWAY = 0.5e-3
@@ -61,11 +64,14 @@ class RigStrokes:
 
         Raises SafetyStop, BoardError and CameraError.
         """
-        low, bent = self.taken_up()
-        high, _ = self._crept(low, 1 if low > 0 else -1, abs(bent) + _STROKE)
+        taut, _ = self.taken_up()
+        sense = 1 if taut > 0 else -1
+        low, _ = self._crept(taut, sense, _BEGUN, _LONGEST)
+        high, _ = self._crept(low, sense, _ENDED, _LONGEST)
         found, rng = list[MotorStroke](), np.random.default_rng(0)
         while len(found) < MOST and (len(found) % COUNT or not found or not enough(found)):
-            self._watch(low, JOG_RATE, _BACK)
+            self._watch(low - sense * round(_BELOW / self._step), JOG_RATE, _BACK)
+            self._watch(low, JOG_RATE, _SETTLED)  # from below: friction is to hold back already when the stroke begins
             # at random, so that strokes begin anywhere between two pictures
             found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
             told(len(found))
@@ -82,17 +88,17 @@ class RigStrokes:
         The position's sign is the motor's sense. Raises SafetyStop where the tendon bends nothing.
         """
         for sense in (1, -1):
-            position, bend = self._crept(0, sense, self._taut)
+            position, bend = self._crept(0, sense, self._taut, self._slack)
             if abs(bend) > self._taut:
                 return position, bend
             self._watch(0, JOG_RATE, _REST)
         what = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
         raise SafetyStop(what, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
 
-    def _crept(self, begin: int, sense: int, wanted: float) -> tuple[int, float]:
-        """Where [steps] a slow reeling in from `begin` has bent the wrist so far [rad], or has used up the slack."""
+    def _crept(self, begin: int, sense: int, wanted: float, most: float) -> tuple[int, float]:
+        """Where [steps] slowly reeling in `most` [m] at most, from `begin`, has bent the wrist so far [rad]."""
         move, bend = max(1, round(_MOVE / self._step)), 0.0
-        for reeled in range(move, round(self._slack / self._step) + move, move):
+        for reeled in range(move, round(most / self._step) + move, move):
             self._watch(begin + sense * reeled, JOG_RATE, _REST)
             if abs(bend := self._bend()) > wanted:
                 break

@@ -159,10 +159,6 @@ def serve(
         before, there = there, line.wait(_QUANTUM if there else _IDLE_QUANTUM)
         if there and not before:
             chip.reset()
-        if there and chip.bytes_coming < _ON_THE_WAY:
-            chip.write(line.receive())
-        elif there:
-            time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
         try:
@@ -170,6 +166,10 @@ def serve(
         except Halted as crash:
             log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
             chip.reset()
+        if there and chip.bytes_coming < _ON_THE_WAY:
+            chip.write(line.receive())  # now that its clock is at the time at which they came
+        elif there:
+            time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
         if data := chip.read():
             line.send(data)
         watch(chip.events(), start)
