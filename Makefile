@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-rig test-statistics worlds clean venv mutants coverage
+	test-rig test-statistics worlds clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -67,6 +67,10 @@ test-faults: .venv/dev
 # link and camera found out, hostile bytes. Alone: beside other work they end as skipped.
 test-rig: .venv/dev
 	WRISTCTL_RIG=1 $(BIN)/pytest -s -rs tests/rig
+
+# The built wheel in an environment of its own and an empty folder: `make installed WITH=python3.13`, `OLDEST=--lowest`.
+installed: .venv/dev
+	$(BIN)/python benchmarks/installed.py $(WITH) $(OLDEST)
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers

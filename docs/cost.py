@@ -134,7 +134,8 @@ def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
         "", "## The full study", "",
         f"`--budget full`: {plan(study, Inputs())}.", "",
         f"By the costs above {searched / 60.0:.0f} core-minutes of searches and",
-        f"{judged / 60.0:.0f} of judgements: {minutes:.0f} minutes on {CORES} cores, an estimate and not a run.",
+        f"{judged / 60.0:.0f} of judgements: {minutes:.0f} minutes on {CORES} cores, an estimate.",
+        "A run of it: [study](study.md).",
     ]  # fmt: skip
 
 

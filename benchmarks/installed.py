@@ -1,0 +1,109 @@
+"""Does the built wheel work elsewhere? `make installed WITH=python3.13`, with `OLDEST=--lowest` at the oldest versions.
+
+Builds the wheel, installs it into an environment of its own, and tries the commands of the README there, in an empty
+folder: no clone and no git. Where pip has no CPU build of torch for this Python, torch is left out and so is `train`.
+Prints a line a command, and ends with 1 where one failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+TORCH = re.compile(r"torch(?![-\w])")
+COMMANDS = (
+    "--version",
+    "init study",
+    "gen-data quick",
+    "train quick --data latest:gen-data --set epochs=5",
+    "tune quick",
+    "compare quick --tuned latest:tune",
+    "simulate --controller smc --gains exchanged",
+    "analyse --controller gvsc --gains default",
+    "study fair_study --executor processes",
+    "audit claims",
+    "hysteresis hysteresis",
+    "hw-run --set directions=[ulnar] --set push.force=0",
+    "identify latest:hw-run --dry-run",
+    "new controller own",
+    "check-law own.py",
+    "simulate --controller own.py",
+    "export-model latest:hw-run --to mujoco --dry-run",
+    "runs verify",
+    "runs replay latest:simulate",
+    "runs pack latest:compare",
+)
+"""In their order; each ends with 0."""
+
+
+def lowest(requirements: list[str]) -> list[str]:
+    """Each requirement at the oldest version that it allows."""
+    return [re.sub(r">=([\d.]+).*", r"==\1", each) for each in requirements]
+
+
+def environment(folder: Path, python: str, oldest: bool) -> tuple[Path, bool]:
+    """The environment's folder of commands, and whether torch is there."""
+    subprocess.run([python, "-m", "venv", folder / "env"], check=True)
+    commands = folder / "env" / "bin"
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = folder.glob("*.whl")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = [each for each in project["dependencies"] if not TORCH.match(each)]
+    pip = [str(commands / "pip"), "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, *(lowest(wanted) if oldest else wanted)], check=True)
+    pins = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    (pinned,) = [each for each in pins if TORCH.match(each)]
+    dry = [*pip, "--only-binary=:all:", "--no-deps", "--dry-run", f"{pinned}+cpu"]
+    if with_torch := subprocess.run(dry, capture_output=True).returncode == 0:
+        subprocess.run([*pip, f"{pinned}+cpu"], check=True)
+    subprocess.run([*pip, "--no-deps", str(wheel)], check=True)
+    return commands, with_torch
+
+
+def tried(commands: Path, folder: Path, command: str) -> str:
+    """Why a command failed; empty where it did not."""
+    own = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    typed = [str(commands / "wristctl"), *command.split()]
+    done = subprocess.run(typed, cwd=folder, env=own, capture_output=True, text=True)
+    return "" if done.returncode == 0 else f"exit {done.returncode}: {done.stderr.strip()[-300:]}"
+
+
+def main() -> None:
+    """Install, try, tell."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("python", nargs="?", default=sys.executable)
+    parser.add_argument("--lowest", action="store_true")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        commands, with_torch = environment(folder, given.python, given.lowest)
+        version = subprocess.run([commands / "python", "-V"], capture_output=True, text=True).stdout.strip()
+        age, torch = "oldest" if given.lowest else "newest", "with" if with_torch else "without"
+        print(f"{version}, {age} dependencies, {torch} torch", flush=True)
+        (folder / "empty").mkdir()
+        failed = 0
+        for command in COMMANDS:
+            if command.startswith("train") and not with_torch:
+                print(f"  left out       wristctl {command}")
+                continue
+            began = time.perf_counter()
+            why = tried(commands, folder / "empty", command)
+            failed += bool(why)
+            took = time.perf_counter() - began
+            print(f"  {'FAILED' if why else 'ok':6} {took:6.1f} s wristctl {command}", flush=True)
+            if why:
+                print(f"         {why}", flush=True)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
