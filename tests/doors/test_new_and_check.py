@@ -64,6 +64,15 @@ def test_a_law_that_pushes_the_wrong_way_gets_no_certificate(stranger: Path) -> 
     assert done.returncode == 3 and "FAILS bends the wrist back" in done.stdout and "is fit" not in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("place", "told"),
+    [("strange.py", "strange.py should name its controller: strange.py:NAME"), ("pidd", "did you mean 'pid'?")],
+)
+def test_a_law_that_is_not_named_is_asked_for_by_name(stranger: Path, place: str, told: str) -> None:
+    done = wristctl(stranger, "check-law", place, "--no-board")
+    assert done.returncode == 2 and told in done.stderr and not done.stdout
+
+
 def test_a_certificate_names_sources_gains_and_cost(stranger: Path) -> None:
     found = list(certificate(f"{stranger}/strange.py:STRANGE", {}, False))
     sources = [each.found for each in found if each.asked == "source"]

@@ -21,6 +21,7 @@ from wristctl.config.study import Study
 from wristctl.records import Run, list_runs
 from wristctl.simulation import cases
 from wristctl.studies.studied import Studied
+from wristctl.work import unit
 
 SMALL = """
 seed: 3
@@ -114,6 +115,15 @@ def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
     units = {each.name: each.stat().st_ino for each in (run_of(again).path / "units").glob("*.npz")}
     assert kept.items() <= units.items(), "what was done is linked"
     assert [each.role for each in run_of(again).manifest.inputs] == ["resume"]
+
+
+def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
+    done: Studied, study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(unit, "code_digest", lambda: "other")
+    again = wristctl.study(study, resume=run_of(done).path, out=tmp_path)
+    assert caplog.text.count(f"{run_of(done).id} was made by other code: none of its units can be taken over") == 1
+    assert run_of(again).result_hash == run_of(done).result_hash
 
 
 def test_in_memory_it_finds_the_same(done: Studied, study: Study) -> None:

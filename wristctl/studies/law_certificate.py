@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import ValidationError
 
 from wristctl.arrays import Array
 from wristctl.comparison.step_cost import step_time
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.control import Row
-from wristctl.config.errors import UserError
+from wristctl.config.errors import UserError, meant
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, signals_of
@@ -40,7 +42,13 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
     Raises UserError where it cannot be loaded, or does not even keep to what a law is: see `vetting.vet`.
     """
     row = {"controller": name, "gains": "default"}
-    study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(each) for key, each in laws.items()}})
+    try:
+        study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(v) for key, v in laws.items()}})
+    except ValidationError as error:
+        first = error.errors()[0]
+        unnamed = first["type"] == "added_value"
+        what, fix = (first["msg"], "FILE:NAME") if unnamed else (f"no law '{name}'", meant(name, CONTROLLERS))
+        raise UserError(what, name, fix) from error
     known, foreign = adopted(study, "hw-run")
     law = controller(known.hw_run.rows[0].controller)
     for origin in foreign:

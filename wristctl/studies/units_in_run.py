@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from wristctl.work.worker import Golden
 
 
+log = logging.getLogger(__name__)
+
+
 def performed(
     session: Session, command: str, what: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
 ) -> UnitsDone:
@@ -24,11 +28,14 @@ def performed(
     from wristctl.studies.adopted import adoption, sources_in
     from wristctl.work.executors import Workers
     from wristctl.work.fan_out import perform_units
-    from wristctl.work.unit import UNITS
+    from wristctl.work.unit import UNITS, code_digest
     from wristctl.work.worker import Computed, Furnish
 
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
     folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
+    first = folder is None or not folder.exists()
+    if first and stopped is not None and stopped.manifest.code.tree_sha256 != code_digest():
+        log.warning("%s was made by other code: none of its units can be taken over, all are computed anew", stopped.id)
     if folder is not None:
         folder.mkdir(exist_ok=True)
     furnish = None
