@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 from typing import Any
 
 import pytest
@@ -55,3 +56,13 @@ def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.Mo
 def test_a_length_that_is_unknown_is_announced_and_quiet_is_quiet() -> None:
     assert _shown(None)[0] == ["tuning ..."]
     assert _shown(None, quiet=True)[0] == []
+
+
+def test_what_says_nothing_for_long_is_said_to_go_on_off_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rig that is prepared for a minute, in a pipe."""
+    monkeypatch.setattr(module, "_LINE_EVERY", 1.0)
+    screen = io.StringIO()
+    with module.progress(Console(file=screen, width=80), no_event, "opening board and camera", None, "", False):
+        time.sleep(1.3)
+    begin, still = screen.getvalue().splitlines()
+    assert begin == "opening board and camera ..." and still == "opening board and camera ... 1 s"
