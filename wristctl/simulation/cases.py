@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
@@ -175,7 +176,8 @@ def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.
     assert outcome.samples is not None
     theta = outcome.samples[:, :, RECORDED.index("theta")]
     found = np.empty(len(theta))
-    for number, followed in enumerate(motions):
-        own = np.flatnonzero(which == number)
-        found[own] = oscillations(theta[own], followed.theta_ref, step)
+    with threadpool_limits(limits=1, user_api="blas"):
+        for number, followed in enumerate(motions):
+            own = np.flatnonzero(which == number)
+            found[own] = oscillations(theta[own], followed.theta_ref, step)
     return found

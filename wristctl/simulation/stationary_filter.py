@@ -25,6 +25,10 @@ def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float
     propagate(drive, known, x, plus + zero, minus + zero, h)
 
 
+_DOUBLINGS, _ALIKE = 20, 1e-14
+"""Doublings at most, and a change of a correlation that is none."""
+
+
 class _Stationary(NamedTuple):
     """What frames one after another lead to: gain (3,), covariance behind a frame; transition and noise of a tick."""
 
@@ -50,13 +54,30 @@ def _stationary(sensor: Sensor, actuator: Actuator, wrist: WristParameters, peri
     for _ in range(_ticks_of_a_frame(sensor, period)):
         frame, between = tick @ frame, tick @ between @ tick.T + noise
     variance = max(np.deg2rad(sensor.noise_deg) ** 2, 1e-12)
-    covariance, gain, fused = between, np.zeros(3), between
-    for _ in range(500):
-        gain = covariance[:, 0] / (covariance[0, 0] + variance)
-        fused = covariance - np.outer(gain, covariance[0])
-        covariance = frame @ fused @ frame.T + between
+    covariance = _predicted(frame, between, variance)
+    gain = covariance[:, 0] / (covariance[0, 0] + variance)
     gain.setflags(write=False)
-    return _Stationary(gain, fused, tick, noise)
+    return _Stationary(gain, covariance - gain[:, None] * covariance[0], tick, noise)
+
+
+def _predicted(frame: Array, between: Array, variance: float) -> Array:
+    """The covariance (3, 3) before a frame that frames one after another lead to, each the first entry's reading.
+
+    Of P = F (P - P c c^T P/(c^T P c + R)) F^T + Q by doubling (Anderson, Int. J. Control 28 (1978) 295): step k has
+    seen 2^k frames.
+    """
+    onward, seen, covariance = frame.T, np.zeros((3, 3)), between
+    seen[0, 0] = 1.0 / variance
+    for _ in range(_DOUBLINGS):
+        shrunk = np.linalg.solve(np.eye(3) + seen @ covariance, np.hstack([onward, seen]))
+        grown = covariance + onward.T @ covariance @ shrunk[:, :3]
+        seen = seen + onward @ shrunk[:, 3:] @ onward.T
+        onward = onward @ shrunk[:, :3]
+        deviation = np.sqrt(np.diag(grown))
+        if (np.abs(grown - covariance) <= _ALIKE * deviation * deviation[:, None]).all():
+            return grown
+        covariance = grown
+    return covariance
 
 
 def _ticks_of_a_frame(sensor: Sensor, period: float) -> int:

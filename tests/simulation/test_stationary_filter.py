@@ -1,0 +1,39 @@
+"""The observer's stationary covariance is the solution that another library finds of its Riccati equation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import solve_discrete_are
+
+from wristctl.config.plant import Actuator, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.simulation.stationary_filter import _predicted, _stationary, _ticks_of_a_frame
+
+
+@given(
+    st.floats(1e-3, 10e-3), st.floats(10.0, 200.0), st.floats(1e-3, 1.0), st.floats(1e-5, 1e-2), st.floats(1e-3, 0.3)
+)
+def test_it_solves_the_riccati_equation_of_a_frame(
+    period: float, rate: float, noise_deg: float, torque_noise: float, load_drift: float
+) -> None:
+    sensor = Sensor(
+        level="camera", frame_rate=rate, noise_deg=noise_deg, torque_noise=torque_noise, load_drift=load_drift
+    )
+    found = _stationary(sensor, Actuator(), WristParameters(), period)
+    frame, between = np.eye(3), np.zeros((3, 3))
+    for _ in range(_ticks_of_a_frame(sensor, period)):
+        frame, between = found.tick @ frame, found.tick @ between @ found.tick.T + found.noise
+    variance = np.deg2rad(noise_deg) ** 2
+    seen = np.array([[1.0], [0.0], [0.0]])
+    size = np.sqrt(np.diag(between).clip(1e-18))  # scaled, or the library loses the smallest entries
+    known = solve_discrete_are(
+        (frame * size / size[:, None]).T, seen * size[0], between / np.outer(size, size), [[variance]]
+    ) * np.outer(size, size)
+    ours = _predicted(frame, between, variance)
+    scale = np.sqrt(np.outer(np.diag(known), np.diag(known)))
+    assert np.abs(ours - known).max() == pytest.approx(0.0, abs=1e-6 * np.abs(known).max())
+    assert (np.abs(ours - known) <= 1e-6 * scale).all()
+    assert found.gain == pytest.approx(known[:, 0] / (known[0, 0] + variance), rel=1e-5, abs=1e-9)
