@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -48,3 +50,13 @@ def test_the_ledgers_ranges_are_ratios_to_the_papers_number() -> None:
     judged = Judgement(CLAIM, {"exact": Finding("reproduced", 1.0, 4.0), "default": Finding("worse than the paper")})
     (panel,) = ours_over_the_papers([judged]).axes
     assert [np.asarray(line.get_xdata(), float).tolist() for line in panel.lines] == [[0.5, 2.0], [1e5, 1e5]]
+
+
+def test_what_stands_beside_the_bars_is_within_the_figure() -> None:
+    told = "46 % where wrist.tension_limit < 21.1, 81 % above, 94 % where there is none"
+    long = dataclasses.replace(STRIP, claim=CLAIM.model_copy(update={"id": "O-steady-state-smc-pid"}), told=told)
+    made = shares([long] * 12, "over the box")
+    made.draw_without_rendering()
+    whole = made.bbox
+    boxes = [text.get_window_extent() for text in made.axes[0].texts]
+    assert len(boxes) == 2 * 12 + 2 and max(box.x1 for box in boxes) <= whole.x1 and min(box.x0 for box in boxes) > 0.0
