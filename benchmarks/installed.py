@@ -37,7 +37,7 @@ COMMANDS = (
     "check-law own.py:OWN",
     "simulate --controller own.py:OWN --gains default",
     "runs verify",
-    "runs replay latest:simulate",
+    "runs replay latest:simulate --trust-code",
     "runs pack latest:compare",
 )
 """In their order; each ends with 0."""
