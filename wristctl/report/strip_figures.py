@@ -12,7 +12,19 @@ from matplotlib.figure import Figure
 
 from wristctl.comparison.paper import FACTOR
 from wristctl.comparison.robust import Strip
-from wristctl.report.style import BLUE, GREEN, GREY, SILVER, VERMILLION, WIDTH, figure, legend_below, logarithmic, title
+from wristctl.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    SILVER,
+    VERMILLION,
+    WIDTH,
+    figure,
+    legend_below,
+    logarithmic,
+    title,
+    with_unit,
+)
 
 _COLOURS = {
     "reproduced": (GREEN, "holds"),
@@ -86,8 +98,7 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
         panel.axvline(one.split.at, color=GREY, lw=0.8, ls="--")
     if not names and np.isinf(np.array(values, float)).any():
         panel.text(x.max(), -0.02, "none", ha="center", va="top", fontsize=9.0, transform=panel.get_xaxis_transform())
-    name = one.leaves[0].name
-    panel.set_xlabel(f"{name}{f' [{unit}]' if unit else ''}", fontsize=10.0)
+    panel.set_xlabel(with_unit(one.leaves[0].name, unit), fontsize=10.0)
     over = f"{one.claim.than} over {one.claim.label}" if one.claim.than else "ours over the paper's"
     panel.set_ylabel("one side over the other" if one.claim.evidence == "symmetry" else over, fontsize=10.0)
     title(panel, fill(f"{one.claim.id}: {one.claim.says}", 78))

@@ -168,6 +168,11 @@ def title(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="left", fontsize=10.0)
 
 
+def with_unit(name: str, unit: str) -> str:
+    """A quantity's label; what has no unit is a name alone."""
+    return name if unit in ("", "1") else f"{name} [{unit}]"
+
+
 def legend(axes: Axes, **options: Any) -> None:
     """A frameless legend inside the axes."""
     axes.legend(**_LEGEND | options)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wristctl.report.style import BLUE, GREY, VERMILLION, figure, logarithmic
+from wristctl.report.style import BLUE, GREY, VERMILLION, figure, logarithmic, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,11 +39,11 @@ def over_key(
         panel.plot(places[~failed], heights[~failed], ".", color=BLUE, markersize=3.0, alpha=0.6)
         panel.plot(places[failed], heights[failed], "x", color=VERMILLION, markersize=4.0)
         _medians(panel, places[~failed], heights[~failed])
-        panel.set_ylabel(name if units[name] == "1" else f"{name} [{units[name]}]")
+        panel.set_ylabel(with_unit(name, units[name]))
         if _is_wide(heights):
             logarithmic(panel.yaxis)
     for panel in axes[-1]:
-        panel.set_xlabel(key if units[key] == "1" else f"{key} [{units[key]}]")
+        panel.set_xlabel(with_unit(key, units[key]))
         if labels is not None:
             panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
         elif _is_wide(places):

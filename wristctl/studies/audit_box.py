@@ -42,8 +42,7 @@ def judged_in_box(session: Session) -> list[Strip]:
             name = each.leaves[0].name
             within = study if name.startswith("wrist.") else study.simulate
             unit = unit_at(within, name.split("."))
-            shown = "" if unit == "1" else unit
-            findings.figure(f"strip-{each.claim.id}", strip, each, drawn.values(name), shown, later=True)
+            findings.figure(f"strip-{each.claim.id}", strip, each, drawn.values(name), unit, later=True)
     return found
 
 

@@ -12,9 +12,9 @@ from pydantic import ValidationError
 
 from wristctl.arrays import Array
 from wristctl.comparison.step_cost import step_time
-from wristctl.config.choices import CONTROLLERS
 from wristctl.config.control import Row
-from wristctl.config.errors import UserError, meant
+from wristctl.config.errors import UserError
+from wristctl.config.explain import explained
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, signals_of
@@ -45,10 +45,7 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
     try:
         study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(v) for key, v in laws.items()}})
     except ValidationError as error:
-        first = error.errors()[0]
-        unnamed = first["type"] == "added_value"
-        what, fix = (first["msg"], "FILE:NAME") if unnamed else (f"no law '{name}'", meant(name, CONTROLLERS))
-        raise UserError(what, name, fix) from error
+        raise explained(error, {}).at(name) from error
     known, foreign = adopted(study, "hw-run")
     law = controller(known.hw_run.rows[0].controller)
     for origin in foreign:

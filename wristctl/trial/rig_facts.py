@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from wristctl.board.usb_adapter import latency_timer, shorter
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.camera_pace import FIX, CameraPace
 from wristctl.trial.rig_strokes import RigStrokes
-from wristctl.trial.step_latency import Latency, MotorStroke, find_latency
+from wristctl.trial.step_latency import Latency, find_latency
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
 from wristctl.trial.tick_timing import SCHEDULING
@@ -89,15 +89,15 @@ def measure(
     usable = pace.verdicts[SightingVerdict.OK] > 0
     latency = None
     if axis is not None and usable:
-        made = RigStrokes(board, tracking, settings, axis).strokes(_sure, told)
-        latency = find_latency(made)
+        strokes = RigStrokes(board, tracking, settings, axis)
+        for made in strokes.strokes(told):
+            latency = find_latency(made)
+            if latency.sd < _SURE:
+                break
+        strokes.let_go()
     quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
     noise = float(np.std(angles)) if len(angles) > 2 else math.nan
     return RigFacts(trips, timer, pace, quality, noise, woken, latency)
-
-
-def _sure(made: Sequence[MotorStroke]) -> bool:
-    return find_latency(made).sd < _SURE
 
 
 def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[float]]:

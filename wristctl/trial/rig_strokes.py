@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from wristctl.trial.step_latency import MotorStroke
 from wristctl.trial.tracking import Tracking
 
 COUNT, MOST = 24, 96
-"""Strokes after which it is asked whether they are enough; that are made at most."""
+"""Strokes after which one may know enough; that are made at most."""
 _BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(3.0), math.radians(6.0), 6e-3, 40e-3
 """Bend [rad] between which strokes go, the tendon taut at both ends; how much of it [m] they reel in at most, and how
 fast [m/s]."""
@@ -57,10 +57,8 @@ class RigStrokes:
         board.home()
         self._straight = Patience(board).angle(tracking, 10)
 
-    def strokes(
-        self, enough: Callable[[Sequence[MotorStroke]], bool], told: Callable[[int], None] = lambda done: None
-    ) -> list[MotorStroke]:
-        """Do COUNT, and so many more until they are enough, MOST in all; the tendon is slack again in the end.
+    def strokes(self, told: Callable[[int], None] = lambda done: None) -> Iterator[Sequence[MotorStroke]]:
+        """All strokes so far, whenever COUNT more are done, up to MOST; the tendon stays taut.
 
         Raises SafetyStop, BoardError and CameraError.
         """
@@ -69,14 +67,14 @@ class RigStrokes:
         low, _ = self._crept(taut, sense, _BEGUN, _LONGEST)
         high, _ = self._crept(low, sense, _ENDED, _LONGEST)
         found, rng = list[MotorStroke](), np.random.default_rng(0)
-        while len(found) < MOST and (len(found) % COUNT or not found or not enough(found)):
+        while len(found) < MOST:
             self._watch(low - sense * round(_BELOW / self._step), JOG_RATE, _BACK)
             self._watch(low, JOG_RATE, _SETTLED)  # from below: friction is to hold back already when the stroke begins
             # at random, so that strokes begin anywhere between two pictures
             found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
             told(len(found))
-        self.let_go()
-        return found
+            if len(found) % COUNT == 0:
+                yield found
 
     def let_go(self) -> None:
         """Back to where the motor stood at first."""
