@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.documented import script_of_docs
+from wristctl.control.law import Controller
 from wristctl.gym import OBSERVED, WristVectorEnv
+from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 
 
 @pytest.fixture(scope="module")
 def ppo() -> ModuleType:
     """docs/ppo.py, with few worlds and few wrists."""
-    spec = importlib.util.spec_from_file_location("ppo", Path(__file__).parents[1] / "docs" / "ppo.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = script_of_docs("ppo")
     module.WORLDS, module.COUNT = 2, 4  # type: ignore[attr-defined]
     return module
 
@@ -40,23 +38,28 @@ def test_an_episodes_end_shows_its_last_sight_and_the_next_has_begun(ppo: Module
     assert not np.array_equal(last, seen), "another episode"
 
 
-def test_a_policy_is_judged_on_the_cases_that_laws_are(ppo: ModuleType) -> None:
+def test_a_policy_is_judged_as_a_law_that_does_the_same_is(ppo: ModuleType) -> None:
     """One that asks for no torque: spools still reel in what the reference shortens, so most of the way is made."""
     study = ppo.study_of()
 
     def still(seen: Any, deterministic: bool) -> tuple[Any, None]:
         return np.zeros((len(seen), 1)), None
 
-    policy = SimpleNamespace(
-        model=SimpleNamespace(predict=still), sight=SimpleNamespace(normalize_obs=lambda seen: seen)
-    )
+    sight = SimpleNamespace(normalize_obs=lambda seen: seen)
+    policy = SimpleNamespace(model=SimpleNamespace(predict=still), sight=sight)
     found = ppo.judged(study, policy)
+    law = Controller("still", lambda now, wrist, gains, memory: 0.0, "a test", {}, {"default": {}}, plain=True)
     cases = drawn_cases(study.families[ppo.RIG], ppo.RIG, "test", study.seed, 2, study.wrist)
+    known = measure(law, np.zeros((1, 0)), cases, study.wrist, ["rmse", "oscillation"])
+    assert found.metrics["rmse"] == pytest.approx(known.metrics["rmse"], rel=0.02), "a sample in 5 ms, not each ms"
+    assert found.metrics["oscillation"] == pytest.approx(known.metrics["oscillation"], rel=0.05, abs=1e-5)
     size = [np.sqrt(np.mean(np.square(each.motion.theta_ref))) for each in cases]
     missed = found.metrics["rmse"][0] / size
     assert (missed > 0.01).all() and (missed < 0.2).all() and not found.failed.any()
+    assert (found.rests == known.rests).all()
     row = ppo.row_of("still", found)
     assert row.scores.shape == (2,) and row.lost == 0
+    assert row.scores == pytest.approx(ppo.row_of("still", known).scores, rel=0.02)
 
 
 def test_a_policy_that_learns_for_a_second_pulls(ppo: ModuleType) -> None:

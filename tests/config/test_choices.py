@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from tests.documented import DOCS, script_of_docs
 from wristctl.config.choices import METRICS
 from wristctl.simulation.metrics import Metric
-
-DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture(scope="module")
 def choices() -> ModuleType:
     """docs/choices.py"""
-    spec = importlib.util.spec_from_file_location("choices", DOCS / "choices.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script_of_docs("choices")
 
 
 def test_the_page_is_what_its_script_makes(choices: ModuleType) -> None:

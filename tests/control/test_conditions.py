@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import logging
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from tests.documented import script_of_docs
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
 from wristctl.config.choices import CONTROLLERS
@@ -35,11 +34,7 @@ STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).
 @pytest.fixture(scope="module")
 def margins() -> ModuleType:
     """docs/margins.py"""
-    spec = importlib.util.spec_from_file_location("margins", Path(__file__).parents[2] / "docs" / "margins.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script_of_docs("margins")
 
 
 @pytest.mark.parametrize(("name", "preset"), STATED)

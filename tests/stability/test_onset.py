@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-DOCS = Path(__file__).parents[2] / "docs"
+from tests.documented import DOCS, script_of_docs
 
 
 @pytest.fixture(scope="module")
 def measured() -> ModuleType:
     """docs/loop_analysis.py"""
-    spec = importlib.util.spec_from_file_location("loop_analysis_of_docs", DOCS / "loop_analysis.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look for their module there
-    spec.loader.exec_module(module)
-    return module
+    return script_of_docs("loop_analysis")
 
 
 @pytest.mark.parametrize("number", [0, 3])
