@@ -20,7 +20,7 @@ from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.frames import readings, schedule
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import Outcome, rollout
-from wristctl.simulation.stationary_filter import expected_error, stationary_gain
+from wristctl.simulation.stationary_filter import Belief, expected_error, stationary_gains
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
@@ -78,6 +78,11 @@ def linear_wrist(duration: float) -> np.ndarray:
     return expm(slope * duration)
 
 
+def _gain(sensor: Sensor) -> np.ndarray:
+    (gain,) = stationary_gains([Belief(sensor, Actuator(), WRIST, 1e-3)])
+    return gain
+
+
 def test_the_gain_is_the_stationary_one_of_an_independent_riccati_solver() -> None:
     fine = linear_wrist(1e-4)
     noise = np.diag([0.0, fine[1, 2] ** 2 * CAMERA.torque_noise**2 / 1e-4, CAMERA.load_drift**2 * 1e-4])
@@ -85,13 +90,13 @@ def test_the_gain_is_the_stationary_one_of_an_independent_riccati_solver() -> No
     between, variance = sum(p @ noise @ p.T for p in powers), np.deg2rad(CAMERA.noise_deg) ** 2
     covariance = solve_discrete_are((powers[-1] @ fine).T, np.eye(3)[:, :1], between, [[variance]])
     expected = covariance[:, 0] / (covariance[0, 0] + variance)
-    assert stationary_gain(CAMERA, Actuator(), WRIST, 1e-3) == pytest.approx(expected, rel=0.05)
+    assert _gain(CAMERA) == pytest.approx(expected, rel=0.05)
 
 
 def test_the_estimates_error_is_the_noise_that_linear_theory_lets_through() -> None:
     """Noise of one frame after another through the gain, then predicted over 34 to 50 ms."""
     sensor = Sensor(level="camera", dropped=0.0)
-    gain, variance = stationary_gain(sensor, Actuator(), WRIST, 1e-3), np.deg2rad(sensor.noise_deg) ** 2
+    gain, variance = _gain(sensor), np.deg2rad(sensor.noise_deg) ** 2
     keep = (np.eye(3) - np.outer(gain, [1.0, 0.0, 0.0])) @ linear_wrist(1.0 / 60.0)
     fused = solve_discrete_lyapunov(keep, variance * np.outer(gain, gain))
     ahead = [linear_wrist(t)[0] for t in np.arange(34, 51) * 1e-3]
@@ -112,7 +117,7 @@ def test_the_error_that_it_expects_is_that_of_linear_theory() -> None:
     behind = before - np.outer(before[:, 0], before[0]) / (before[0, 0] + variance)
     ages = [round(each / 1e-4) for each in np.arange(33, 50) * 1e-3]
     expected = np.sqrt(np.mean([(powers[age] @ behind @ powers[age].T + grown[age - 1])[0, 0] for age in ages]))
-    assert expected_error(CAMERA, Actuator(), WRIST, 1e-3) == pytest.approx(expected, rel=0.05)
+    assert expected_error(Belief(CAMERA, Actuator(), WRIST, 1e-3)) == pytest.approx(expected, rel=0.05)
 
 
 def test_an_observer_whose_belief_is_wrong_is_seen_to_be_off_by_more_than_it_expects() -> None:
@@ -127,7 +132,7 @@ def test_an_observer_whose_belief_is_wrong_is_seen_to_be_off_by_more_than_it_exp
         ratios[radius] = done.metrics["observer_consistency"]
         course = done.trajectory
         rms = np.sqrt(np.mean((course.columns()["theta_seen"] - course.theta) ** 2))
-        expected = expected_error(study.simulate.loop.sensor, study.simulate.loop.actuator, study.wrist, 1e-3)
+        expected = expected_error(Belief(study.simulate.loop.sensor, study.simulate.loop.actuator, study.wrist, 1e-3))
         assert ratios[radius] == pytest.approx(rms / expected)
         assert course.load is not None and np.abs(course.load).max() > 1e-3
     assert 0.3 < ratios["x1"] < 1.1 and ratios["x1.05"] > 2.0 * ratios["x1"]

@@ -10,7 +10,7 @@ from scipy.linalg import solve_discrete_are
 
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.stationary_filter import _predicted, _stationary, _ticks_of_a_frame
+from wristctl.simulation.stationary_filter import Belief, _predicted, _stationary, _ticks_of_a_frame, stationary_gains
 
 
 @given(
@@ -22,18 +22,38 @@ def test_it_solves_the_riccati_equation_of_a_frame(
     sensor = Sensor(
         level="camera", frame_rate=rate, noise_deg=noise_deg, torque_noise=torque_noise, load_drift=load_drift
     )
-    found = _stationary(sensor, Actuator(), WristParameters(), period)
+    (gain,), _, (tick,), (noise,) = _stationary((Belief(sensor, Actuator(), WristParameters(), period),))
     frame, between = np.eye(3), np.zeros((3, 3))
     for _ in range(_ticks_of_a_frame(sensor, period)):
-        frame, between = found.tick @ frame, found.tick @ between @ found.tick.T + found.noise
+        frame, between = tick @ frame, tick @ between @ tick.T + noise
     variance = np.deg2rad(noise_deg) ** 2
     seen = np.array([[1.0], [0.0], [0.0]])
     size = np.sqrt(np.diag(between).clip(1e-18))  # scaled, or the library loses the smallest entries
     known = solve_discrete_are(
         (frame * size / size[:, None]).T, seen * size[0], between / np.outer(size, size), [[variance]]
     ) * np.outer(size, size)
-    ours = _predicted(frame, between, variance)
+    (ours,) = _predicted(frame[None], between[None], np.array([variance]))
     scale = np.sqrt(np.outer(np.diag(known), np.diag(known)))
     assert np.abs(ours - known).max() == pytest.approx(0.0, abs=1e-6 * np.abs(known).max())
     assert (np.abs(ours - known) <= 1e-6 * scale).all()
-    assert found.gain == pytest.approx(known[:, 0] / (known[0, 0] + variance), rel=1e-5, abs=1e-9)
+    assert gain == pytest.approx(known[:, 0] / (known[0, 0] + variance), rel=1e-5, abs=1e-9)
+
+
+def test_each_of_many_observers_has_the_gain_that_it_has_alone() -> None:
+    rng = np.random.default_rng(3)
+    beliefs = [
+        Belief(
+            Sensor(level="camera", frame_rate=rate, noise_deg=noise, load_drift=drift),
+            Actuator(level="tendon", tendon_stiffness=stiffness),
+            WristParameters(stiffness=spring),
+            5e-3,
+        )
+        for rate, noise, drift, stiffness, spring in rng.uniform(
+            (20.0, 0.01, 0.01, 8e3, 0.5), (120.0, 0.5, 0.3, 4e4, 0.8), (12, 5)
+        ).tolist()
+    ]
+    beliefs += beliefs[:3]
+    together = stationary_gains(beliefs)
+    alone = np.array([stationary_gains([each])[0] for each in beliefs])
+    assert np.array_equal(together, alone)
+    assert len(np.unique(together[:, 1])) == 12

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -103,8 +104,7 @@ def unit_at(begin: Section, path: Sequence[str]) -> str:
         field = keys_of(type(section)).get(part)
         if field is None:
             return "1"
-        name = next(name for name, each in type(section).model_fields.items() if each is field)
-        section = getattr(section, name)
+        section = getattr(section, _names(type(section))[part])
     return (unit_of(field) if field else "") or "1"
 
 
@@ -112,7 +112,7 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
     """The section with a leaf at another value; only what lies on the way to it is made anew, and checked."""
     head, *rest = path
     if isinstance(section, Section):
-        fields = {field.alias or name: name for name, field in type(section).model_fields.items()}
+        fields = _names(type(section))
         extra = section.model_extra or {}
         if head not in fields and head not in extra and not (hasattr(section, "added") and head in section.added()):
             raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, fields))
@@ -122,8 +122,7 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         if not rest and isinstance(own, Section):
             raise UserError(f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(own)))}")
         # all that it has, since what is left out would be a default, copied deeply
-        given = {each: getattr(section, each) for each in type(section).model_fields}
-        made = type(section).model_validate({**given, **extra, name: new}, by_name=True)
+        made = type(section).model_validate({**section.__dict__, **extra, name: new}, by_name=True)
         object.__setattr__(made, "__pydantic_fields_set__", section.model_fields_set | {name})
         return made
     if isinstance(section, Mapping) and (head in section or rest):
@@ -136,6 +135,12 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
         return (*section[: int(head)], new, *section[int(head) + 1 :])
     raise UserError(f"there is no leaf {axis.key}", axis.where, "one that `--dry-run` shows")
+
+
+@cache
+def _names(kind: type[Section]) -> dict[str, str]:
+    """The names of a section's fields by the keys that they have in a file."""
+    return {field.alias or name: name for name, field in kind.model_fields.items()}
 
 
 def _alike(known: Any, value: Any) -> Any:

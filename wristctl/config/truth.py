@@ -7,6 +7,7 @@ believes. One that is not given is as believed.
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer
@@ -64,6 +65,14 @@ def is_unsaid(field: FieldInfo) -> bool:
     return isinstance(extra, dict) and bool(extra.get("unsaid"))
 
 
+@lru_cache
+def _shared(facts: type[Section], believed: type[Section]) -> tuple[str, ...]:
+    """Names of the leaves of facts that override one that is believed."""
+    return tuple(
+        name for name, field in facts.model_fields.items() if is_unsaid(field) and name in believed.model_fields
+    )
+
+
 class Overrides(Section):
     """Leaves that override those of the same names in another section; what is as believed is not written out."""
 
@@ -76,12 +85,8 @@ class Overrides(Section):
 
     def of(self, believed: Any) -> Any:
         """The other section with what is true of it."""
-        names = [
-            name
-            for name, field in type(self).model_fields.items()
-            if is_unsaid(field) and name in type(believed).model_fields
-        ]
-        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        kind: type[Section] = type(believed)
+        given = {name: value for name in _shared(type(self), kind) if (value := getattr(self, name)) is not None}
         changed = {name: actual(getattr(believed, name), each) for name, each in given.items()}
         return believed.model_copy(update=changed) if changed else believed
 

@@ -21,7 +21,7 @@ from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValu
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch
 from wristctl.simulation.reference import Motion
-from wristctl.simulation.stationary_filter import observer_of
+from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.plant import PlantModel
@@ -176,25 +176,23 @@ def _watch(
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
     lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
     by_block = np.moveaxis(lanes_last.reshape(*lanes_last.shape[:2], blocks, *wide), 2, 0)
-    own = [_observer(each, model, angle, longest) for each, angle in zip(worlds, rest, strict=True)]
-
-    def of_observers(name: str) -> Array:
-        rows = np.array([getattr(each, name).ravel() for each in own])[lanes.world]
-        shape = getattr(own[0], name).shape
-        return spread(rows, count).reshape(blocks, *shape, *wide)
-
-    fields = {name: of_observers(name) for name in ("gain", "delivered", "fused", "now")}
-    observer = Observer(**fields, at=np.zeros((blocks, 1), np.int64))
+    gains = stationary_gains([_belief(each) for each in worlds])
+    start = np.zeros((len(worlds), 3))
+    start[:, 0] = [float(model.angle(q)) for q in rest]
+    now = spread(start[lanes.world], count)
+    observer = Observer(
+        gain=spread(gains[lanes.world], count), delivered=np.zeros((blocks, longest, 2, *wide)), fused=now,
+        now=now.copy(), at=np.zeros((blocks, 1), np.int64),
+    )  # fmt: skip
     pictures = np.zeros((blocks, len(frames.captures), *wide))
     turn = np.zeros((blocks, 2), np.int64)
     return Watch(np.ascontiguousarray(by_block), pictures, turn, observer), frames
 
 
+def _belief(world: World) -> Belief:
+    return Belief(world.loop.sensor, world.loop.actuator, world.wrist, world.loop.control_period)
+
+
 def _winding(world: World, actual: Actuator) -> Winding:
     pull = TENDONS_PER_SIDE * world.wrist.pretension
     return winding_of(world.loop.actuator, actual, pull, world.loop.plant.actuator.creep)
-
-
-def _observer(world: World, model: PlantModel, q: Array, ticks: int) -> Observer:
-    loop, wrist = world
-    return observer_of(loop.sensor, loop.actuator, wrist, loop.control_period, ticks, float(model.angle(q)))

@@ -22,7 +22,7 @@ from wristctl.simulation.metrics import of_trajectory
 from wristctl.simulation.reference import Motion, motion, reference_name, toward
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
 from wristctl.simulation.rollout import Outcome, rollout
-from wristctl.simulation.stationary_filter import expected_error
+from wristctl.simulation.stationary_filter import Belief, expected_error
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
@@ -52,8 +52,8 @@ def repeat(
     rows, times = len(gains), repetitions if is_random(loop) else 1
     loops = loops_of(loop, [draws.plant(each) for each in range(times)])
     each = max(1, _TOGETHER // rows)
-    believed = loop.sensor, loop.actuator, wrist, loop.control_period
-    expected = expected_error(*believed) if loop.sensor.level == "camera" else None
+    belief = Belief(loop.sensor, loop.actuator, wrist, loop.control_period)
+    expected = expected_error(belief) if loop.sensor.level == "camera" else None
     found: list[Gathered] = [Gathered() for _ in range(rows)]
     for first in range(0, times, each):
         now = range(first, min(first + each, times))

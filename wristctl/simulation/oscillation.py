@@ -24,6 +24,8 @@ _HARMONICS = 4.0
 _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
+_ENOUGH = 0.01
+"""Between samples that show how fast a reference goes [s]: no wrist follows 50 Hz."""
 _TOGETHER = 256
 """Loops whose spectra are worked out at once."""
 
@@ -83,7 +85,7 @@ def _remaining(theta: Array, theta_ref: Array, step: float) -> Array | None:
         return None
     if np.ptp(theta_ref[-window:]) == 0.0:
         return _without_trend(theta[:, -window:])
-    frequency = float(_strongest(theta_ref[None] - theta_ref.mean(), step)[0])
+    frequency = float(_strongest(theta_ref[None] - theta_ref.mean(), step, max(1, round(_ENOUGH / step)))[0])
     window = min(samples, max(window, round(2.0 / (frequency * step))))
     error = (theta - theta_ref)[:, -window:]
     degree = 4 + round(
@@ -128,11 +130,12 @@ def _without_swing(angle: Array, left: Array, trend: Array) -> Array:
     return found
 
 
-def _strongest(values: Array, step: float) -> Array:
-    """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart, (L,)."""
-    count = 8 * values.shape[1]
-    power = np.abs(np.fft.rfft(values * np.hanning(values.shape[1]), count, axis=1))
-    return np.asarray((np.argmax(power[:, 8:], axis=1) + 8) / (count * step))
+def _strongest(values: Array, step: float, every: int = 1) -> Array:
+    """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart, (L,), by one in `every`."""
+    windowed = (values * np.hanning(values.shape[1]))[:, ::every]
+    count = round(8 * values.shape[1] / every)
+    power = np.abs(np.fft.rfft(windowed, count, axis=1))
+    return np.asarray((np.argmax(power[:, 8:], axis=1) + 8) / (count * every * step))
 
 
 def _step(course: Trajectory) -> float:

@@ -116,12 +116,12 @@ def motion(
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
         return _evaluated(reference, wrist, horizon, period, network)
-    path = WristParameters(length=wrist.length, range_deg=wrist.range_deg)  # all that it depends on
-    return _known(reference, path, horizon, period)
+    return _known(reference, wrist.length, wrist.range_deg, horizon, period)
 
 
 @lru_cache(maxsize=64)
-def _known(reference: Reference, wrist: WristParameters, horizon: float, period: float) -> Motion:
+def _known(reference: Reference, length: float, range_deg: float, horizon: float, period: float) -> Motion:
+    wrist = WristParameters(length=length, range_deg=range_deg)  # all that it depends on
     return _evaluated(reference, wrist, horizon, period, None)
 
 

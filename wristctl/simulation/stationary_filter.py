@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -29,8 +30,18 @@ _DOUBLINGS, _ALIKE = 20, 1e-14
 """Doublings at most, and a change of a correlation that is none."""
 
 
+class Belief(NamedTuple):
+    """What an observer goes by; the period [s] is of control."""
+
+    sensor: Sensor
+    actuator: Actuator
+    wrist: WristParameters
+    period: float
+
+
 class _Stationary(NamedTuple):
-    """What frames one after another lead to: gain (3,), covariance behind a frame; transition and noise of a tick."""
+    """What frames one after another lead to, of each belief: gain (B, 3), covariance behind a frame; transition and
+    noise of a tick, (B, 3, 3)."""
 
     gain: Array
     covariance: Array
@@ -38,64 +49,88 @@ class _Stationary(NamedTuple):
     noise: Array
 
 
+@lru_cache(maxsize=64)
+def _stationary(beliefs: tuple[Belief, ...]) -> _Stationary:
+    tick = np.array([_linearised(each.actuator, each.wrist, each.period) for each in beliefs])
+    period, noise_deg, torque_noise, load_drift = np.array(
+        [(each.period, each.sensor.noise_deg, each.sensor.torque_noise, each.sensor.load_drift) for each in beliefs]
+    ).T
+    unknown = tick[:, 1, 2]  # rate gained in one period per unit of torque
+    noise = np.zeros_like(tick)
+    noise[:, 1, 1], noise[:, 2, 2] = unknown**2 * torque_noise**2 / period, load_drift**2 * period
+    ticks = np.array([_ticks_of_a_frame(each.sensor, each.period) for each in beliefs])[:, None, None]
+    frame, between = np.broadcast_to(np.eye(3), tick.shape), np.zeros_like(tick)
+    for done in range(ticks.max()):
+        due = done < ticks
+        frame = np.where(due, tick @ frame, frame)
+        between = np.where(due, tick @ between @ _transposed(tick) + noise, between)
+    variance = np.maximum(np.deg2rad(noise_deg) ** 2, 1e-12)
+    covariance = _predicted(frame, between, variance)
+    gain = covariance[:, :, 0] / (covariance[:, 0, 0] + variance)[:, None]
+    return _Stationary(gain, covariance - gain[:, :, None] * covariance[:, :1], tick, noise)
+
+
 @lru_cache(maxsize=256)
-def _stationary(sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float) -> _Stationary:
-    """From the prediction linearised where the wrist is straight."""
+def _linearised(actuator: Actuator, wrist: WristParameters, period: float) -> Array:
+    """The transition (3, 3) of the prediction over a period [s], where the wrist is straight."""
     drive = drive_of(actuator)
     delivered = at_rest(drive, wrist, PCC, np.zeros(1))[[0, 2]]
     small = 1e-6
     states = small * np.eye(4, 3)
     for state in states:
         _propagate_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
-    tick = (states[:3] - states[3]).T / small
-    unknown = tick[1, 2]  # rate gained in one period per unit of torque
-    noise = np.diag([0.0, unknown**2 * sensor.torque_noise**2 / period, sensor.load_drift**2 * period])
-    frame, between = np.eye(3), np.zeros((3, 3))
-    for _ in range(_ticks_of_a_frame(sensor, period)):
-        frame, between = tick @ frame, tick @ between @ tick.T + noise
-    variance = max(np.deg2rad(sensor.noise_deg) ** 2, 1e-12)
-    covariance = _predicted(frame, between, variance)
-    gain = covariance[:, 0] / (covariance[0, 0] + variance)
-    gain.setflags(write=False)
-    return _Stationary(gain, covariance - gain[:, None] * covariance[0], tick, noise)
+    found: Array = (states[:3] - states[3]).T / small
+    found.setflags(write=False)
+    return found
 
 
-def _predicted(frame: Array, between: Array, variance: float) -> Array:
-    """The covariance (3, 3) before a frame that frames one after another lead to, each the first entry's reading.
+def _predicted(frame: Array, between: Array, variance: Array) -> Array:
+    """The covariances (B, 3, 3) before a frame that frames one after another lead to, of transitions and noise from
+    frame to frame (B, 3, 3), each frame the first entry's reading with a variance (B,).
 
     Of P = F (P - P c c^T P/(c^T P c + R)) F^T + Q by doubling (Anderson, Int. J. Control 28 (1978) 295): step k has
     seen 2^k frames.
     """
-    onward, seen, covariance = frame.T, np.zeros((3, 3)), between
-    seen[0, 0] = 1.0 / variance
+    onward, seen, covariance = _transposed(frame), np.zeros_like(between), between
+    seen[:, 0, 0] = 1.0 / variance
+    still = np.ones((len(between), 1, 1), bool)
     for _ in range(_DOUBLINGS):
-        shrunk = np.linalg.solve(np.eye(3) + seen @ covariance, np.hstack([onward, seen]))
-        grown = covariance + onward.T @ covariance @ shrunk[:, :3]
-        seen = seen + onward @ shrunk[:, 3:] @ onward.T
-        onward = onward @ shrunk[:, :3]
-        deviation = np.sqrt(np.diag(grown))
-        if (np.abs(grown - covariance) <= _ALIKE * deviation * deviation[:, None]).all():
-            return grown
-        covariance = grown
+        shrunk = np.linalg.solve(np.eye(3) + seen @ covariance, np.concatenate([onward, seen], axis=2))
+        grown = covariance + _transposed(onward) @ covariance @ shrunk[:, :, :3]
+        seen = seen + onward @ shrunk[:, :, 3:] @ _transposed(onward)
+        onward = onward @ shrunk[:, :, :3]
+        deviation = np.sqrt(np.diagonal(grown, axis1=1, axis2=2))
+        change = np.abs(grown - covariance)
+        covariance = np.where(still, grown, covariance)  # each ends by itself, whatever stands beside it
+        still &= (change > _ALIKE * deviation[:, None] * deviation[:, :, None]).any(axis=(1, 2), keepdims=True)
+        if not still.any():
+            break
     return covariance
+
+
+def _transposed(matrices: Array) -> Array:
+    return np.swapaxes(matrices, 1, 2)
 
 
 def _ticks_of_a_frame(sensor: Sensor, period: float) -> int:
     return max(1, round(1.0 / (sensor.frame_rate * period)))
 
 
-def stationary_gain(sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float) -> Array:
-    """The Kalman gain (3,) for one frame after another."""
-    return _stationary(sensor, actuator, wrist, period).gain
+def stationary_gains(beliefs: Sequence[Belief]) -> Array:
+    """The Kalman gains (B, 3) for one frame after another."""
+    different = {each: number for number, each in enumerate(dict.fromkeys(beliefs))}
+    found: Array = _stationary(tuple(different)).gain[[different[each] for each in beliefs]]
+    return found
 
 
-def expected_error(sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float) -> float:
+def expected_error(belief: Belief) -> float:
     """Standard deviation [rad] of what a law sees less the true angle, by the observer's own covariance.
 
     That is behind a frame and the prediction from it, on average over the ticks for which it is the last to have
     arrived. Frames that are lost, and all that differs from what is believed, come on top.
     """
-    _, covariance, tick, noise = _stationary(sensor, actuator, wrist, period)
+    covariance, tick, noise = (each[0] for each in _stationary((belief,))[1:])
+    sensor, period = belief.sensor, belief.period
     late, ticks = round(sensor.delay_frames / (sensor.frame_rate * period)), _ticks_of_a_frame(sensor, period)
     variances = []
     for age in range(late + ticks):
@@ -105,10 +140,8 @@ def expected_error(sensor: Sensor, actuator: Actuator, wrist: WristParameters, p
     return float(np.sqrt(np.mean(variances)))
 
 
-def observer_of(
-    sensor: Sensor, actuator: Actuator, wrist: WristParameters, period: float, ticks: int, theta: float
-) -> Observer:
-    """A rollout's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
+def observer_of(belief: Belief, ticks: int, theta: float) -> Observer:
+    """One loop's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
     start = np.array([theta, 0.0, 0.0])
-    gain = stationary_gain(sensor, actuator, wrist, period).copy()
+    (gain,) = stationary_gains([belief])
     return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1, np.int64))

@@ -14,7 +14,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import predict
-from wristctl.simulation.stationary_filter import observer_of
+from wristctl.simulation.stationary_filter import Belief, observer_of
 from wristctl.wrist.segments import load_segments, segments
 
 _REMEMBERED = 256
@@ -33,7 +33,7 @@ class BlindModel:
     ) -> None:
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
         self._drives = [drive_of(each) for each in (actuator, soft)]
-        self._observers = [observer_of(sensor, actuator, wrist, period, 1, 0.0) for _ in self._drives]
+        self._observers = [observer_of(Belief(sensor, actuator, wrist, period), 1, 0.0) for _ in self._drives]
         self._model, self._period, self._tick = segments(wrist, 1), period, 0
         self._angles = np.zeros((_REMEMBERED, 2))
 

@@ -17,7 +17,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import fuse, predict
-from wristctl.simulation.stationary_filter import observer_of
+from wristctl.simulation.stationary_filter import Belief, observer_of
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -43,7 +43,7 @@ class Steering:
         self._drive = drive_of(actuator)
         self._model = segments(wrist, 1)
         self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
-        self._observer = observer_of(sensor, actuator, wrist, period, REMEMBERED, theta)
+        self._observer = observer_of(Belief(sensor, actuator, wrist, period), REMEMBERED, theta)
         self._signals, self._target, self._found = (np.zeros(rows) for rows in (0, len(REFERENCE), 6))
         self._period = period
         self._law: Any = None
