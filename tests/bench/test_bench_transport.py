@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -16,9 +17,9 @@ from wristctl.config.injected import FaultKind, InjectedFault
 
 
 def wire(
-    kind: FaultKind, at: float = 0.01, duration: float | None = None, chip: Atmega2560 | None = None
+    kind: FaultKind, at: float = 0.01, duration: float | None = None, chip: Atmega2560 | None = None, size: float = 1.0
 ) -> BenchTransport:
-    faults = Faults([InjectedFault(kind=kind, at=at, duration=duration)])
+    faults = Faults([InjectedFault(kind=kind, at=at, duration=duration, size=size)])
     faults.begin(0.0)
     return BenchTransport(chip or Atmega2560(), faults)
 
@@ -61,6 +62,21 @@ def test_a_board_restarts_once_at_its_moment_whether_waited_for_or_read_from(tmp
         restarting.chip.poke(0x54, 0)
         restarting.wait(0.1)
         assert restarting.chip.peek(0x54) == 0
+
+
+def test_late_answers_come_so_much_later_whole_and_in_their_order() -> None:
+    """Each byte by the same time, whatever pieces it is read in."""
+    sound, late = (wire("answers-late", at, size=8.0) for at in (100.0, 0.0))
+    trips = []
+    for each in (sound, late):
+        board = Board(each)
+        board.connect()
+        each.wait(math.ceil(1e3 * each.now()) * 1e-3 - each.now())
+        began = each.now()
+        status = board.read()
+        trips.append(each.now() - began)
+        assert status.position == (0, 0, 0, 0)
+    assert trips[1] - trips[0] == pytest.approx(8e-3, abs=1e-5)
 
 
 def test_reading_takes_no_longer_than_asked_and_hands_over_at_whole_milliseconds() -> None:

@@ -93,9 +93,15 @@ def test_each_limit_stops_once_it_is_exceeded_for_so_long(sign: float) -> None:
 
 def test_what_is_over_sooner_does_not_stop() -> None:
     brief = {"at": 0.5, "until": 0.5 + LIMITS.odd_for - 2 * PERIOD}
-    watched(load=after(2.0 * LIMITS.load, **brief))
-    short: Course = lambda time: after(2.0 * LIMITS.load, **brief)(time) + after(1.7, 0.58, 0.62)(time)  # noqa: E731
+    watched(load=after(1.01 * LIMITS.load, **brief))
+    short: Course = lambda time: after(1.01 * LIMITS.load, **brief)(time) + after(1.7, 0.58, 0.62)(time)  # noqa: E731
     watched(load=short)
+
+
+@pytest.mark.parametrize("times", [2.0, 3.0])
+def test_what_is_well_beyond_a_limit_stops_so_many_times_sooner(times: float) -> None:
+    _, late = stopped(load=after(times * LIMITS.load))
+    assert late == pytest.approx(LIMITS.odd_for / times, abs=1.5 * PERIOD)
 
 
 def test_another_limit_kept_does_not_forgive_one_that_is_not() -> None:

@@ -40,7 +40,7 @@ def test_a_sound_rig_has_no_troubles() -> None:
     [
         ({"trips": SLOW, "timer": 0.016}, True, "latency timer is 16 ms", "tee"),
         ({"trips": SLOW}, True, "take 16.7 ms of a tick's 5 ms",
-         "control_period=0.017"),
+         "control_period=0.018"),
         ({"pace": pace(40.0, 0.033)}, False, "gives 40 pictures/s; the loop's observer counts on 60", "device.fourcc"),
         ({"pace": pace(60.0, 0.0, 61, jitter=4e-3)}, False, "unevenly, +-12 ms", "hub"),
         ({"pace": pace(60.0, 0.14)}, True, "beyond safety.stale (150 ms)", "safety.stale of 0.2"),

@@ -40,14 +40,14 @@ def test_a_sound_loop_goes_on_and_blames_nobody() -> None:
         ({"work": 0.007}, WORK, "ticks were skipped: the loop's own work"),
     ],
 )
-def test_a_loop_that_cannot_keep_its_period_is_stopped_within_a_second_of_ticks(
+def test_a_loop_that_cannot_keep_its_period_is_stopped_within_half_a_second_and_a_few_ticks(
     how: dict[str, float], culprit: str, said: str
 ) -> None:
     timing = TickTiming(PERIOD)
     with pytest.raises(SafetyStop, match=said) as stopped:
         run(timing, 400, **how)
     assert stopped.value.exit_code == 5 and stopped.value.fix
-    assert len(timing.late) + timing.overruns <= 230
+    assert len(timing.late) + timing.overruns <= 115
     assert timing.culprits.most_common(1)[0][0] == culprit and culprit in timing.said()
 
 
@@ -58,15 +58,15 @@ def test_a_few_skipped_ticks_are_borne_and_half_of_them_never() -> None:
         timing.judge(LIMITS)
     assert timing.overruns == 100
     most = Safety.model_validate({"skipped": 0.49, "round_trip": 1.0})
-    with pytest.raises(SafetyStop, match="50 % of the last second's ticks"):
+    with pytest.raises(SafetyStop, match="50 % of the last half second's ticks"):
         for _ in range(400):
             timing.tick(0.0, 6e-3, SOUND, SOUND, 1)
             timing.judge(most)
 
 
-def test_the_last_second_counts_and_no_older_one() -> None:
+def test_the_last_half_second_counts_and_no_older_one() -> None:
     timing = TickTiming(PERIOD)
-    run(timing, 90, woken=0.006)  # too few to be judged yet
+    run(timing, 40, woken=0.006)  # too few to be judged yet
     skipped = timing.overruns
     assert skipped > 0
     for _ in range(10):
@@ -75,5 +75,5 @@ def test_the_last_second_counts_and_no_older_one() -> None:
         run(timing, 40)
     later = TickTiming(PERIOD)
     run(later, 300)
-    run(later, 30, woken=0.006)
+    run(later, 14, woken=0.006)
     run(later, 300)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -30,6 +31,7 @@ class BenchTransport(VirtualTransport):
         self._noise = np.random.default_rng(0)
         self._happened: set[tuple[FaultKind, float]] = set()
         self._pressed = False
+        self._on_the_way: deque[tuple[int, bytes]] = deque()
 
     def write(self, data: bytes) -> None:
         """Put bytes on the line. Raises PortLost."""
@@ -42,14 +44,22 @@ class BenchTransport(VirtualTransport):
         self._see_port()
         self._stand_still("answers-held")
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
-        late = self._sizes("answers-late")
+        late = round(1e-3 * self._sizes("answers-late") * FREQUENCY)
         every = max(self._handed_over, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
-        while not (data := self.chip.read()) and self.chip.cycles < end:
-            self._run(min(end, (self.chip.cycles // every + 1) * every))
+        while not (data := self._arrived(late)) and self.chip.cycles < end:
+            due = self._on_the_way[0][0] if self._on_the_way else end
+            self._run(min(end, due, (self.chip.cycles // every + 1) * every))
             self._see_port()
-        if data and late:
-            self._run_until(self.chip.cycles + round(1e-3 * late * FREQUENCY))
         return self._garbled(data)
+
+    def _arrived(self, late: int) -> bytes:
+        """What the chip has sent and the cable, which takes so many cycles, has handed over by now."""
+        if sent := self.chip.read():
+            self._on_the_way.append((self.chip.cycles + late, sent))
+        data = b""
+        while self._on_the_way and self._on_the_way[0][0] <= self.chip.cycles:
+            data += self._on_the_way.popleft()[1]
+        return data
 
     def wait(self, seconds: float) -> None:
         """Run the chip for so long."""

@@ -55,12 +55,16 @@ class Safety(Section):
     across_deg: float = quantity(
         1.0, "deg", "largest bend across the plane, by the size of the tip's marker", "measured", gt=0
     )
-    odd_for: float = quantity(0.06, "s", "how long follow_deg, load or across_deg may be exceeded", "assumed", ge=0)
+    odd_for: float = quantity(
+        0.06, "s", "how long follow_deg, load or across_deg may be exceeded; half as long if twice", "assumed", ge=0
+    )
     stale: float = quantity(0.15, "s", "longest time since the capture of a usable marker angle", "assumed", gt=0)
     late: float = quantity(0.05, "s", "longest delay of one tick; with its period below the watchdog", "assumed", gt=0)
-    skipped: float = quantity(0.2, "", "largest share of a second's ticks that are skipped", "assumed", gt=0, lt=0.5)
+    skipped: float = quantity(
+        0.2, "", "largest share of half a second's ticks that are skipped", "assumed", gt=0, lt=0.5
+    )
     round_trip: float = quantity(
-        1.0, "", "largest median of a second's command round trips, over control_period", "assumed", gt=0, le=1
+        0.95, "", "largest median of half a second's command round trips, over control_period", "assumed", gt=0, le=1
     )
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")

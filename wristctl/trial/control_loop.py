@@ -176,7 +176,7 @@ class ControlLoop:
             self._timing.camera.add(seen)
             if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
                 self._last_usable = seen.time
-                self._following.saw(seen, seen.time - self._epoch)
+                self.oddities.lag.add(seen.theta, *self._following.saw(seen, seen.time - self._epoch))
                 found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
             if task.trial >= 0:
                 used = self._clock.now() - task.begin

@@ -75,11 +75,14 @@ class ExpectedMoves:
             likely = f"it turns the wrong way while others are taut, or {likely}"
         raise SafetyStop(f"{what}; likely {likely}", "homing", _SCREWED)
 
-    def judge_steps(self, axis: int, steps: float) -> None:
-        """Raises SafetyStop where steps per radian are not those of the model, within `homing.steps_tolerance`."""
+    def has_steps(self, steps: float) -> bool:
+        """Whether steps per radian are those of the model, within `homing.steps_tolerance`."""
         share = self._homing.steps_tolerance
-        least, most = (1.0 - share) * self.steps(), (1.0 + share) * self.steps(self._softest, _HARDER)
-        if least <= steps <= most:
+        return (1.0 - share) * self.steps() <= steps <= (1.0 + share) * self.steps(self._softest, _HARDER)
+
+    def judge_steps(self, axis: int, steps: float) -> None:
+        """Raises SafetyStop where steps per radian are not those of the model."""
+        if self.has_steps(steps):
             return
         fix = (
             "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)"

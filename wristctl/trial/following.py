@@ -54,7 +54,7 @@ class Greatest(NamedTuple):
 
 
 class Following:
-    """Raises SafetyStop, with likely causes, once a limit has been exceeded for `safety.odd_for`.
+    """Raises SafetyStop, with likely causes, once a limit is exceeded for `safety.odd_for`, or twice for half as long.
 
     At first the wrist is at rest at zero: what the marker's size is then is that of a wrist not bent across.
     """
@@ -63,6 +63,7 @@ class Following:
         self._limits, self._plus = settings.safety, tuple(on_plus_side(plane).tolist())
         self._away = away_of(plane, settings.markers.positive)
         self._blind = BlindModel(wrist, settings.actuator, self._limits.softest, settings.sensor, period)
+        self._period = period
         self._nearer = 2.0 * settings.markers.distance / wrist.length
         self._frame: Followed | None = None
         self.greatest = Greatest()
@@ -74,11 +75,14 @@ class Following:
         """Go on to the next tick, with the sides reeled in by so much [m] until then."""
         self._blind.predict(reeled_plus, reeled_minus)
 
-    def saw(self, seen: Sighting, captured: float) -> None:
-        """Take in a usable frame, taken `captured` seconds after tick 0."""
+    def saw(self, seen: Sighting, captured: float) -> tuple[float, float]:
+        """Take in a usable frame, taken `captured` seconds after tick 0; the angle that tendons as believed should
+        have had then, and its rate."""
         away = -self._nearer * math.log(seen.size)  # a marker at a bend b is b L/2 further off
         predicted = self._blind.angles(captured)
         self._frame = Followed(0.0, seen.time, seen.theta, predicted, 0.0, self._across(away), np.zeros(0))
+        before, after = (self._blind.angles(captured + each)[0] for each in (-self._period / 2.0, self._period / 2.0))
+        return float(predicted[0]), float(after - before) / self._period
 
     def see(self, time: float, load: float, position: Array) -> None:
         """Judge a tick."""
@@ -110,7 +114,7 @@ class Following:
         if value <= limit:
             self._beyond.pop(what, None)
             return
-        if now.time - self._beyond.setdefault(what, now.time) < self._limits.odd_for:
+        if now.time - self._beyond.setdefault(what, now.time) < self._limits.odd_for * limit / value:
             return
         raise self._stop(what, value, limit)
 

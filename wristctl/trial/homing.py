@@ -31,6 +31,8 @@ log = logging.getLogger(__name__)
 
 _CHECKED = 1.2
 """Share of `homing.pull` by which a tendon is reeled in to check it."""
+_AGAIN = 4
+"""Times as long for each reading, where a result is doubtful."""
 _FURTHEST_DEG = 10.0
 """A bend at which homing stops."""
 
@@ -97,11 +99,21 @@ class _Finder:
         self._go()
 
     def taut(self, axis: int, about: int) -> tuple[float, float, float]:
-        """Taut point [steps], steps per radian and friction [steps] of an axis that bends at `about`. Lets go again."""
+        """Taut point [steps], steps per radian and friction [steps] of an axis that bends at `about`. Lets go again.
+
+        Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
+        """
+        found = self._measured(axis, about, 1)
+        if not self._expected.has_steps(found[1]):
+            found = self._measured(axis, about, _AGAIN)
+        self._expected.judge_steps(axis, found[1])
+        return found
+
+    def _measured(self, axis: int, about: int, slowly: int) -> tuple[float, float, float]:
         reeled, bends = [], []
         for at in range(min(0, about - 3 * self._move), about + self._pull, self._move):
             self._reel(axis, at)
-            bend = self._bent(axis)
+            bend = self._bent(axis, slowly)
             if abs(bend.theta) > self._bend:
                 reeled.append(at)
                 bends.append(bend.theta)
@@ -118,7 +130,6 @@ class _Finder:
         self._expected.judge_side(axis, bend)
         if reeled[0] <= 0:  # it bends the wrist where it was at the start: the line alone may err by friction
             self._expected.judge_slack(axis, -offset / slope * self._spools.step)
-        self._expected.judge_steps(axis, float(1.0 / abs(slope)))
         return float(-offset / slope), float(1.0 / abs(slope)), float(friction)
 
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
@@ -128,11 +139,11 @@ class _Finder:
         self._board.home()
         return tuple(map(int, self._signs))
 
-    def _bent(self, axis: int) -> Bend:
-        """From straight. Raises SafetyStop where it is too far."""
+    def _bent(self, axis: int, slowly: int = 1) -> Bend:
+        """From straight, of so many times the usual rest and frames. Raises SafetyStop where it is too far."""
         patience = Patience(self._board)
-        patience.wait(self._settings.rest)
-        bend = self._expected.bend(self._straight, patience.reading(self._tracking, self._settings.frames))
+        patience.wait(slowly * self._settings.rest)
+        bend = self._expected.bend(self._straight, patience.reading(self._tracking, slowly * self._settings.frames))
         if abs(bend.theta) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
             what = f"axis {axis} bent the wrist by {math.degrees(bend.theta):.1f} deg while homing"

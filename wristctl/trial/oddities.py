@@ -11,11 +11,14 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.following import Greatest
+from wristctl.trial.marker_lag import MarkerLag
 
 _SHARE, _FOLLOWING = 0.6, {"apart": 0.35, "jump": 0.5, "across": 0.8}
 """Of a limit from which a value is worth a word, above what sound rigs of the default settings show."""
 _UNSEEN, _RESENT, _SKIPPED = 0.1, 0.002, 0.01
 """Shares beyond what is believed that are: of frames without an angle, of commands sent again, of ticks skipped."""
+_LAG = 0.015
+"""Seconds; no stepper's tendons as believed lag by 3 ms."""
 _MOVED, _LONG = 0.03, 0.85
 """Of the marker's side, and of the control period."""
 
@@ -41,6 +44,7 @@ class Oddities:
     """How often each verdict but ok came."""
     round_trips: list[float] = field(default_factory=list)
     """From each tick's command to its answer [s]."""
+    lag: MarkerLag = field(default_factory=MarkerLag)
     moved: float = 0.0
     """How far the base's marker was from where it was first, in its sides."""
     _base: Array | None = None
@@ -91,6 +95,9 @@ class Oddities:
             found.append(f"the base's marker moved by {100.0 * self.moved:.0f} % of its side: camera or clamp is loose")
         if self.round_trips and (taken := float(np.median(self.round_trips))) > _LONG * self.settings.control_period:
             found.append(f"the board's answers took {1e3 * taken:.1f} ms, of {1e3 * self.settings.control_period:g} ms")
+        if (lag := self.lag.least()) > _LAG:
+            what = f"the marker comes {1e3 * lag:.0f} ms or more after its motors"
+            found.append(f"{what}: pictures older than their stamps say, soft tendons or friction")
         if self.resent > _RESENT * self.ticks:
             found.append(f"{self.resent} commands sent again: see the cable")
         return "; ".join(found)

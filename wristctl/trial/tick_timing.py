@@ -13,8 +13,10 @@ from wristctl.config.hw_run import Safety
 from wristctl.trial.camera_pace import CameraPace
 from wristctl.trial.safety import SafetyStop
 
-_WINDOW = 1.0
-"""Seconds."""
+_WINDOW = 0.5
+"""Seconds that are judged together."""
+_EVERY = 4
+"""Ticks from one look at them to the next."""
 _SOUND = 0.6
 """Share of a period that the board's answer may take without being blamed."""
 
@@ -48,7 +50,8 @@ class TickTiming:
 
     def __post_init__(self) -> None:
         self._most = round(_WINDOW / self.period)
-        self._recent: deque[_Tick] = deque(maxlen=self._most)
+        self._recent: deque[_Tick] = deque()
+        self._due = 0
 
     def jitter(self, share: float) -> float:
         """This quantile of lateness [s]."""
@@ -64,23 +67,24 @@ class TickTiming:
         self.late.append(late)
         self.overruns += skipped
         self._recent.append(_Tick(round_trip, skipped, culprit))
+        self._due += 1 + skipped
+        while self._due - 1 - self._recent[0].skipped >= self._most:
+            self._due -= 1 + self._recent.popleft().skipped
 
     def judge(self, limits: Safety) -> None:
-        """Raises SafetyStop where too much of the last second's ticks was skipped, or spent waiting for the board."""
-        if len(self.late) % max(1, self._most // 20):
+        """Raises SafetyStop where too many of the last half second's ticks were skipped, or spent on the board."""
+        if self._due < self._most or len(self.late) % _EVERY:
             return
-        skipped = sum(each.skipped for each in self._recent)
-        if len(self._recent) + skipped < self._most:
-            return
+        skipped = self._due - len(self._recent)
         trip = float(np.median([each.round_trip for each in self._recent]))
         if trip > limits.round_trip * self.period:
             what = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * self.period:g} ms"
             raise SafetyStop(what, fix=FIX[LINK])
-        share = skipped / (len(self._recent) + skipped)
+        share = skipped / self._due
         if share > limits.skipped:
             blamed = Counter(each.culprit for each in self._recent if each.skipped)
             who = blamed.most_common(1)[0][0]
-            what = f"{100 * share:.0f} % of the last second's ticks were skipped: {who}"
+            what = f"{100 * share:.0f} % of the last half second's ticks were skipped: {who}"
             raise SafetyStop(what, fix=FIX[who])
 
     def said(self) -> str:

@@ -16,7 +16,7 @@ from wristctl.vision.view import View
 
 _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
-_LOOK_ROUND = 1.0
+_LOOK_ROUND = 0.15
 """Seconds between two searches of the whole picture for a second marker of the same id."""
 
 
@@ -83,8 +83,9 @@ class Tracker:
     """Follows the two markers; `zero` [rad] is the angle between them on the straight wrist.
 
     The base is clamped, so its place is averaged over `base_memory` and believed for as long while it is not seen.
-    Markers are looked for around their last place, and in the whole picture where they are not found there, and once a
-    second for others of the same id: finely, which takes longer, as long as no usual search has found both.
+    Markers are looked for around their last place, and in the whole picture where they are not found there, and several
+    times a second for others of the same id, at every frame while there is one: finely, which takes longer, as long as
+    no usual search has found both.
     """
 
     def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
@@ -122,6 +123,8 @@ class Tracker:
             everywhere = self._everywhere(frame.image, wanted)
             twice = {number: each for number, each in everywhere.items() if len(each) > 1}
             found = {**found, **twice} if len(found) == 2 else everywhere
+            if twice:
+                self._look_round = frame.time
         self._last_seen = {number: each[0] for number, each in found.items()}
         return found
 

@@ -18,7 +18,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Image
 from wristctl.vision.detector import print_of
 from wristctl.vision.pinhole import Pinhole
-from wristctl.vision.scene_parts import BASE_AT, Stroke, bent_across, clamp, fingers, last_disc, moving
+from wristctl.vision.scene_parts import BASE_AT, Stroke, bent_across, clamp, fingers, last_disc, moving, with_last_disc
 from wristctl.vision.view import View
 
 _CELL, _FINE, _BITS = 16, 6, 4
@@ -66,7 +66,7 @@ class Scene:
             image = self._still[swapped].copy()
             self._draw(image, drawing)
             place = last_disc(self._backbone, angles, self._wrist)
-            self._with_marker(image, self._prints[not swapped], place[0], place[1] * cmath.exp(1j * turned), True)
+            self._with_marker(image, self._prints[not swapped], place[0], place[1] * cmath.exp(1j * turned), place)
             if covered:
                 self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)], True))
             cv2.accumulate(image, total)
@@ -98,15 +98,20 @@ class Scene:
             elif self.camera.side * cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0.0:
                 cv2.fillConvexPoly(image, _fixed(pixels), stroke.grey, cv2.LINE_AA, _BITS)
 
-    def _with_marker(self, image: Image, print_: Image, centre: complex, along: complex, moving: bool = False) -> Image:
-        """Paint a print on its flag, its top edge toward `along`. The lens's distortion within it is left out."""
+    def _with_marker(
+        self, image: Image, print_: Image, centre: complex, along: complex, disc: tuple[complex, complex] | None = None
+    ) -> Image:
+        """Paint a print on its flag, its top edge toward `along`, and fixed to the last disc if that is given.
+
+        The lens's distortion within it is left out.
+        """
         half = 0.5 * self._markers.side * print_.shape[0] / (print_.shape[0] - 2 * _CELL)
         right = 1j * self.camera.side
         places = centre + along * half * np.array([1 - right, 1 + right, -1 + right, -1 - right])
         depth = np.full(4, -self._settings.marker_offset)
         points = np.stack([places.real, places.imag, depth], axis=-1)
-        if moving:
-            points = bent_across(points, self._across, self._wrist.length)
+        if disc is not None:
+            points = with_last_disc(points, self._across, self._wrist.length, disc)
         corners = self.camera.project(points)
         start = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
         width, height = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 2, self.camera.size) - start

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 from functools import cache
 from typing import Literal, NamedTuple
 
+import cv2
 import numpy as np
 
 from wristctl.arrays import Array
@@ -74,7 +77,7 @@ def bent_across(points: Array, bend: float, length: float) -> Array:
     """Points (m, 3) that a bend [rad] away from the camera carries along, of constant curvature up to x = `length`.
 
     The bend goes by the height x of a point, though a wrist that is bent in its plane too is a little longer than it
-    is high: at 30 degrees by 4 %.
+    is high, at 30 degrees by 4 %, and discs would curl: what is measured goes `with_last_disc`.
     """
     if not bend:
         return points
@@ -86,6 +89,32 @@ def bent_across(points: Array, bend: float, length: float) -> Array:
     raised = 2.0 * ahead * np.cos(0.5 * angle) + beyond * np.cos(angle) - depth * np.sin(angle)
     away = 2.0 * ahead * np.sin(0.5 * angle) + beyond * np.sin(angle) + depth * np.cos(angle)
     return np.stack([raised, y, away], axis=-1)
+
+
+def with_last_disc(points: Array, bend: float, length: float, disc: tuple[complex, complex]) -> Array:
+    """Points (m, 3) fixed to the last disc (its centre [m] and unit normal), which such a bend carries along as it is.
+
+    Of constant curvature in both planes: the wrist is one arc, in a plane of its own.
+    """
+    if not bend:
+        return points
+    centre, theta = np.array([disc[0].real, disc[0].imag, 0.0]), cmath.phase(disc[1])
+    turned = _turned(theta, bend) @ _turned(theta, 0.0).T
+    moved = centre + length * (_arc_end(theta, bend) - _arc_end(theta, 0.0))
+    found: Array = moved + (points - centre) @ turned.T
+    return found
+
+
+def _turned(theta: float, bend: float) -> Array:
+    """The rotation (3, 3) from the first disc to the last."""
+    return np.asarray(cv2.Rodrigues(np.array([0.0, -bend, theta]))[0])
+
+
+def _arc_end(theta: float, bend: float) -> Array:
+    """Where an arc of length 1 ends, that begins along x and bends toward y and depth."""
+    whole = math.hypot(theta, bend)
+    aside = 0.5 * np.sinc(0.5 * whole / np.pi) ** 2
+    return np.array([np.sinc(whole / np.pi), aside * theta, aside * bend])
 
 
 def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:
