@@ -29,7 +29,7 @@ from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import _advance
+from wristctl.simulation.rollout import _advance, columns_of
 from wristctl.simulation.worlds import World, facing, mismatches, plant_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.segments import load_segments
@@ -99,7 +99,8 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     law, followed = controller("smc-tracking"), motion(Reference(duration=0.3), WRIST, horizon, 1e-3)
     world = World(loop.model_copy(update={"plant": plant}), WRIST)
     lanes = Lanes(np.zeros(1, np.int64), np.zeros(1, np.int64), [(4, 2)])
-    return batch(law, np.array([gains_of(law, "camera")]), [followed], [world], lanes, PLANTS[plant.model], None, True)
+    gains, columns = np.array([gains_of(law, "camera")]), columns_of(True, loop.plant_segments)
+    return batch(law, gains, [followed], [world], lanes, PLANTS[plant.model], None, columns)
 
 
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:

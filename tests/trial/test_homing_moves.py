@@ -165,7 +165,7 @@ def test_doubtful_steps_are_measured_once_more_before_they_are_refused() -> None
         first = 0 not in measured
         return Wrist.angle(wrist) * (0.5 if first and reeled > 20 else 1.0)
 
-    wrist.tracking = Marker(wrist.board, angle)  # type: ignore[arg-type]
+    wrist.tracking = Marker(wrist.board, angle)
     zero = wrist.homed()
     assert zero.steps_per_radian[0] == pytest.approx(PER_RADIAN[0], rel=0.01)
 

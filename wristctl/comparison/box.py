@@ -22,7 +22,6 @@ from wristctl.lanes.cores import cores
 from wristctl.lanes.types import LANES
 from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
-from wristctl.simulation.kernel import RECORDED
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
 
@@ -104,12 +103,10 @@ def courses(row: Row, settings: Sequence[PaperSetting], references: Sequence[Ref
     motions = [motion(ref, each.wrist, horizons.max(), period) for ref, each in zip(references, settings, strict=True)]
     out = rollout(
         law, gains, motions, np.arange(len(settings)), [each.loop for each in settings],
-        [each.wrist for each in settings], record=True,
+        [each.wrist for each in settings], record="briefly",
     )  # fmt: skip
-    assert out.samples is not None
-    theta = out.samples[:, :, RECORDED.index("theta")]
     wanted, rests = np.array([each.theta_ref for each in motions]), np.array([each.rest for each in motions])
-    return Courses(theta, wanted, rests, horizons, period)
+    return Courses(out.columns("theta"), wanted, rests, horizons, period)
 
 
 def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool) -> dict[str, Array]:

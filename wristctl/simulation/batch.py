@@ -17,7 +17,7 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import readings, schedule
-from wristctl.simulation.kernel import RECORDED, LoopCourse, LoopState, LoopValues, Scratch, Setup
+from wristctl.simulation.kernel import LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch
 from wristctl.simulation.reference import Motion
@@ -69,9 +69,9 @@ def batch(
     lanes: Lanes,
     model: PlantModel,
     start: Start | None,
-    record: bool,
+    columns: int,
 ) -> Batch:
-    """The batch of `rollout`; all worlds have the same structure, timing and frames."""
+    """The batch of `rollout`, which records so many columns; all worlds have the same structure, timing and frames."""
     check_stops(worlds, max(float(np.abs(each.theta_ref).max()) for each in motions))
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
@@ -137,10 +137,12 @@ def batch(
         motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[lanes.world], count),
         tendons=None if ideal else spread(np.array([resting(each) for each in range(len(worlds))])[lanes.world], count),
         sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
-        record=np.empty((blocks, samples if record else 0, len(RECORDED) + k, *wide)),
+        record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
-    references = np.array([np.stack([m.theta_ref, m.rate_ref, m.acceleration_ref], axis=1) for m in motions])
+    references = np.empty((len(motions), samples, 3))
+    for each, own in zip(references, motions, strict=True):
+        each[:] = np.stack([own.theta_ref, own.rate_ref, own.acceleration_ref], axis=1)
     course = LoopCourse(references, _stacked(cases, samples), frames)
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)

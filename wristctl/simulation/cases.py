@@ -20,11 +20,10 @@ from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.energy import energy
-from wristctl.simulation.kernel import RECORDED
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
 from wristctl.simulation.reference import Motion
-from wristctl.simulation.rollout import Outcome, rollout, structure
+from wristctl.simulation.rollout import How, Outcome, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
 
 _RECORDED_AT_ONCE = 12_000_000
@@ -99,9 +98,11 @@ def measure(
     return Measured(found, failed, np.clip(lasted, 0.0, 1.0), np.array([case.rests for case in cases]))
 
 
-def _recorded(metrics: Sequence[str]) -> bool:
-    """Whether a metric needs more than sums."""
-    return any(METRICS[name].of_trajectory is not None for name in metrics)
+def _recorded(metrics: Sequence[str]) -> How:
+    """What the metrics need beyond sums."""
+    if any(METRICS[name].of_totals is None and name not in AT_ONCE for name in metrics):
+        return True
+    return "briefly" if any(name in AT_ONCE for name in metrics) else False
 
 
 def _alike(cases: Sequence[Case]) -> list[list[int]]:
@@ -112,18 +113,18 @@ def _alike(cases: Sequence[Case]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _pieces(rows: int, own: Sequence[int], like: Case, recorded: bool) -> list[tuple[Sequence[int], Sequence[int]]]:
+def _pieces(rows: int, own: Sequence[int], like: Case, recorded: How) -> list[tuple[Sequence[int], Sequence[int]]]:
     """Rows and cases that are run at once: all, or as many as can be kept in memory."""
     if not recorded:
         return [(range(rows), own)]
-    parts = pieces(own, like.loop, like.motion)
-    each = max(1, len(pieces(range(rows * len(own)), like.loop, like.motion)[0]) // len(parts[0]))
+    parts = pieces(own, like.loop, like.motion, recorded)
+    each = max(1, len(pieces(range(rows * len(own)), like.loop, like.motion, recorded)[0]) // len(parts[0]))
     return [(range(first, min(first + each, rows)), part) for part in parts for first in range(0, rows, each)]
 
 
-def pieces(own: Sequence[int], loop: Loop, followed: Motion) -> list[Sequence[int]]:
+def pieces(own: Sequence[int], loop: Loop, followed: Motion, recorded: How) -> list[Sequence[int]]:
     """Rollouts of such a loop in pieces whose samples can be kept in memory."""
-    most = max(1, _RECORDED_AT_ONCE // ((len(RECORDED) + loop.plant_segments) * len(followed.time)))
+    most = max(1, _RECORDED_AT_ONCE // (columns_of(recorded, loop.plant_segments) * len(followed.time)))
     return [own[at : at + most] for at in range(0, len(own), most)]
 
 
@@ -135,9 +136,7 @@ def at_once(
     if "oscillation" in metrics:
         found["oscillation"] = _oscillation(outcome, motions, which, step)
     if "energy" in metrics:
-        assert outcome.samples is not None
-        torque, rate = (outcome.samples[:, :, RECORDED.index(each)] for each in ("torque", "rate"))
-        found["energy"] = energy(torque, rate, step)
+        found["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
     return found
 
 
@@ -173,8 +172,7 @@ def _measured(
 
 def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.int64], step: float) -> Array:
     """The metric of that name, without a trajectory for each."""
-    assert outcome.samples is not None
-    theta = outcome.samples[:, :, RECORDED.index("theta")]
+    theta = outcome.columns("theta")
     found = np.empty(len(theta))
     with threadpool_limits(limits=1, user_api="blas"):
         for number, followed in enumerate(motions):

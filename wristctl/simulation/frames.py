@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,10 +15,18 @@ from wristctl.simulation.observer import Schedule
 
 def schedule(sensor: Sensor, period: float, horizon: float, believed: Sensor | None = None) -> Schedule:
     """Control ticks of the frames of `horizon` [s], (F,) each; the observer dates them by the believed delay."""
-    times = np.arange(int(horizon * sensor.frame_rate) + 1) / sensor.frame_rate
+    return _schedule(sensor.frame_rate, _delay(sensor, period), _delay(believed or sensor, period), period, horizon)
+
+
+@lru_cache(maxsize=64)
+def _schedule(frame_rate: float, late: int, believed: int, period: float, horizon: float) -> Schedule:
+    times = np.arange(int(horizon * frame_rate) + 1) / frame_rate
     captures = np.rint(times / period).astype(np.int64)
-    arrivals = captures + _delay(sensor, period)
-    return Schedule(captures, arrivals, np.maximum(arrivals - _delay(believed or sensor, period), 0))
+    arrivals = captures + late
+    found = Schedule(captures, arrivals, np.maximum(arrivals - believed, 0))
+    for each in found:
+        each.setflags(write=False)
+    return found
 
 
 def _delay(sensor: Sensor, period: float) -> int:

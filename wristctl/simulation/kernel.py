@@ -31,8 +31,10 @@ RECORDED = (
 """Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
 angle that the law sees, and the load that its observer estimates. theta is nan where the lane has failed."""
 
+BRIEFLY = RECORDED[:4]
+"""Those of them that are recorded where no more are asked for."""
 _ALIVE = SUMS.index("alive")
-_COLUMNS = len(RECORDED)
+_COLUMNS, _BRIEFLY = len(RECORDED), len(BRIEFLY)
 _SIDE = float(TENDONS_PER_SIDE)
 _NAN = float("nan")
 
@@ -86,8 +88,8 @@ class LoopState(NamedTuple):
 
     `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates,
     `tendons` what is remembered of tendons and springs that are not ideal, or None.
-    `record` [block, sample, column, lane] takes each sample's values, or has no samples. `watch` is the camera with its
-    observer, None where sensors are ideal.
+    `record` [block, sample, column, lane] takes each sample's values, all or BRIEFLY, or has no samples. `watch` is the
+    camera with its observer, None where sensors are ideal.
     """
 
     which: Any
@@ -176,14 +178,15 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 row[1] = rate
                 row[2] = wanted
                 row[3] = torque_of(seen.theta, known, plus, minus)
-                row[4] = plus / _SIDE
-                row[5] = minus / _SIDE
-                row[6] = acting_plus / _SIDE
-                row[7] = acting_minus / _SIDE
-                row[8] = seen.theta
-                row[9] = seen.load
-                for i in range(n):
-                    row[_COLUMNS + i] = q[i]
+                if state.record.shape[1] > _BRIEFLY:
+                    row[4] = plus / _SIDE
+                    row[5] = minus / _SIDE
+                    row[6] = acting_plus / _SIDE
+                    row[7] = acting_minus / _SIDE
+                    row[8] = seen.theta
+                    row[9] = seen.load
+                    for i in range(n):
+                        row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
             for _ in range(setup.substeps):
                 sum_[_ALIVE] = advance_or_stop(plant, q, rates, reeled, tendons, h, sum_[_ALIVE])

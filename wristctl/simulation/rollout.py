@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,8 @@ from wristctl.lanes.cores import cores
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.frames import schedule
-from wristctl.simulation.kernel import RECORDED, Span, run_blocks
+from wristctl.simulation.kept_samples import KeptSamples
+from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import GOALS, SUMS
@@ -33,26 +35,47 @@ _SHARES = 8
 """Least number of pieces of work for each thread, where there are so many blocks, so that all end together."""
 
 
+How = bool | Literal["briefly"]
+"""Whether samples are recorded: all columns, or BRIEFLY."""
+
+
+def columns_of(record: How, coordinates: int) -> int:
+    """How many columns of a plant with so many coordinates are recorded."""
+    if record == "briefly":
+        return len(BRIEFLY)
+    return len(RECORDED) + coordinates if record else 0
+
+
 @dataclass(frozen=True)
 class Outcome:
-    """Metrics of each rollout, shape (count,), and, where recorded, its samples (count, T, columns)."""
+    """Metrics of each rollout, shape (count,), and, where recorded, its samples."""
 
     metrics: dict[str, Array]
     failed: NDArray[np.bool_]
     """Rollouts whose wrist left its range, or bent to no number at all."""
     until: Array
     """When they were last within it [s]: where they have failed."""
-    samples: Array | None
+    kept: KeptSamples | None = None
+
+    @property
+    def samples(self) -> Array | None:
+        """All that was recorded of all, (count, T, columns)."""
+        return None if self.kept is None else self.kept.all()
 
     def column(self, name: str, rollout: int) -> Array:
         """One recorded column of one rollout, (T,)."""
-        assert self.samples is not None
-        return self.samples[rollout, :, RECORDED.index(name)]
+        assert self.kept is not None
+        return self.kept.rollout(rollout)[:, RECORDED.index(name)].copy()
+
+    def columns(self, name: str) -> Array:
+        """One recorded column of all, (count, T)."""
+        assert self.kept is not None
+        return self.kept.column(RECORDED.index(name))
 
     def coordinates(self, rollout: int) -> Array:
         """The plant's coordinates, the angles of its segments, (T, q) [rad]."""
-        assert self.samples is not None
-        return self.samples[rollout, :, len(RECORDED) :]
+        assert self.kept is not None
+        return self.kept.rollout(rollout)[:, len(RECORDED) :].copy()
 
 
 def rollout(
@@ -64,7 +87,7 @@ def rollout(
     wrist: WristParameters | Sequence[WristParameters],
     start: Start | None = None,
     streams: Sequence[Entropy] | None = None,
-    record: bool = False,
+    record: How = False,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
@@ -98,8 +121,8 @@ def rollout(
     metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in done[0].metrics}
     failed = np.concatenate([each.failed for each in done])[back]
     until = np.concatenate([each.until for each in done])[back]
-    samples = [each.samples for each in done if each.samples is not None]
-    return Outcome(metrics, failed, until, np.concatenate(samples)[back] if samples else None)
+    kept = [each.kept for each in done if each.kept is not None]
+    return Outcome(metrics, failed, until, KeptSamples.joined(kept, back) if kept else None)
 
 
 def worlds_of(
@@ -153,22 +176,22 @@ def _run(
     worlds: Sequence[World],
     lanes: Lanes,
     start: Start | None,
-    record: bool,
+    record: How,
     threads: int | None,
     progress: Callable[[float], None],
 ) -> Outcome:
     loop, count = worlds[0].loop, len(gains)
     model = PLANTS[loop.plant.model]
-    done = batch(controller, gains, motions, worlds, lanes, model, start, record)
+    columns = columns_of(record, model.coordinates(loop.plant_segments))
+    done = batch(controller, gains, motions, worlds, lanes, model, start, columns)
     _advance(done, kernel_of(run_blocks, model), threads or cores(), progress)
     done.setup.law.check()
     sums = to_rows(done.state.sums, count)
     goals = to_rows(done.world.goals, count)
-    kept = to_rows(done.state.record.reshape(done.blocks, -1, *done.wide), count) if record else None
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
-    samples = None if kept is None else kept.reshape(count, done.samples, -1)
-    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], samples)
+    kept = KeptSamples(done.state.record, count) if record else None
+    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], kept)
 
 
 def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None]) -> None:

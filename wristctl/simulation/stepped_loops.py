@@ -99,7 +99,7 @@ class SteppedLoops:
         self._look: Callable[..., None] = kernel_of(_look_blocks, model)
         self._groups = list[_Group]()
         for own in by_frames(worlds, world, motions[0].horizon):
-            made = batch(GIVEN, np.zeros((len(own), 1)), motions, *part_of(worlds, lanes, own), model, start, False)
+            made = batch(GIVEN, np.zeros((len(own), 1)), motions, *part_of(worlds, lanes, own), model, start, 0)
             self._groups.append(_Group(own, made, made.scratch(), np.empty((made.blocks, _ROWS, *made.wide))))
 
     @property

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +17,16 @@ from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Start, sample_period
-from wristctl.simulation.cases import AT_ONCE, at_once, pieces
+from wristctl.simulation.cases import AT_ONCE, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.reference import Motion, motion, toward
 from wristctl.simulation.rollout import rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
+
+_TOGETHER = 256
+"""Loops that run at once, while the next ones are prepared."""
 
 
 class SweptLoop(NamedTuple):
@@ -78,25 +82,38 @@ def swept_metrics() -> list[str]:
     return [name for name, metric in METRICS.items() if metric.of_totals is not None or name in AT_ONCE]
 
 
-def run_swept(loops: Sequence[SweptLoop], progress: Callable[[float], None] | None = None) -> SweptMetrics:
-    """Run all loops, those that differ in numbers alone side by side."""
-    names, count = swept_metrics(), len(loops)
-    found = SweptMetrics({name: np.empty(count) for name in names}, np.empty(count, bool), np.empty(count))
-    groups: dict[tuple[object, ...], list[int]] = {}
+def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
+    """Run all loops, those that differ in numbers alone side by side, and prepare more of them meanwhile."""
+    names = swept_metrics()
+    order, done = list[int](), list[SweptMetrics]()
+    with ThreadPoolExecutor(1) as pool:
+        running: Future[SweptMetrics] | None = None
+        for numbers, own in _pieces(loops):
+            if running is not None:
+                done.append(running.result())
+            running = pool.submit(_run, own, names)
+            order += numbers
+        if running is not None:
+            done.append(running.result())
+    back = np.argsort(order, kind="stable")
+    metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in names}
+    failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in done), strict=True))
+    return SweptMetrics(metrics, failed, until)
+
+
+def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptLoop]]]:
+    """Loops that can run as lanes of one batch, with their numbers, as soon as there are enough of a kind."""
+    waiting: dict[tuple[object, ...], tuple[list[int], list[SweptLoop]]] = {}
     for number, each in enumerate(loops):
-        groups.setdefault(each.kind, []).append(number)
-    done = 0
-    for group in groups.values():
-        for own in pieces(group, loops[group[0]].loop, loops[group[0]].motion):
-            _run(loops, own, names, found)
-            done += len(own)
-            if progress is not None:
-                progress(done / count)
-    return found
+        numbers, own = waiting.setdefault(each.kind, ([], []))
+        numbers.append(number)
+        own.append(each)
+        if len(own) == _TOGETHER:
+            yield waiting.pop(each.kind)
+    yield from waiting.values()
 
 
-def _run(loops: Sequence[SweptLoop], own: Sequence[int], names: Sequence[str], found: SweptMetrics) -> None:
-    chosen = [loops[each] for each in own]
+def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
     first = chosen[0]
     motions = list({id(each.motion): each.motion for each in chosen}.values())
     numbers = {id(each): number for number, each in enumerate(motions)}
@@ -105,9 +122,7 @@ def _run(loops: Sequence[SweptLoop], own: Sequence[int], names: Sequence[str], f
     outcome = rollout(
         first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
         [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
-        record=True,
+        record="briefly",
     )  # fmt: skip
     known = outcome.metrics | at_once(names, outcome, motions, which)
-    for name in names:
-        found.metrics[name][own] = known[name]
-    found.failed[own], found.until[own] = outcome.failed, outcome.until
+    return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)

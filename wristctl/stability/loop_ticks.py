@@ -17,7 +17,7 @@ from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.frames import schedule
-from wristctl.simulation.kernel import Span, run_blocks
+from wristctl.simulation.kernel import RECORDED, Span, run_blocks
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
@@ -170,7 +170,7 @@ class LoopTicks:
         lanes = Lanes(which, np.zeros(count, np.int64), [(0,)] * count)
         made = batch(
             self._law, gains, motions, [self._world], lanes, self._model,
-            lambda plant: np.full(k, self._theta / k), record=True,
+            lambda plant: np.full(k, self._theta / k), len(RECORDED) + k,
         )  # fmt: skip
         self._count, self._batch = count, made._replace(setup=made.setup._replace(ticks=1))
         self._scratch = made.scratch()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from wristctl.config.study import Study
@@ -36,10 +36,10 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
     return units
 
 
-def _studies(spec: Mapping[str, Any]) -> list[Study]:
+def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
     study = Study.model_validate_json(json.dumps(spec["study"]))
     axes = [SweepAxis(key, (), False, text) for key, text in spec["keys"]]
-    return [study_at(study, axes, _plain(values)) for values in spec["points"]]
+    return (study_at(study, axes, _plain(values)) for values in spec["points"])
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
@@ -51,12 +51,18 @@ def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Closed loops at the points as lanes: metrics by name, and which failed, a row for each point and repetition."""
     import numpy as np
 
-    from wristctl.simulation.swept_loops import run_swept, swept_loops
+    from wristctl.simulation.swept_loops import SweptLoop, run_swept, swept_loops
 
-    loops = [swept_loops(study) for study in _studies(spec)]
-    found = run_swept([each for own in loops for each in own])
-    point = np.repeat(np.arange(len(loops)), [len(own) for own in loops])
-    repetition = np.concatenate([np.arange(len(own)) for own in loops])
+    places = list[tuple[int, int]]()
+
+    def loops() -> Iterator[SweptLoop]:
+        for point, study in enumerate(_studies(spec)):
+            for repetition, each in enumerate(swept_loops(study)):
+                places.append((point, repetition))
+                yield each
+
+    found = run_swept(loops())
+    point, repetition = np.array(places).T
     rows = {"point": point, "repetition": repetition, "failed": found.failed, "until": found.until}
     return rows | {f"metric {name}": values for name, values in found.metrics.items()}
 
