@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
 from typing import Any
 
@@ -11,13 +12,14 @@ import pytest
 
 from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
-from wristctl.board.messages import JOG_RATE
+from wristctl.board.messages import JOG_RATE, Status
 from wristctl.config.hw_run import Homing
 from wristctl.config.plant import Actuator
-from wristctl.trial.expected_moves import ExpectedMoves
-from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
+from wristctl.trial.homing import Zero, check_zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
+from wristctl.wrist.directions import ACTIVE, away_of
 
 SPOOLS = spools_of(Actuator(level="tendon"))
 SLACK, PER_RADIAN = np.array([31, 52, 17, 44]), np.array([1900.0, 2000.0, 2100.0, 1950.0])
@@ -175,6 +177,51 @@ def test_slackened_tendons_are_paid_out_by_the_pull_each_in_its_sense() -> None:
     assert slacken(board, SPOOLS, Homing(pull=1e-3), (1, -1, 1, -1)) == (1, 2, 3, 4)
     steps = round(1e-3 / SPOOLS.step)
     assert board.told == [("go to", (-steps, steps, -steps, steps), JOG_RATE)]
+
+
+class Slackened(RigBoard):
+    """Goes where it is told."""
+
+    def go_to(self, positions: Sequence[int], rate: int) -> Status:
+        self.position[:] = positions
+        return super().go_to(positions, rate)
+
+
+@pytest.mark.parametrize(("short", "refused"), [(0, False), (20, False), (75, True), (120, True)])
+def test_a_tendon_that_is_still_taut_where_all_are_slackened_is_found(short: int, refused: bool) -> None:
+    """It lets the wrist move when all are let out by another 0.6 mm."""
+    board: Any = Slackened()
+    signs = (1, -1, 1, 1)
+    wrist = Wrist(signs, board=board)
+
+    def angle() -> float:
+        reeled = wrist.signs * board.position + np.array([0, 0, short, 0])
+        return GLUED + float((wrist.sides * np.maximum(0.0, reeled) / PER_RADIAN).sum())
+
+    tracking: Any = Marker(board, angle)
+    settings = settings_of(homing={"frames": 1, "rest": 0.0})
+    zero = Zero(signs, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    slacken(board, SPOOLS, settings.homing, signs)
+    if not refused:
+        check_zero(board, tracking, settings, WRIST, "ulnar", zero)
+        return
+    with pytest.raises(SafetyStop, match=r"a slackened wrist still moved by .* when it was slackened further"):
+        check_zero(board, tracking, settings, WRIST, "ulnar", zero)
+
+
+@pytest.mark.parametrize("plane", ["ulnar", "flexion"])
+def test_what_a_slackened_wrist_moves_away_from_is_named_and_what_it_moves_to(plane: str) -> None:
+    expected = ExpectedMoves(settings_of(), WRIST, plane)
+    diagonal = {1: 5, 5: 1, 2: 4, 4: 2}
+    for axis, tendon in enumerate(ACTIVE):
+        toward = 0.02 if on_plus_side(plane)[axis] else -0.02
+        away = 0.02 * away_of(plane, settings_of().markers.positive)[axis]
+        with pytest.raises(SafetyStop) as stopped:
+            expected.judge_slackened(Bend(toward, away))
+        assert f"tendon {diagonal[tendon]} is shorter than it was" in stopped.value.what
+        assert f"axis {axis} (tendon {tendon}) turns the wrong way" in stopped.value.what
+    expected.judge_slackened(Bend(0.004, 0.003))
+    expected.judge_slackened(Bend(-0.005, math.nan))
 
 
 @pytest.mark.parametrize(("share", "refused"), [(0.83, True), (0.87, False), (1.3, False), (1.45, True)])

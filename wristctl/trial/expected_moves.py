@@ -17,6 +17,8 @@ _HARDER = 1.5
 """Springs that are stiffer than believed and friction may ask for so many times the pull that the model says."""
 _LEAST, _MOST = 0.6, 1.35
 """Shares of the believed bend that a small move may make: soft tendons and where zero was found."""
+_SLACK = 0.7
+"""Of the least bend that is one, what a wrist without a taut tendon may move by: noise, and springs that creep."""
 _SCREWED = "check which tendon is on which motor, and markers.positive"
 
 
@@ -60,6 +62,10 @@ class ExpectedMoves:
         """How the wrist is bent against a reading when it was straight."""
         return Bend(seen.theta - straight.theta, -self._scale * math.log(seen.size / straight.size))
 
+    def _axis_of(self, plus: bool, away: int) -> int:
+        """The axis that pulls to this side of the plane, and away from the camera (1) or toward it (-1)."""
+        return next(k for k in range(4) if (bool(self._plus[k]), self._away[k]) == (plus, away))
+
     def judge_side(self, axis: int, bend: Bend) -> None:
         """Raises SafetyStop where a bend by reeling in is another tendon's. One of noise tells nothing."""
         noise = 0.5 * math.radians(self._homing.bend_deg)
@@ -67,7 +73,7 @@ class ExpectedMoves:
         away = self._away[axis] if not abs(bend.away) > noise else (1 if bend.away > 0.0 else -1)
         if (plus, away) == (bool(self._plus[axis]), self._away[axis]):
             return
-        like = next(k for k in range(4) if (bool(self._plus[k]), self._away[k]) == (plus, away))
+        like = self._axis_of(plus, away)
         where = "to the other side than" if plus != self._plus[axis] else "across its plane otherwise than"
         what = f"axis {axis} bends the wrist {where} tendon {ACTIVE[axis]} should: as tendon {ACTIVE[like]} would"
         likely = f"motors of axes {axis} and {like} exchanged, or tendons {ACTIVE[axis]} and {ACTIVE[like]}"
@@ -108,6 +114,19 @@ class ExpectedMoves:
             return
         what = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
         raise SafetyStop(what, "homing", "see whether it chafes or its sheath is bent sharply; or raise homing.sticks")
+
+    def judge_slackened(self, bend: Bend) -> None:
+        """Raises SafetyStop where a wrist that nothing should hold moves when its tendons are let out further."""
+        if bend.askew <= _SLACK * math.radians(self._homing.bend_deg):
+            return
+        away = 1 if bend.away > 0.0 else -1
+        pulls, holds = self._axis_of(bend.theta > 0.0, away), self._axis_of(bend.theta < 0.0, -away)
+        what = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
+        likely = (
+            f"tendon {ACTIVE[holds]} is shorter than it was, caught or slipped on its pulley, or axis {pulls} "
+            f"(tendon {ACTIVE[pulls]}) turns the wrong way"
+        )
+        raise SafetyStop(f"{what}; likely {likely}", "homing", "see tendons and motors, then calibrate the wrist again")
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""

@@ -165,9 +165,14 @@ class _Finder:
         self._board.jog(list(self._start + self._signs * self._at))
 
 
-def slacken(board: Board, spools: Spools, settings: Homing, signs: Sequence[int]) -> tuple[int, ...]:
-    """Let the tendons of a homed wrist go, so that nothing holds it; where the motors then stand [steps]."""
-    reeled = -round(settings.pull / spools.step)
+def slacken(
+    board: Board, spools: Spools, settings: Homing, signs: Sequence[int], times: float = 1.0
+) -> tuple[int, ...]:
+    """Let the tendons of a homed wrist go, so that nothing holds it; where the motors then stand [steps].
+
+    They are let out by so many times `homing.pull`.
+    """
+    reeled = -round(times * settings.pull / spools.step)
     one, two, four, five = (reeled * sign for sign in signs)
     return board.go_to((one, two, four, five), JOG_RATE).position
 
@@ -200,12 +205,17 @@ def check_zero(
 ) -> None:
     """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
 
-    Raises SafetyStop where a motor turns the wrong way or winds another tendon than its own.
+    Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
     """
     expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
     patience = Patience(board)
-    straight = patience.reading(tracking, homing.frames)
+    held = patience.reading(tracking, 4 * homing.frames)
+    slacken(board, spools, homing, zero.signs, 2.0)
+    patience = Patience(board)
+    patience.wait(0.5 * homing.let_go)
+    straight = patience.reading(tracking, 4 * homing.frames)
+    expected.judge_slackened(expected.bend(held, straight))
     for axis in range(AXES):
         at = np.full(AXES, slack)
         at[axis] = reeled
