@@ -121,6 +121,8 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
         if not rest and isinstance(own, Section):
             raise UserError(f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(own)))}")
+        if rest and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
+            return section.model_copy(update={name: new})
         # all that it has, since what is left out would be a default, copied deeply
         made = type(section).model_validate({**section.__dict__, **extra, name: new}, by_name=True)
         object.__setattr__(made, "__pydantic_fields_set__", section.model_fields_set | {name})

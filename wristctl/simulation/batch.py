@@ -72,6 +72,8 @@ def batch(
     columns: int,
 ) -> Batch:
     """The batch of `rollout`, which records so many columns; all worlds have the same structure, timing and frames."""
+    filmed, (worlds, body) = worlds, _bodies(worlds)
+    world = body[lanes.world]
     check_stops(worlds, max(float(np.abs(each.theta_ref).max()) for each in motions))
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
@@ -96,12 +98,12 @@ def batch(
         """A row of each world's as blocks; of one world as one block for all."""
         if len(worlds) == 1:
             return spread(row(0), max(1, *wide, 1))[:1]
-        return spread(np.array([row(each) for each in range(len(worlds))])[lanes.world], count)
+        return spread(np.array([row(each) for each in range(len(worlds))])[world], count)
 
     def limits(each: int) -> Array:
-        world = worlds[each]
-        most = world.wrist.tension_limit if world.loop.limits else np.inf
-        return np.array([world.wrist.pretension, most, bending_limit(actual[each], world.loop.plant.end_stop_deg)])
+        loop, wrist = worlds[each]
+        most = wrist.tension_limit if loop.limits else np.inf
+        return np.array([wrist.pretension, most, bending_limit(actual[each], loop.plant.end_stop_deg)])
 
     def at_the_motors(each: int) -> Array:
         drive = None if level is None else Drive(level, counted[each])
@@ -127,15 +129,15 @@ def batch(
     )
     kinds = list(dict.fromkeys(each.loop.disturbances for each in worlds))
     cases = [acting(each, motions[0].time) for each in kinds]
-    case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[lanes.world]
-    watch, frames = _watch(worlds, lanes, motions[0].horizon, model, rest)
+    case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[world]
+    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
         memory=spread(np.zeros(max(1, controller.memory)), count),
-        coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[lanes.world], count),
-        motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[lanes.world], count),
-        tendons=None if ideal else spread(np.array([resting(each) for each in range(len(worlds))])[lanes.world], count),
+        coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[world], count),
+        motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[world], count),
+        tendons=None if ideal else spread(np.array([resting(each) for each in range(len(worlds))])[world], count),
         sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
@@ -146,6 +148,16 @@ def batch(
     course = LoopCourse(references, _stacked(cases, samples), frames)
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
+
+
+def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
+    """Of worlds that differ in nothing but their cameras one each, and which of them every world is like."""
+    found, which = dict[tuple[object, ...], tuple[int, World]](), []
+    for each in worlds:
+        loop = each.loop
+        parts = id(each.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits
+        which.append(found.setdefault(parts, (len(found), each))[0])
+    return [each for _, each in found.values()], np.array(which)
 
 
 def sample_period(control_period: float) -> float:
