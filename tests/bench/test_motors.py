@@ -179,6 +179,15 @@ def test_turned_to_the_other_plane_it_is_straight_and_other_tendons_bend_it() ->
     assert abs(pins.after(402).truth().angle[-1]) < 0.01
 
 
+def test_a_tendon_alone_swings_the_wrist_as_much_across_the_plane_as_in_it_at_every_moment() -> None:
+    """Springs, masses and damping are the same both ways; four segments are a little otherwise than one."""
+    pins = Pins()
+    pins.steps(100, 2)
+    course = pins.after(600).truth()
+    assert np.ptp(course.angle[60:150]) > 0.1 * course.angle[-1], "it swings"
+    assert np.abs(course.angle + course.across).max() < 0.03 * np.abs(course.angle).max()
+
+
 def test_its_course_is_told_since_a_time_at_the_ends_of_milliseconds() -> None:
     wrist = bent(Pins(), 2, 3)
     assert wrist.time == pytest.approx(0.4)

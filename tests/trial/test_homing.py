@@ -16,7 +16,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
 
-QUICK = {"move": 1e-4, "rest": 0.08, "frames": 2, "slack": 8e-4, "let_go": 1.0}
+QUICK = {"move": 1e-4, "rest": 0.15, "frames": 2, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 

@@ -67,7 +67,7 @@ class SpoolState(NamedTuple):
     latch: Any
     reeled: Any
     pull: Any
-    bent: Any  # (1,) [rad] across the plane, away from the camera
+    bent: Any  # (2,) across the plane, away from the camera [rad], and its rate [rad/s]
 
 
 def spool_state_of(settings: BenchSettings) -> SpoolState:
@@ -85,7 +85,7 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
         latch=np.zeros(1, np.int64),
         reeled=-slack,
         pull=np.zeros(AXES),
-        bent=np.zeros(1),
+        bent=np.zeros(2),
     )
 
 
@@ -141,7 +141,7 @@ class Hanging(NamedTuple):
 
 @compiled
 def _bend_across(spools: Any, across: Any, stiffness: float) -> None:
-    """A period of the bend across the plane: damping carries what tendons, springs and gravity leave, no mass."""
+    """A period of the bend across the plane, linearly implicit in damping and stiffness."""
     resisting = across.stiffness
     moment = across.moment - across.stiffness * spools.bent[0]
     for axis in range(AXES):
@@ -149,7 +149,11 @@ def _bend_across(spools: Any, across: Any, stiffness: float) -> None:
         moment += lever * pull
         if pull > 0.0:
             resisting += stiffness * lever * lever
-    spools.bent[0] += PERIOD * moment / (across.damping + PERIOD * resisting)
+    rate = spools.bent[1]
+    push = moment - (across.damping + PERIOD * resisting) * rate
+    rate += PERIOD * push / (across.inertia + PERIOD * across.damping + PERIOD * PERIOD * resisting)
+    spools.bent[0] += PERIOD * rate
+    spools.bent[1] = rate
 
 
 def follow(

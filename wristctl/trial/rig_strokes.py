@@ -29,10 +29,8 @@ _TAKEN_UP, _FURTHEST = math.radians(1.0), math.radians(12.0)
 """Bend [rad] at which the tendon counts as taut; at which strokes end."""
 _MOVE, _REST = 0.12e-3, 0.15
 """Tendon [m] taken up by one move, and the pause [s] after it."""
-_BEFORE, _AFTER, _BACK, _SETTLED = 0.15, 0.35, 0.4, 0.3
+_BEFORE, _AFTER, _BACK, _SETTLED = 0.15, 0.35, 0.4, 0.8
 """Seconds for which a stroke is watched before and after it begins; for the way back, and up to where it begins."""
-_BELOW = 0.8e-3
-"""Tendon [m] by which the way back goes further."""
 _SILENCE = 0.5
 """Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer."""
 _UNDERWAY = 0.5e-3
@@ -68,8 +66,8 @@ class RigStrokes:
         high, _ = self._crept(low, sense, _ENDED, _LONGEST)
         found, rng = list[MotorStroke](), np.random.default_rng(0)
         while len(found) < MOST:
-            self._watch(low - sense * round(_BELOW / self._step), JOG_RATE, _BACK)
-            self._watch(low, JOG_RATE, _SETTLED)  # from below: friction is to hold back already when the stroke begins
+            self._watch(0, JOG_RATE, _BACK)  # slack: friction is to hold back already when the stroke begins
+            self._watch(low, JOG_RATE, _SETTLED)
             # at random, so that strokes begin anywhere between two pictures
             found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
             told(len(found))

@@ -17,6 +17,8 @@ class Across(NamedTuple):
     stiffness: float
     """Springs, less what upright gravity takes [N m/rad]."""
     damping: float
+    inertia: float
+    """Of the straight wrist with its hand [kg m^2]."""
     moment: float
     """Of gravity across the straight wrist [N m]."""
     levers: Array
@@ -33,5 +35,6 @@ def across_of(wrist: WristParameters, away: Sequence[int]) -> Across:
     along, aside = wrist.gravity
     lowering = wrist.mass * length / 12.0 + wrist.hand_mass * (length / 3.0 + hand)
     beside = wrist.mass * length / 6.0 + wrist.hand_mass * (0.5 * length + hand)
+    inertia = wrist.mass * length**2 / 20.0 + wrist.hand_mass * (0.5 * length + hand) ** 2
     levers = wrist.tendon_offset * np.array(away, float)
-    return Across(wrist.stiffness + along * lowering, wrist.damping, aside * beside * float(away[-1]), levers)
+    return Across(wrist.stiffness + along * lowering, wrist.damping, inertia, aside * beside * float(away[-1]), levers)
