@@ -144,7 +144,7 @@ def batch(
     )
     references = np.empty((len(motions), samples, 3))
     for each, own in zip(references, motions, strict=True):
-        each[:] = np.stack([own.theta_ref, own.rate_ref, own.acceleration_ref], axis=1)
+        np.stack([own.theta_ref, own.rate_ref, own.acceleration_ref], axis=1, out=each)
     course = LoopCourse(references, _stacked(cases, samples), frames)
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)

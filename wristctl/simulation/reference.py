@@ -157,7 +157,10 @@ def _moves(
     before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
     arc = _straight(wrist, time)
     for number, change in enumerate(targets - before):
-        arc += change[:, None, None] * kind.course(reference, time - number * reference.duration)
+        course = kind.course(reference, time - number * reference.duration)
+        for row, by in zip(arc, change.tolist(), strict=True):
+            if by:
+                row += by * course
     return arc, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
 
 

@@ -15,7 +15,8 @@ def _step(reference: Reference, time: Array) -> Array:
 
 def _sine(reference: Reference, time: Array) -> Array:
     w = 2.0 * np.pi * reference.frequency
-    return 0.5 * np.stack([1.0 - np.cos(w * time), w * np.sin(w * time), w * w * np.cos(w * time)])
+    cosine = np.cos(w * time)
+    return 0.5 * np.stack([1.0 - cosine, w * np.sin(w * time), w * w * cosine])
 
 
 def _minimum_jerk(reference: Reference, time: Array) -> Array:
