@@ -35,6 +35,8 @@ _SHOWN, _CAMERA = np.deg2rad(1.0), 3.0 / 60.0
 """Difference from a sound wrist that a frame can show, and how long after."""
 _ALIKE = np.deg2rad(0.5), 3.0
 """True radians and newtons above a sound run's, below which a fault had no effect."""
+_CREEPS = 1.0
+"""Seconds without a moving reference before what is seen of a fault: small moves are made, if any."""
 _AHEAD, _FIRST = 0.01, ("homing", "moving")
 _FULL = {
     "directions": ("ulnar", "flexion"), "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
@@ -234,6 +236,8 @@ def judge(cases: Sequence[Case], phase: Phase, course: Course, sound: Course) ->
     shown = [_shown(case, begin, course, sound) for case in demanding or cases]
     seen = min(shown) if demanding else max(shown)  # of two that may be tolerated, either may end it
     seconds = max(0.0, stopped - seen) if course.reason else np.nan
+    near = (course.moves > seen - _CREEPS) & (course.moves <= stopped)
+    creeping |= not near.any()  # it came out in the small moves before a further plane's motion
     name = " + ".join(case.name for case in cases)
     ends = {each for case in cases for each in case.right(phase)}
     right = end in ends if len(cases) == 1 else end == "caught" or all("tolerated" in c.right(phase) for c in cases)
