@@ -32,7 +32,7 @@ from wristctl.wrist.kinematics import chain_tip
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "build" / "screenshots"
 
-HOMING = "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}"
+HOMING = "homing={move: 1.0e-4, rest: 0.15, frames: 2, slack: 5.0e-4, let_go: 1.0}"
 QUICK = (
     "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.5", "--set", "back=0.3",
     "--set", "reference={duration: 0.4, angle_deg: 10.0}", "--set", HOMING,
