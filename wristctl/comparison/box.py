@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -79,20 +80,29 @@ def react(
 ) -> Reactions:
     """Every row in every setting; `mirrored` turns the references to the other side."""
     found = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
-    groups = _alike(settings)
+    work = [(own, row) for own in _alike(settings) for row in rows]
+
+    def ran(task: tuple[NDArray[np.intp], Row]) -> dict[str, Array]:
+        return _ran(task[1], [settings[each] for each in task[0]], mirrored)
+
     done = 0
-    for own in groups:
-        chosen = [settings[each] for each in own]
-        for row in rows:
-            for name, each in _ran(row, chosen, mirrored).items():
-                found[row.label][name][own] = each
-            done += len(own)
-            if progress is not None:
-                progress(done / (len(settings) * len(rows)))
+    with ThreadPoolExecutor(cores()) as pool:
+        try:
+            for (own, row), read in zip(work, pool.map(ran, work), strict=True):
+                for name, each in read.items():
+                    found[row.label][name][own] = each
+                done += len(own)
+                if progress is not None:
+                    progress(done / (len(settings) * len(rows)))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     return Reactions(settings, found)
 
 
-def courses(row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference]) -> Courses:
+def courses(
+    row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference], threads: int | None = None
+) -> Courses:
     """What one row does in settings that can run in one batch, each with a reference of its own."""
     law = controller(row.controller)
     gains = np.tile(gains_of(law, row.gains, None), (len(settings), 1))
@@ -103,7 +113,7 @@ def courses(row: Row, settings: Sequence[PaperSetting], references: Sequence[Ref
     motions = [motion(ref, each.wrist, horizons.max(), period) for ref, each in zip(references, settings, strict=True)]
     out = rollout(
         law, gains, motions, np.arange(len(settings)), [each.loop for each in settings],
-        [each.wrist for each in settings], record="briefly",
+        [each.wrist for each in settings], record="briefly", threads=threads,
     )  # fmt: skip
     wanted, rests = np.array([each.theta_ref for each in motions]), np.array([each.rest for each in motions])
     return Courses(out.columns("theta"), wanted, rests, horizons, period)
@@ -112,7 +122,7 @@ def courses(row: Row, settings: Sequence[PaperSetting], references: Sequence[Ref
 def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool) -> dict[str, Array]:
     """The readings (settings,) of one row."""
     references = [each.reference.mirrored() if mirrored else each.reference for each in settings]
-    return readings(courses(row, settings, references))
+    return readings(courses(row, settings, references, threads=1))
 
 
 def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
@@ -121,8 +131,8 @@ def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
     for number in sorted(range(len(settings)), key=lambda each: settings[each].horizon):
         each = settings[number]
         groups.setdefault((*structure(each.loop), each.measured), []).append(number)
-    most = LANES * cores()  # a core runs so many side by side, until the longest horizon among them
-    found = [np.array(own[k : k + most]) for own in groups.values() for k in range(0, len(own), most)]
+    # a core runs so many side by side, until the longest horizon among them
+    found = [np.array(own[k : k + LANES]) for own in groups.values() for k in range(0, len(own), LANES)]
     return sorted(found, key=lambda own: -settings[own[0]].loop.control_period)
 
 
