@@ -21,7 +21,7 @@ def kept(count: int, blocks: int, lanes: int) -> tuple[KeptSamples, np.ndarray]:
     """Of random numbers, with them as (count, T, columns)."""
     numbers = np.random.default_rng(count).random((blocks * lanes, SAMPLES, COLUMNS))
     of_blocks = numbers.reshape(blocks, lanes, SAMPLES, COLUMNS).transpose(0, 2, 3, 1)
-    return KeptSamples(of_blocks if lanes > 1 else of_blocks[..., 0], count), numbers[:count]
+    return KeptSamples.of(of_blocks if lanes > 1 else of_blocks[..., 0], count), numbers[:count]
 
 
 @pytest.mark.parametrize(("count", "blocks", "lanes"), [(1, 1, 1), (5, 1, 8), (8, 1, 8), (19, 3, 8)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,7 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     """The same, run to its end."""
     done = prepared(plant, loop, horizon)
-    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, lambda share: None)
+    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, lambda share: None, Event())
     return done
 
 

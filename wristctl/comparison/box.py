@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.cores import cores
+from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.lanes.types import LANES
 from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
@@ -82,27 +83,25 @@ def react(
     found = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
     work = [(own, row) for own in _alike(settings) for row in rows]
 
-    def ran(task: tuple[NDArray[np.intp], Row]) -> dict[str, Array]:
-        return _ran(task[1], [settings[each] for each in task[0]], mirrored)
+    done, stop = 0, Event()
 
-    done = 0
-    with ThreadPoolExecutor(cores()) as pool:
-        try:
-            for (own, row), read in zip(work, pool.map(ran, work), strict=True):
-                for name, each in read.items():
-                    found[row.label][name][own] = each
-                done += len(own)
-                if progress is not None:
-                    progress(done / (len(settings) * len(rows)))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    def ran(task: tuple[NDArray[np.intp], Row]) -> dict[str, Array]:
+        return _ran(task[1], [settings[each] for each in task[0]], mirrored, stop)
+
+    with stoppable(cores(), stop) as pool:
+        for (own, row), read in zip(work, pool.map(ran, work), strict=True):
+            for name, each in read.items():
+                found[row.label][name][own] = each
+            done += len(own)
+            if progress is not None:
+                progress(done / (len(settings) * len(rows)))
     return Reactions(settings, found)
 
 
 def courses(
-    row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference], threads: int | None = None
-) -> Courses:
+    row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference], threads: int | None = None,
+    stop: Event | None = None,
+) -> Courses:  # fmt: skip
     """What one row does in settings that can run in one batch, each with a reference of its own."""
     law = controller(row.controller)
     gains = np.tile(gains_of(law, row.gains, None), (len(settings), 1))
@@ -113,16 +112,16 @@ def courses(
     motions = [motion(ref, each.wrist, horizons.max(), period) for ref, each in zip(references, settings, strict=True)]
     out = rollout(
         law, gains, motions, np.arange(len(settings)), [each.loop for each in settings],
-        [each.wrist for each in settings], record="briefly", threads=threads,
+        [each.wrist for each in settings], record="briefly", threads=threads, stop=stop,
     )  # fmt: skip
     wanted, rests = np.array([each.theta_ref for each in motions]), np.array([each.rest for each in motions])
     return Courses(out.columns("theta"), wanted, rests, horizons, period)
 
 
-def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool) -> dict[str, Array]:
+def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> dict[str, Array]:
     """The readings (settings,) of one row."""
     references = [each.reference.mirrored() if mirrored else each.reference for each in settings]
-    return readings(courses(row, settings, references, threads=1))
+    return readings(courses(row, settings, references, 1, stop))
 
 
 def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:

@@ -117,15 +117,15 @@ def _pieces(rows: int, own: Sequence[int], like: Case, recorded: How) -> list[tu
     """Rows and cases that are run at once: all, or as many as can be kept in memory."""
     if not recorded:
         return [(range(rows), own)]
-    parts = pieces(own, like.loop, like.motion, recorded)
-    each = max(1, len(pieces(range(rows * len(own)), like.loop, like.motion, recorded)[0]) // len(parts[0]))
+    most = at_most(like.loop, like.motion, recorded)
+    parts = [own[at : at + most] for at in range(0, len(own), most)]
+    each = max(1, min(most, rows * len(own)) // len(parts[0]))
     return [(range(first, min(first + each, rows)), part) for part in parts for first in range(0, rows, each)]
 
 
-def pieces(own: Sequence[int], loop: Loop, followed: Motion, recorded: How) -> list[Sequence[int]]:
-    """Rollouts of such a loop in pieces whose samples can be kept in memory."""
-    most = max(1, _RECORDED_AT_ONCE // (columns_of(recorded, loop.plant_segments) * len(followed.time)))
-    return [own[at : at + most] for at in range(0, len(own), most)]
+def at_most(loop: Loop, followed: Motion, recorded: How) -> int:
+    """Rollouts of such a loop whose samples can be kept in memory."""
+    return max(1, _RECORDED_AT_ONCE // (columns_of(recorded, loop.plant_segments) * len(followed.time)))
 
 
 def at_once(

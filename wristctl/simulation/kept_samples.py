@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,39 +11,43 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 
 
-class KeptSamples:
-    """Samples of `count` rollouts out of (blocks, T, columns, LANES), or (1, T, columns) of one alone."""
+class KeptSamples(NamedTuple):
+    """Samples of rollouts, of a batch or of several."""
 
-    def __init__(self, blocks: Array, count: int) -> None:
-        self._parts = [blocks if blocks.ndim == 4 else blocks[..., None]]
-        self._places = np.stack([np.zeros(count, np.int64), np.arange(count)], axis=1)
+    parts: Sequence[Array]
+    """Of each batch (blocks, T, columns, lanes)."""
+    places: NDArray[np.int64]
+    """Of each rollout its batch and which of that one's it is, (count, 2)."""
 
     @classmethod
-    def joined(cls, parts: Sequence[KeptSamples], order: NDArray[np.int64]) -> KeptSamples:
-        """Of all parts after each other, in this order."""
-        found = cls.__new__(cls)
-        found._parts = [each for part in parts for each in part._parts]
-        before = np.cumsum([0, *(len(part._parts) for part in parts)])
-        places = [part._places + np.array([first, 0]) for first, part in zip(before[:-1].tolist(), parts, strict=True)]
-        found._places = np.concatenate(places)[order]
-        return found
+    def of(cls, record: Array, count: int) -> Self:
+        """A batch's record, (blocks, T, columns, LANES), or (1, T, columns) of a rollout alone."""
+        places = np.stack([np.zeros(count, np.int64), np.arange(count)], axis=1)
+        return cls([record if record.ndim == 4 else record[..., None]], places)
+
+    @classmethod
+    def joined(cls, kept: Sequence[KeptSamples], order: NDArray[np.int64]) -> Self:
+        """Of all after each other, in this order."""
+        before = np.cumsum([0, *(len(each.parts) for each in kept)])
+        places = [each.places + np.array([first, 0]) for first, each in zip(before.tolist(), kept, strict=False)]
+        return cls([part for each in kept for part in each.parts], np.concatenate(places)[order])
 
     def column(self, number: int) -> Array:
         """One column of every rollout, (count, T)."""
-        found = np.empty((len(self._places), self._parts[0].shape[1]))
-        for part, blocks in enumerate(self._parts):
-            own = np.flatnonzero(self._places[:, 0] == part)
-            lanes = np.moveaxis(blocks[:, :, number], 1, 2).reshape(-1, blocks.shape[1])
-            found[own] = lanes[self._places[own, 1]]
+        found = np.empty((len(self.places), self.parts[0].shape[1]))
+        for part, blocks in enumerate(self.parts):
+            own = np.flatnonzero(self.places[:, 0] == part)
+            block, lane = np.divmod(self.places[own, 1], blocks.shape[3])
+            found[own] = blocks[block, :, number, lane]
         return found
 
     def rollout(self, number: int) -> Array:
         """A view of one rollout's samples, (T, columns)."""
-        part, lane = self._places[number]
-        blocks = self._parts[part]
-        found: Array = blocks[lane // blocks.shape[3], :, :, lane % blocks.shape[3]]
+        part, each = self.places[number]
+        blocks = self.parts[part]
+        found: Array = blocks[each // blocks.shape[3], :, :, each % blocks.shape[3]]
         return found
 
     def all(self) -> Array:
         """Everything, (count, T, columns)."""
-        return np.array([self.rollout(each) for each in range(len(self._places))])
+        return np.array([self.rollout(each) for each in range(len(self.places))])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import Event
 from typing import Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_rows
 from wristctl.lanes.cores import cores
+from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.frames import schedule
@@ -90,6 +90,7 @@ def rollout(
     record: How = False,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    stop: Event | None = None,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
@@ -97,8 +98,8 @@ def rollout(
     controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and
     what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
     ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
-    (count,) are the entropies of the cameras' noise; all meet the same where none is given. Raises what a plain law
-    has raised; such rollouts run one by one.
+    (count,) are the entropies of the cameras' noise; all meet the same where none is given. Where another thread sets
+    `stop`, the outcome comes soon and is of no use. Raises what a plain law has raised; such rollouts run one by one.
     """
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
@@ -107,6 +108,7 @@ def rollout(
     if controller.plain:
         groups = [np.array([each]) for each in range(count)]
     done: list[Outcome] = []
+    stop = stop or Event()
     for own in groups:
         before = sum(map(len, (each.failed for each in done)))
 
@@ -114,7 +116,8 @@ def rollout(
             if progress is not None:
                 progress((before + share * size) / count)
 
-        done.append(_run(controller, gains[own], motions, *part_of(worlds, lanes, own), start, record, threads, so_far))
+        part = part_of(worlds, lanes, own)
+        done.append(_run(controller, gains[own], motions, *part, start, record, threads, so_far, stop))
     if len(done) == 1:
         return done[0]
     back = np.argsort(np.concatenate(groups), kind="stable")
@@ -179,28 +182,31 @@ def _run(
     record: How,
     threads: int | None,
     progress: Callable[[float], None],
+    stop: Event,
 ) -> Outcome:
     loop, count = worlds[0].loop, len(gains)
     model = PLANTS[loop.plant.model]
     columns = columns_of(record, model.coordinates(loop.plant_segments))
     done = batch(controller, gains, motions, worlds, lanes, model, start, columns)
-    _advance(done, kernel_of(run_blocks, model), threads or cores(), progress)
+    _advance(done, kernel_of(run_blocks, model), threads or cores(), progress, stop)
     done.setup.law.check()
     sums = to_rows(done.state.sums, count)
     goals = to_rows(done.world.goals, count)
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
-    kept = KeptSamples(done.state.record, count) if record else None
+    kept = KeptSamples.of(done.state.record, count) if record else None
     return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], kept)
 
 
-def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None]) -> None:
-    """Run all blocks to the end, on so many threads."""
+def _advance(
+    done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None], stop: Event
+) -> None:
+    """Run all blocks to the end, or until they are to stop, on so many threads."""
     setup, blocks, samples = done.setup, done.blocks, done.samples
     each = samples * setup.ticks * setup.substeps
     together = max(1, min(_SLICE_TICKS // each, blocks // (_SHARES * workers)))
     piece = max(1, _SLICE_TICKS // (setup.ticks * setup.substeps))
-    stop, ended = threading.Event(), [0] * blocks
+    ended = [0] * blocks
 
     def run(begin: int) -> None:
         end, scratch = min(begin + together, blocks), done.scratch()
@@ -217,10 +223,6 @@ def _advance(done: Batch, kernel: Callable[..., None], workers: int, progress: C
             run(begin)
             progress(sum(ended) / (blocks * samples))
         return
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            for _ in pool.map(run, pieces):
-                progress(sum(ended) / (blocks * samples))
-        except BaseException:
-            stop.set()
-            raise
+    with stoppable(workers, stop) as pool:
+        for _ in pool.map(run, pieces):
+            progress(sum(ended) / (blocks * samples))

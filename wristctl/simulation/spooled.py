@@ -6,9 +6,8 @@ reeled in anew before each step: the element with its friction is the same for b
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
 from wristctl.lanes.cores import cores
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import part, rows_of
+from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.wrist.elastic import Nonideal, Tendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
 from wristctl.wrist.moving import advance_or_stop
@@ -147,7 +147,7 @@ def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, ev
     blocks, which = _lanes(wrists, h), np.atleast_2d(lanes_of(count))
     wide, samples = blocks.wrist.shape[2:], -(-steps // every)
     out, move = np.empty((len(which), samples, len(Spooled._fields), *wide)), kernel_of(_move, PCC)
-    stop = threading.Event()
+    stop = Event()
 
     def run(block: int) -> None:
         own = _Lanes(*(each[block] for each in blocks))
@@ -159,12 +159,8 @@ def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, ev
             driven = told(middle, which[block]).reshape(last - first, 2, *wide)
             move(PCC, own, np.ascontiguousarray(driven), _Timing(h, first, every), out[block], cut)
 
-    with ThreadPoolExecutor(cores()) as pool:
-        try:
-            list(pool.map(run, range(len(which))))
-        except BaseException:
-            stop.set()
-            raise
+    with stoppable(cores(), stop) as pool:
+        list(pool.map(run, range(len(which))))
     rows: Array = to_rows(out.reshape(len(out), -1, *wide), count).reshape(count, samples, -1)
     return Spooled(*np.moveaxis(rows, 2, 0))
 

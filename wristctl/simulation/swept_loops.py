@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
+from threading import Event
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
+from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Start, sample_period
-from wristctl.simulation.cases import AT_ONCE, at_once
+from wristctl.simulation.cases import AT_ONCE, at_most, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
@@ -86,12 +88,12 @@ def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
     """Run all loops, those that differ in numbers alone side by side, and prepare more of them meanwhile."""
     names = swept_metrics()
     order, done = list[int](), list[SweptMetrics]()
-    with ThreadPoolExecutor(1) as pool:
+    with stoppable(1, stop := Event()) as pool:
         running: Future[SweptMetrics] | None = None
         for numbers, own in _pieces(loops):
             if running is not None:
                 done.append(running.result())
-            running = pool.submit(_run, own, names)
+            running = pool.submit(_run, own, names, stop)
             order += numbers
         if running is not None:
             done.append(running.result())
@@ -108,12 +110,12 @@ def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptL
         numbers, own = waiting.setdefault(each.kind, ([], []))
         numbers.append(number)
         own.append(each)
-        if len(own) == _TOGETHER:
+        if len(own) == min(_TOGETHER, at_most(each.loop, each.motion, "briefly")):
             yield waiting.pop(each.kind)
     yield from waiting.values()
 
 
-def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
+def _run(chosen: Sequence[SweptLoop], names: Sequence[str], stop: Event) -> SweptMetrics:
     first = chosen[0]
     motions = list({id(each.motion): each.motion for each in chosen}.values())
     numbers = {id(each): number for number, each in enumerate(motions)}
@@ -122,7 +124,7 @@ def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
     outcome = rollout(
         first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
         [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
-        record="briefly",
+        record="briefly", stop=stop,
     )  # fmt: skip
     known = outcome.metrics | at_once(names, outcome, motions, which)
     return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)
