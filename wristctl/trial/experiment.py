@@ -140,8 +140,7 @@ class Experiment:
         """A loop at rest at zero in this plane; the first one homes the board, others read the slack wrist's marker."""
         settings, tracking = self._settings, testbed.tracking()
         if self.zero is not None:
-            slacken(board, spools_of(settings.actuator), settings.homing, self.zero.signs)
-            Patience(board).wait(settings.homing.let_go)
+            self._let_go(board, self.zero)
         watching = Patience(board)
         marker = watching.angle(tracking, 4 * settings.homing.frames)
         watching.pace.fits(settings.safety.stale)
@@ -164,11 +163,16 @@ class Experiment:
         settings, known = self._settings, self._calibration
         if known is not None and settings.positions == "stored":
             known.restore(board)
-            slacken(board, spools_of(settings.actuator), settings.homing, known.zero.signs)
+            self._let_go(board, known.zero)
             check_zero(board, tracking, settings, self._wrist, plane, known.zero)
             return known.zero
         signs = known.zero.signs if known else None
         return find_zero(board, tracking, settings, self._wrist, plane, signs)
+
+    def _let_go(self, board: Board, zero: Zero) -> None:
+        """Slacken the tendons, and give the wrist time to straighten."""
+        slacken(board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
+        Patience(board).wait(self._settings.homing.let_go)
 
     def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
