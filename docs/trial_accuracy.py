@@ -52,8 +52,8 @@ def tried(rig: Rig) -> dict[str, float] | str:
         command = [sys.executable, "-m", "wristctl", "hw-run", "--quiet", "--out", folder, *settings]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
-            said = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
-            return said[0].removeprefix("error: ").split(";")[0].split(" - fix")[0]
+            said = done.stderr.strip().splitlines()[-1].removeprefix("error: ")
+            return said.split(";")[0].split(" - fix")[0]
         trials = pd.read_csv(Path(done.stdout.split()[-1]) / "data" / "trials.csv")
     still, pushed = trials[trials["push"] == 0.0].iloc[0], trials[trials["push"] > 0.0].iloc[0]
     return {
