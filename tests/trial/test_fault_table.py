@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from tests.trial.fault_cases import CASES, EXCEPTED, PHASES, Case, Phase
-from tests.trial.fault_runs import Judged, by_phase, fan_out, from_power_on, perform, rig_settings, sound_course, table
+from tests.trial.fault_judging import Judged, by_phase, table
+from tests.trial.fault_runs import fan_out, from_power_on, perform, rig_settings, sound_course
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 thorough = pytest.mark.skipif(not THOROUGH, reason="with WRISTCTL_THOROUGH: takes minutes")
