@@ -36,7 +36,7 @@ def _task(
         local = np.maximum(time - whole * np.floor(time / whole + 1e-12), 0.0)
         found = np.zeros((3, len(time)))
         for number, change in enumerate(np.diff(angles)):
-            found += change * np.stack(minimum_jerk(local - number * duration, duration))
+            found += change * minimum_jerk(local - number * duration, duration)
         return found
 
     signs = ("extension", "flexion") if plane == "flexion" else ("radial", "ulnar")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Literal
 
@@ -96,13 +96,19 @@ class Motion:
         return float(self.theta_ref[-1])
 
 
-def minimum_jerk(time: Array, duration: float) -> tuple[Array, Array, Array]:
-    """The minimum-jerk course from 0 to 1 and two time derivatives (Flash and Hogan, J. Neurosci. 5 (1985) 1688)."""
-    s = np.clip(time / duration, 0.0, 1.0)
-    course = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    rate = 30.0 * s**2 * (1.0 - s) ** 2 / duration
-    acceleration = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration**2
-    return course, rate, acceleration
+def minimum_jerk(time: Array, duration: float) -> Array:
+    """The minimum-jerk course from 0 to 1 and two derivatives, (3, T), by the time (T,) since it began.
+
+    From Flash and Hogan, J. Neurosci. 5 (1985) 1688.
+    """
+    found = np.zeros((3, len(time)))
+    found[0, time >= duration] = 1.0
+    moving = np.flatnonzero((time > 0.0) & (time < duration))
+    s = time[moving] / duration
+    found[0, moving] = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    found[1, moving] = 30.0 * s**2 * (1.0 - s) ** 2 / duration
+    found[2, moving] = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration**2
+    return found
 
 
 def motion(
@@ -121,74 +127,96 @@ def motion(
 
 @lru_cache(maxsize=64)
 def _known(reference: Reference, length: float, range_deg: float, horizon: float, period: float) -> Motion:
+    if _bends_alone(reference):
+        of_any = _bending(reference, range_deg, horizon, period)
+        bend = of_any.theta_ref, of_any.rate_ref, of_any.acceleration_ref
+        return replace(of_any, tips=lambda: _tips(np.array(bend), _unstretched(length, of_any.time)))
     wrist = WristParameters(length=length, range_deg=range_deg)  # all that it depends on
     return _evaluated(reference, wrist, horizon, period, None)
+
+
+def _bends_alone(reference: Reference) -> bool:
+    """Whether it asks for angles, and the length of the arc stays."""
+    targets = REFERENCES[reference.kind].targets
+    return reference.inverse == "none" and reference.tip is None and targets in ("end", "angles_deg")
+
+
+@lru_cache(maxsize=64)
+def _bending(reference: Reference, range_deg: float, horizon: float, period: float) -> Motion:
+    """Such a motion, but for its tips: wrists of any length have the same angles, in the same arrays."""
+    return _evaluated(reference, _ranging(range_deg), horizon, period, None)
+
+
+@lru_cache(maxsize=64)
+def _ranging(range_deg: float) -> WristParameters:
+    return WristParameters(range_deg=range_deg)
 
 
 def _evaluated(
     reference: Reference, wrist: WristParameters, horizon: float, period: float, network: Inverse | None
 ) -> Motion:
     kind = REFERENCES[reference.kind]
-    time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
-    arc, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
+    time = _grid(horizon, period)
+    bend, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
     rest = kind.rest(reference, begin, horizon)
-    theta, wanted, tips = arc[0], arc[0][0], partial(_tips, arc)
-    angles, outside = (theta[0], theta[1], theta[2]), 0.0
+    wanted, tips = bend[0], partial(_tips, bend, length)
+    angles, outside = (bend[0], bend[1], bend[2]), 0.0
     if reference.inverse != "none":
-        found = _inverse(reference, network)(arc_path(arc[0], arc[1]))
+        found = _inverse(reference, network)(arc_path(bend, length))
         angles, outside = (found.theta, found.rate, found.acceleration), float(np.mean(found.outside))
-    for each in (time, *angles, wanted, arc):
+    for each in (*angles, wanted, bend, length):
         each.setflags(write=False)
     return Motion(time, *angles, wanted, tips, move, begin, rest, horizon, outside)
 
 
-def _tips(arc: Array) -> Array:
-    """Of angle and length of an arc, (2, 3, T)."""
-    found = arc_path(arc[0], arc[1]).position
+@lru_cache(maxsize=64)
+def _grid(horizon: float, period: float) -> Array:
+    time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
+    time.setflags(write=False)
+    return time
+
+
+def _tips(bend: Array, length: Array) -> Array:
+    found = arc_path(bend, length).position
     found.setflags(write=False)
     return found
 
 
+def _unstretched(length: float, time: Array) -> Array:
+    return np.broadcast_to(np.array([[length], [0.0], [0.0]]), (3, len(time)))
+
+
 def _moves(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Array, float, float]:
-    """Angle and length of the arc with two derivatives (2, 3, T), the last move [rad], and when it begins."""
+) -> tuple[Array, Array, float, float]:
+    """Angle and length of the arc with two derivatives (3, T), the last move [rad], and when it begins."""
     targets = np.array(_targets(reference, kind, wrist))
     before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
-    arc = _straight(wrist, time)
-    for number, change in enumerate(targets - before):
-        course = kind.course(reference, time - number * reference.duration)
-        for row, by in zip(arc, change.tolist(), strict=True):
-            if by:
-                row += by * course
-    return arc, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
+    bend, length = np.zeros((3, 1)), _unstretched(wrist.length, time)
+    for number, (turn, stretch) in enumerate((targets - before).tolist()):
+        course = kind.course(reference, time - number * reference.duration if number else time)
+        bend = bend + turn * course
+        if stretch:
+            length = length + stretch * course
+    return bend, length, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
 
 
 def _whole(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Array, float, float]:
+) -> tuple[Array, Array, float, float]:
     """The same of a course that has no targets: its last move is from straight to where it ends."""
-    course, arc = kind.course(reference, time), _straight(wrist, time)
-    if course.ndim == 3:
-        arc[:] = course
-    else:
-        arc[0] = course
-    most = float(np.abs(arc[0, 0]).max(initial=0.0))
+    course = kind.course(reference, time)
+    bend, length = course if course.ndim == 3 else (course, _unstretched(wrist.length, time))
+    most = float(np.abs(bend[0]).max(initial=0.0))
     if most > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
-        at = time[int(np.argmax(np.abs(arc[0, 0])))]
+        at = time[int(np.argmax(np.abs(bend[0])))]
         raise UserError(
             f"{reference_name(reference)} bends by {np.rad2deg(most):.1f} deg at {at:.3g} s, "
             f"beyond the wrist's range of +-{wrist.range_deg:g} deg",
             where="reference",
             fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",
         )
-    return arc, float(arc[0, 0, -1]), 0.0
-
-
-def _straight(wrist: WristParameters, time: Array) -> Array:
-    arc = np.zeros((2, 3, len(time)))
-    arc[1, 0] = wrist.length
-    return arc
+    return bend, length, float(bend[0, -1]), 0.0
 
 
 def _targets(reference: Reference, kind: ReferenceKind, wrist: WristParameters) -> list[tuple[float, float]]:

@@ -14,13 +14,16 @@ def _step(reference: Reference, time: Array) -> Array:
 
 
 def _sine(reference: Reference, time: Array) -> Array:
-    w = 2.0 * np.pi * reference.frequency
-    cosine = np.cos(w * time)
-    return 0.5 * np.stack([1.0 - cosine, w * np.sin(w * time), w * w * cosine])
+    w, found = 2.0 * np.pi * reference.frequency, np.empty((3, len(time)))
+    phase = w * time
+    cosine = np.cos(phase)
+    found[0], found[1], found[2] = 1.0 - cosine, w * np.sin(phase), w * w * cosine
+    found *= 0.5
+    return found
 
 
 def _minimum_jerk(reference: Reference, time: Array) -> Array:
-    return np.stack(minimum_jerk(time, reference.duration))
+    return minimum_jerk(time, reference.duration)
 
 
 def _millimetres(tip: tuple[float, float]) -> str:

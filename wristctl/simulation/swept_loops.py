@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future
-from threading import Event
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +14,6 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
-from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.cases import AT_ONCE, at_most, at_once
@@ -26,9 +23,6 @@ from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.reference import Motion, motion, toward
 from wristctl.simulation.rollout import rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
-
-_TOGETHER = 256
-"""Loops that run at once, while the next ones are prepared."""
 
 
 class SweptLoop(NamedTuple):
@@ -85,18 +79,11 @@ def swept_metrics() -> list[str]:
 
 
 def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
-    """Run all loops, those that differ in numbers alone side by side, and prepare more of them meanwhile."""
-    names = swept_metrics()
-    order, done = list[int](), list[SweptMetrics]()
-    with stoppable(1, stop := Event()) as pool:
-        running: Future[SweptMetrics] | None = None
-        for numbers, own in _pieces(loops):
-            if running is not None:
-                done.append(running.result())
-            running = pool.submit(_run, own, names, stop)
-            order += numbers
-        if running is not None:
-            done.append(running.result())
+    """Run all loops, those that differ in numbers alone side by side."""
+    names, order, done = swept_metrics(), list[int](), list[SweptMetrics]()
+    for numbers, own in _pieces(loops):
+        order += numbers
+        done.append(_run(own, names))
     back = np.argsort(order, kind="stable")
     metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in names}
     failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in done), strict=True))
@@ -110,21 +97,21 @@ def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptL
         numbers, own = waiting.setdefault(each.kind, ([], []))
         numbers.append(number)
         own.append(each)
-        if len(own) == min(_TOGETHER, at_most(each.loop, each.motion, "briefly")):
+        if len(own) == at_most(each.loop, each.motion, "briefly"):
             yield waiting.pop(each.kind)
     yield from waiting.values()
 
 
-def _run(chosen: Sequence[SweptLoop], names: Sequence[str], stop: Event) -> SweptMetrics:
+def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
     first = chosen[0]
-    motions = list({id(each.motion): each.motion for each in chosen}.values())
-    numbers = {id(each): number for number, each in enumerate(motions)}
-    which = np.array([numbers[id(each.motion)] for each in chosen])
+    motions = list({id(each.motion.theta_ref): each.motion for each in chosen}.values())  # which may differ in tips
+    numbers = {id(each.theta_ref): number for number, each in enumerate(motions)}
+    which = np.array([numbers[id(each.motion.theta_ref)] for each in chosen])
     start: Start | None = equilibrium(first.loop) if first.at_rest else None
     outcome = rollout(
         first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
         [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
-        record="briefly", stop=stop,
+        record="briefly",
     )  # fmt: skip
     known = outcome.metrics | at_once(names, outcome, motions, which)
     return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)
