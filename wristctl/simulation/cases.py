@@ -28,7 +28,8 @@ from wristctl.simulation.worlds import plant_of
 
 _RECORDED_AT_ONCE = 12_000_000
 """Numbers that are kept of rollouts whose samples are wanted."""
-
+_SPECTRA = 256
+"""Loops whose spectra are worked out at once."""
 
 AT_ONCE = ("oscillation", "energy")
 """Metrics of courses that are taken of many rollouts without a trajectory for each."""
@@ -175,7 +176,9 @@ def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.
     theta = outcome.columns("theta")
     found = np.empty(len(theta))
     with threadpool_limits(limits=1, user_api="blas"):
-        for number, followed in enumerate(motions):
-            own = np.flatnonzero(which == number)
-            found[own] = oscillations(theta[own], followed.theta_ref, step)
+        for first in range(0, len(theta), _SPECTRA):
+            own = slice(first, first + _SPECTRA)
+            there, followed = np.unique(which[own], return_inverse=True)
+            references = np.array([motions[each].theta_ref for each in there])
+            found[own] = oscillations(theta[own], references, followed, step)
     return found

@@ -7,9 +7,11 @@ error's, over the last second or the last two of its periods, with all up to fou
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.simulation.trajectory import Trajectory
@@ -24,26 +26,23 @@ _HARMONICS = 4.0
 _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
+_FIRST = np.zeros(1, np.int64)
 _ENOUGH = 0.01
 """Between samples that show how fast a reference goes [s]: no wrist follows 50 Hz."""
-_TOGETHER = 256
-"""Loops whose spectra are worked out at once."""
 
 
 def oscillation(course: Trajectory) -> float:
     """Half the peak-to-peak [rad] that is left at rest; nan where the wrist has failed or there is no time to rest."""
-    found = float(oscillations(course.theta[None], course.theta_ref, _step(course))[0])
+    found = float(oscillations(course.theta[None], course.theta_ref[None], _FIRST, _step(course))[0])
     return _UNKNOWN if math.isnan(found) else found
 
 
-def oscillations(theta: Array, theta_ref: Array, step: float) -> Array:
-    """The same of many loops (L,) that follow one reference (T,), of their angles (L, T) `step` [s] apart."""
+def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step: float) -> Array:
+    """The same of many loops (L,), of their angles (L, T) `step` [s] apart, and which (L,) of references (M, T) each
+    follows."""
     found = np.full(len(theta), _UNKNOWN)
-    for first in range(0, len(theta), _TOGETHER):
-        own = slice(first, first + _TOGETHER)
-        left = _remaining(theta[own], theta_ref, step)
-        if left is not None:
-            found[own] = np.ptp(left, axis=1) / 2.0
+    for own, left in _remaining(theta, references, which, step):
+        found[own] = np.ptp(left, axis=1) / 2.0
     return found
 
 
@@ -69,34 +68,39 @@ def hunting(course: Trajectory) -> float:
 
 def oscillation_frequency(course: Trajectory) -> float:
     """Of what is left the strongest frequency [1/s]; nan where there is nothing."""
-    left = _remaining(course.theta[None], course.theta_ref, _step(course))
-    if left is None or not np.ptp(left) >= _STILL:
-        return _UNKNOWN
-    return float(_strongest(left, _step(course))[0])
+    for _, left in _remaining(course.theta[None], course.theta_ref[None], _FIRST, _step(course)):
+        if np.ptp(left) >= _STILL:
+            return float(_strongest(left, _step(course))[0])
+    return _UNKNOWN
 
 
-def _remaining(theta: Array, theta_ref: Array, step: float) -> Array | None:
-    """What is left at the end of each course (L, T), its trend or what follows its reference removed, (L, W) [rad].
-
-    nan where a wrist has failed, None where there is no time to rest.
-    """
-    window, samples = round(WINDOW / step), len(theta_ref)
+def _remaining(
+    theta: Array, references: Array, which: NDArray[np.int64], step: float
+) -> Iterator[tuple[NDArray[np.intp], Array]]:
+    """Of loops that are judged alike, what is left at the end of each course (l, W) [rad], its trend or what follows
+    its reference removed: nan where a wrist has failed. Of none, where there is no time to rest."""
+    window, samples = round(WINDOW / step), references.shape[1]
     if window > samples:
-        return None
-    if np.ptp(theta_ref[-window:]) == 0.0:
-        return _without_trend(theta[:, -window:])
-    frequency = float(_strongest(theta_ref[None] - theta_ref.mean(), step, max(1, round(_ENOUGH / step)))[0])
-    window = min(samples, max(window, round(2.0 / (frequency * step))))
-    error = (theta - theta_ref)[:, -window:]
-    degree = 4 + round(
-        math.pi * _HARMONICS * frequency * step * window
-    )  # a polynomial follows so many waves, and no more
-    basis = _polynomials(window, min(degree, window // 2))
-    left: Array = error - error @ basis @ basis.T
-    return left
+        return
+    rests = np.ptp(references[:, -window:], axis=1) == 0.0
+    if rests.any():  # whichever it follows
+        own = np.flatnonzero(rests[which])
+        yield own, _without_trend(theta[own, -window:])
+    if rests.all():
+        return
+    swing = references - references.mean(axis=1, keepdims=True)
+    frequency = _strongest(swing, step, max(1, round(_ENOUGH / step)))
+    windows = np.clip(np.rint(2.0 / (frequency * step)), window, samples).astype(int)
+    waves = math.pi * _HARMONICS * frequency * step * windows  # a polynomial follows so many waves, and no more
+    degrees = np.minimum(4 + np.rint(waves).astype(int), windows // 2)
+    for most, degree in dict.fromkeys(zip(windows[~rests].tolist(), degrees[~rests].tolist(), strict=True)):
+        own = np.flatnonzero((~rests & (windows == most) & (degrees == degree))[which])
+        basis = _polynomials(most, degree)
+        error = theta[own, -most:] - references[which[own], -most:]
+        yield own, error - error @ basis @ basis.T
 
 
-@lru_cache(8)
+@lru_cache(32)
 def _polynomials(samples: int, degree: int) -> Array:
     """An orthonormal basis of the polynomials up to a degree, (samples, degree + 1)."""
     basis: Array = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, samples), degree))[0]
