@@ -126,7 +126,7 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
     zero, view = 0.0 * low, now_of(scratch.now)
     for tick in range(out.shape[0]):
         for value in range(3):
-            target[value] = course.references[0, tick, value] + zero
+            target[value] = course.references[0, value, tick] + zero
         seen = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
         wanted, _, _, plus, minus = respond(control, known, seen, (low, high), 0.0, setup.period)
         row = rows_of(out[tick])

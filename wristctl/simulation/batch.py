@@ -142,9 +142,9 @@ def batch(
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
-    references = np.empty((len(motions), samples, 3))
+    references = np.empty((len(motions), 3, samples))
     for each, own in zip(references, motions, strict=True):
-        np.stack([own.theta_ref, own.rate_ref, own.acceleration_ref], axis=1, out=each)
+        each[0], each[1], each[2] = own.theta_ref, own.rate_ref, own.acceleration_ref
     course = LoopCourse(references, _stacked(cases, samples), frames)
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
@@ -166,11 +166,11 @@ def sample_period(control_period: float) -> float:
 
 
 def _stacked(cases: Sequence[Array | None], samples: int) -> Array | None:
-    """Each case's disturbances, (cases, T, 2); None where nothing acts in any of them."""
+    """Each case's disturbances, (cases, 2, T); None where nothing acts in any of them."""
     if all(case is None for case in cases):
         return None
     nothing = np.tile((0.0, 1.0), (samples, 1))
-    return np.array([nothing if case is None else case for case in cases])
+    return np.array([(nothing if case is None else case).T for case in cases])
 
 
 def _watch(

@@ -56,8 +56,8 @@ class Setup(NamedTuple):
 class LoopCourse(NamedTuple):
     """What happens over time, on the sample grid, and the ticks of frames.
 
-    `references` [motion, sample, (angle, rate, acceleration)], continued between samples by its own derivatives;
-    `acting` [case, sample, (tip force, stiffness scale)] or None; `schedule` of the frames or None.
+    `references` [motion, (angle, rate, acceleration), sample], continued between samples by its own derivatives;
+    `acting` [case, (tip force, stiffness scale), sample] or None; `schedule` of the frames or None.
     """
 
     references: Any
@@ -155,7 +155,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             angle, rate = tip_angle(plant, q, rates)
             seen = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
             for ahead in range(1, setup.preview + 1):
-                to_come = min((now_tick + ahead) // ticks, course.references.shape[1] - 1)
+                to_come = min((now_tick + ahead) // ticks, course.references.shape[2] - 1)
                 gather_lanes(course.references, state.which, to_come, targets)
                 look_ahead(control, ahead, (now_tick + ahead - to_come * ticks) * period)
             if setup.preview > 0:
@@ -223,10 +223,10 @@ def _rows(state: Any) -> Any:
 
 @compiled
 def gather_lanes(tables: Any, which: Any, sample: int, out: Any) -> None:
-    """Each lane's own values of one sample, from tables [case, sample, value] into [value, lane]."""
+    """Each lane's own values of one sample, from tables [case, value, sample] into [value, lane]."""
     for value in range(out.shape[0]):
         for lane in range(len(which)):
-            out[value, lane] = tables[which[lane], sample, value]
+            out[value, lane] = tables[which[lane], value, sample]
 
 
 @compiled
