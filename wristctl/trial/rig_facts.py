@@ -31,7 +31,7 @@ _SLOW_CAMERA, _UNEVEN, _UNSTAMPED, _WOKEN = 0.9, 0.3, 5e-3, 0.2
 """What is worth a word: share of the expected pictures, scatter over their interval, seconds of age that stamps do not
 tell, share of a period by which one tick in a hundred begins late."""
 _SURE = 0.7e-3
-"""Standard deviation [s] of a camera's age that is enough: what friction does to a stroke is more, 2 to 3 ms."""
+"""Standard deviation [s] of a camera's age that is enough: what friction does to a stroke is as much."""
 _SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
 """Of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's."""
 
