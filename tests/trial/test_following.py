@@ -12,7 +12,7 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.trial.blind_model import BlindModel
 from wristctl.trial.following import Following
-from wristctl.trial.likely_causes import Evidence, likely_causes
+from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side
 from wristctl.vision.marker import Sighting, SightingVerdict
@@ -201,3 +201,18 @@ def test_causes_of_the_whole_wrist_go_by_how_far_it_moved() -> None:
     assert "bends by less" in of(turned=turned, meant=0.2, bent=0.1)[0]
     assert "marker has slipped" in of(jump=0.1)[0]
     assert of(load=1.0)[-1] == "something holds or pushes the wrist"
+
+
+def test_a_loop_that_swings_is_said_to_before_any_tendon_is_blamed() -> None:
+    assert "swings" in of(reversals=3)[0] and "swings" in of(across=0.05, load=1.0, reversals=5)[0]
+    assert not any("swings" in each for each in (*of(reversals=2), *of(across=0.05, load=1.0)))
+
+
+@pytest.mark.parametrize(("frequency", "size", "found"), [(0.5, 300, 1), (2.0, 300, 4), (4.0, 21, 6), (4.0, 19, 0)])
+def test_a_spool_turns_back_where_it_goes_forty_steps_each_way(frequency: float, size: int, found: int) -> None:
+    """Counted over a second; the slack tendons' spools stand still."""
+    time = np.arange(0.0, 1.0, 5e-3)
+    courses = np.zeros((len(time), 4))
+    courses[:, 2] = np.rint(size * np.sin(2.0 * np.pi * frequency * time))
+    assert reversals(courses) == found and reversals(-courses) == found
+    assert reversals(np.cumsum(np.abs(courses), axis=0)) == 0, "it goes on and on"

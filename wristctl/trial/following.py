@@ -13,14 +13,14 @@ from wristctl.arrays import Array
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.likely_causes import Evidence, likely_causes
+from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side
 from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import away_of
 
-_HISTORY = 0.2
-"""Seconds by which causes are judged."""
+_HISTORY, _SWINGING = 0.2, 1.0
+"""Seconds by which causes are judged, and whether the loop swings."""
 _SUCCESSIVE = 0.06
 """Seconds between two frames from which the wrist may have gone anywhere."""
 _REFERENCE_FRAMES = 5
@@ -70,6 +70,7 @@ class Following:
         self._straight: list[float] = []
         self._beyond: dict[str, float] = {}
         self._past: deque[Followed] = deque()
+        self._positions: deque[Array] = deque(maxlen=round(_SWINGING / period))
 
     def predict(self, reeled_plus: float, reeled_minus: float) -> None:
         """Go on to the next tick, with the sides reeled in by so much [m] until then."""
@@ -90,6 +91,7 @@ class Following:
             return
         now = self._frame._replace(time=time, load=load, position=position)
         self._past.append(now)
+        self._positions.append(position)
         while now.time - self._past[0].time > _HISTORY:
             self._past.popleft()
         limits = self._limits
@@ -142,6 +144,7 @@ class Following:
             meant=float((last.predicted - first.predicted)[0]),
             jump=jump,
             bends=math.radians(self._limits.across_deg),
+            reversals=reversals(np.array(self._positions)),
         )
         return likely_causes(evidence, self._plus, self._away)
 

@@ -13,6 +13,9 @@ _TURNED = 40.0
 """Steps in the time looked at from which a motor has turned."""
 _MEANT = math.radians(2.0)
 """Bend in that time from which the wrist was meant to move."""
+_SWINGS = 3
+"""Turnings back, in the time looked at for them, from which a loop swings: a motion there and back has one."""
+_SWINGING = "the loop swings: friction in the sheaths, a camera later than is believed, or gains too high for them"
 _JUMP = math.radians(2.0)
 """Change from one frame to the next that no motion at rest makes."""
 
@@ -32,6 +35,24 @@ class Evidence(NamedTuple):
     """Largest change of the marker's angle from one frame to the next, off what the spools make."""
     bends: float
     """Bend across that is beyond the limit."""
+    reversals: int = 0
+    """How often a spool has turned back."""
+
+
+def reversals(positions: Array) -> int:
+    """How often any spool (n, 4) [steps] has turned back by so much that it has turned."""
+    return max(_turned_back(course) for course in positions.T.tolist())
+
+
+def _turned_back(course: Sequence[float]) -> int:
+    found, sense, low, high = 0, 0, course[0], course[0]
+    for at in course:
+        low, high = min(low, at), max(high, at)
+        if sense >= 0 and high - at >= _TURNED:
+            found, sense, low = found + sense, -1, at
+        elif sense <= 0 and at - low >= _TURNED:
+            found, sense, high = found - sense, 1, at
+    return found
 
 
 def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
@@ -41,9 +62,10 @@ def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> 
     more. Of each pair the bend across tells which: it is away from a camera for a tendon that pulls too much on the
     far side, or too little on the near one.
     """
+    swings = [_SWINGING] if seen.reversals >= _SWINGS else []
     if abs(seen.across) > 0.5 * seen.bends and seen.jump <= _JUMP:
-        return _of_one_tendon(seen, plus, away)
-    causes, meant = [], abs(seen.meant) > _MEANT
+        return [*swings, *_of_one_tendon(seen, plus, away)]
+    causes, meant = swings, abs(seen.meant) > _MEANT
     if seen.jump > _JUMP:
         causes += ["the tip's marker has slipped on its disc", "the camera shows or dates pictures wrongly"]
     share = seen.bent / seen.meant if meant else math.nan
