@@ -29,7 +29,7 @@ from wristctl.trial.loop_priority import prioritised
 ROOT = Path(__file__).parents[2]
 BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 TENDONS_OFF = ("--set", "bench.motors.slack=[0.02, 0.02, 0.02, 0.02]")
-PERIOD = 5e-3
+PERIOD, MAY_BE_LATE = 5e-3, 2.5e-3
 
 pytestmark = pytest.mark.skipif(not os.environ.get("WRISTCTL_RIG"), reason="runs alone: make test-rig")
 
@@ -68,15 +68,14 @@ class Lateness:
 
 @contextmanager
 def in_time(first: bool = False) -> Iterator[None]:
-    """What fails in the block is only held against us where the computer kept the period: who wakes later than that
-    has missed a tick. What passes is skipped too where it has not."""
+    """What fails in the block is only held against us where the computer kept the period, for those who come first."""
     with Lateness(first) as lateness:
         failed: BaseException | None = None
         try:
             yield
         except (AssertionError, subprocess.TimeoutExpired) as error:
             failed = error
-    if lateness.p99 > PERIOD:
+    if lateness.p99 > MAY_BE_LATE:
         late = f"one time in a hundred this computer wakes {1e3 * lateness.p99:.1f} ms late"
         pytest.skip(f"{late}, which is too much for ticks of {1e3 * PERIOD:g} ms: {failed or 'it passed all the same'}")
     if failed is not None:
