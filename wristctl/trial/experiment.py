@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wristctl.board.driver import Board
+from wristctl.board.messages import AXES
 from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
@@ -18,7 +19,7 @@ from wristctl.interrupt import undisturbed
 from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
-from wristctl.trial.following import Greatest
+from wristctl.trial.following import Following, Greatest
 from wristctl.trial.halt import Halt, halt
 from wristctl.trial.homing import Zero, check_zero, find_zero, slacken
 from wristctl.trial.host_faults import HostFaults
@@ -119,7 +120,11 @@ class Experiment:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
         settings = self._settings
         steering = Steering(self._wrist, settings.actuator, settings.sensor, settings.control_period, 0.0)
-        taut, _ = Paths(self._wrist, self._trials[0].plane).taut(0.0)
+        plane, spools, still = self._trials[0].plane, spools_of(settings.actuator), np.zeros(AXES)
+        taut, _ = Paths(self._wrist, plane).taut(0.0)
+        spools.target(still, taut)
+        spools.rate(still, still, still, settings.control_period)
+        Following(settings, self._wrist, plane, settings.control_period).predict(float(taut[0]), float(taut[0]))
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(np.zeros((1, 3)))
