@@ -14,7 +14,7 @@ from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.closed_loop import simulate
-from wristctl.simulation.oscillation import LIMIT_CYCLE, hunting, oscillation, oscillation_frequency
+from wristctl.simulation.oscillation import LIMIT_CYCLE, hunting, oscillation, oscillation_frequency, oscillations
 from wristctl.simulation.reference import motion
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.rollout import rollout
@@ -31,6 +31,27 @@ def course(theta: Array, theta_ref: Array) -> Trajectory:
     return Trajectory(
         "", TIME[: len(theta)], theta, theta[:, None], nothing, theta_ref, theta_ref, pair, pair, nothing, nothing, pair
     )
+
+
+def test_loops_with_other_references_beside_each_other_are_judged_as_alone() -> None:
+    """Some rest at the end, some move slowly or fast, and some go as fast as others, at other phases."""
+    rng, time = np.random.default_rng(0), 1e-3 * np.arange(3000)
+    rates = [0.0, 0.34, 0.5, 0.5, 0.9, 2.0, 2.0]
+    courses = [0.3 * np.sin(2.0 * np.pi * rate * time + phase) for phase, rate in enumerate(rates)]
+    references = np.array(
+        [*courses, *(motion(Reference(duration=each), WristParameters(), 3.0, 1e-3).theta_ref for each in (1.0, 2.0))]
+    )
+    which = rng.permutation(np.repeat(np.arange(len(references)), 2))
+    swings = rng.uniform(1e-3, 1e-2, (len(which), 1)) * np.sin(
+        2.0 * np.pi * rng.uniform(6.0, 30.0, (len(which), 1)) * time
+    )
+    theta = 0.9 * references[which] + swings
+    first = np.zeros(1, np.int64)
+    alone = [
+        oscillations(each[None], references[None, own], first, 1e-3)[0] for each, own in zip(theta, which, strict=True)
+    ]
+    assert oscillations(theta, references, which, 1e-3) == pytest.approx(alone, rel=1e-9)
+    assert np.ptp(alone) > 1e-3
 
 
 @pytest.mark.parametrize("frequency", [2.0, 7.0, 40.0, 200.0])

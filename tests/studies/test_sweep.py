@@ -34,6 +34,8 @@ def at(*overrides: str) -> Simulated:
         ("simulate.loop.sensor.noise_deg", ("0.02", "0.2"), CAMERA),
         ("simulate.loop.plant.stiffness", ("x0.8", "x1.2"), ()),
         ("simulate.reference.angle_deg", ("-20", "35"), ()),
+        ("simulate.reference.frequency", ("0.6", "1.4"), ("simulate.reference.kind=sine", "simulate.horizon=2.5")),
+        ("simulate.reference.kind", ("minimum-jerk", "sine"), ("simulate.horizon=2.5",)),
         ("simulate.controller", ("pid-ff", "computed-torque"), ("simulate.gains=default",)),
     ],
 )
