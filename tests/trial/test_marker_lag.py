@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wristctl.simulation.reference import minimum_jerk
+from wristctl.simulation.minimum_jerk import minimum_jerk
 from wristctl.trial.marker_lag import MarkerLag
 
 RATE, NOISE = 60.0, 1e-3

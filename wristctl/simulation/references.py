@@ -6,7 +6,8 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
-from wristctl.simulation.reference import ReferenceKind, minimum_jerk
+from wristctl.simulation.minimum_jerk import minimum_jerk
+from wristctl.simulation.reference import ReferenceKind
 
 
 def _step(reference: Reference, time: Array) -> Array:

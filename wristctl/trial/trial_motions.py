@@ -8,7 +8,8 @@ from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.reference import Motion, minimum_jerk, motion
+from wristctl.simulation.minimum_jerk import minimum_jerk
+from wristctl.simulation.reference import Motion, motion
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 
