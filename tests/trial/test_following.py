@@ -33,9 +33,10 @@ def still(time: float) -> float:
 
 
 def watched(
-    theta: Course = still, away: Course = still, load: Course = still, seconds: float = 1.0, **changes: Any
-) -> tuple[Following, float]:
-    """A wrist whose spools stand at pretension and whose marker shows this; when it was stopped."""
+    theta: Course = still, away: Course = still, load: Course = still, seconds: float = 1.0, position: Course = still,
+    **changes: Any,
+) -> tuple[Following, float]:  # fmt: skip
+    """A wrist whose spools are said to stand here [steps] and whose marker shows this; when it was stopped."""
     settings = settings_of(**changes)
     following = Following(settings, WRIST, "ulnar", PERIOD)
     held = WRIST.pretension / settings.actuator.tendon_stiffness
@@ -44,7 +45,7 @@ def watched(
         if tick % FRAME == 0:
             size = math.exp(-away(time) / PER_RADIAN) * 0.9
             following.saw(Sighting(time, tick, theta(time), SightingVerdict.OK, np.zeros((2, 4, 2)), size), time)
-        following.see(time, load(time), np.zeros(4))
+        following.see(time, load(time), np.full(4, position(time)))
         following.predict(held, held)
     return following, time
 
@@ -115,6 +116,14 @@ def test_a_jump_between_two_frames_stops_at_once() -> None:
     assert "jumps by 2.2 deg from one frame to the next" in said and late <= FRAME * PERIOD
     assert "likely the tip's marker has slipped" in said
     watched(theta=after(math.radians(1.9)))
+
+
+@pytest.mark.parametrize(("frequency", "until", "swings"), [(2.0, 3.0, True), (0.8, 3.0, False), (2.0, 0.9, False)])
+def test_a_loop_that_has_swung_for_the_last_second_is_named_first(frequency: float, until: float, swings: bool) -> None:
+    """Stopped at 2 s."""
+    swing: Course = lambda time: 200.0 * math.sin(2.0 * math.pi * frequency * min(time, until))  # noqa: E731
+    said, _ = stopped(load=after(3.0, at=2.0), position=swing, seconds=3.0)
+    assert ("likely the loop swings" in said) is swings
 
 
 def test_what_the_marker_shows_of_a_wrist_at_rest_is_no_bend_across() -> None:
