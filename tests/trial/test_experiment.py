@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.trial.conftest import Run
+from tests.trial.conftest import Run, settings_of
+from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.config.errors import UserError
+from wristctl.trial.homing import check_zero, slacken
 from wristctl.trial.log import LOG
 
 
@@ -94,6 +96,27 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
         done = experiment()
         files.append({file.name: file.read_bytes() for file in done.folder.iterdir()})
     assert set(files[0]) == {"log.csv", "between.csv", "frames.csv", "truth.csv", "wire.csv"} and files[0] == files[1]
+
+
+def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
+    experiment: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times: list[float] = []
+
+    def slackened(board: Board, *given: Any) -> Any:
+        position = slacken(board, *given)
+        times.append(board.transport.now())
+        return position
+
+    def checked(board: Board, *given: Any) -> None:
+        times.append(board.transport.now())
+        check_zero(board, *given)
+
+    monkeypatch.setattr("wristctl.trial.experiment.slacken", slackened)
+    monkeypatch.setattr("wristctl.trial.experiment.check_zero", checked)
+    done = experiment()
+    assert done.error is None and len(times) == 2
+    assert times[1] - times[0] >= settings_of().homing.let_go > 0.0
 
 
 def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: Run, at_zero: Any) -> None:
