@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import threading
@@ -107,6 +108,13 @@ def test_time_in_which_the_computer_did_something_else_is_given_up(monkeypatch: 
     before, after, later = paced(monkeypatch, [0.05, 3.0, 0.01])
     assert after[1] - before[1] == pytest.approx(0.1, abs=1e-6)
     assert later[1] - after[1] == pytest.approx(0.01, abs=1e-6)
+
+
+def test_garbage_collection_does_not_hold_a_board_up() -> None:
+    """All that was there before is left alone: to go through it takes a tenth of a second, which no board pauses."""
+    clock, left_alone = Clock([0.001] * 3), list[int]()
+    serve(Atmega2560(), clock, lambda: bool(clock.waits), lambda *_: left_alone.append(gc.get_freeze_count()))
+    assert len(left_alone) == 3 and min(left_alone) > 10_000 and gc.get_freeze_count() == 0
 
 
 def test_a_second_program_of_ours_is_refused_the_port_and_told_why() -> None:

@@ -24,7 +24,7 @@ import pytest
 
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.loop_priority import prioritised
+from wristctl.loop_priority import prioritised
 
 ROOT = Path(__file__).parents[2]
 BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
@@ -35,10 +35,8 @@ pytestmark = pytest.mark.skipif(not os.environ.get("WRISTCTL_RIG"), reason="runs
 
 
 class Lateness:
-    """How late this computer wakes somebody who sleeps for 5 ms at a time, for as long as the block lasts."""
-
-    def __init__(self, first: bool) -> None:
-        self._first = first
+    """How late this computer wakes somebody who sleeps for 5 ms at a time, with a loop's priority where it gives any,
+    for as long as the block lasts."""
 
     def __enter__(self) -> Lateness:
         self._late: list[float] = []
@@ -56,20 +54,17 @@ class Lateness:
         return float(np.quantile(self._late, 0.99)) if self._late else 0.0
 
     def _sleep(self) -> None:
-        with prioritised(self._first):
-            self._measure()
-
-    def _measure(self) -> None:
-        while not self._done.is_set():
-            due = time.monotonic() + PERIOD
-            time.sleep(PERIOD)
-            self._late.append(time.monotonic() - due)
+        with prioritised(True):
+            while not self._done.is_set():
+                due = time.monotonic() + PERIOD
+                time.sleep(PERIOD)
+                self._late.append(time.monotonic() - due)
 
 
 @contextmanager
-def in_time(first: bool = False) -> Iterator[None]:
-    """What fails in the block is only held against us where the computer kept the period, for those who come first."""
-    with Lateness(first) as lateness:
+def in_time() -> Iterator[None]:
+    """What fails in the block is only held against us where the computer kept the period."""
+    with Lateness() as lateness:
         failed: BaseException | None = None
         try:
             yield
@@ -142,7 +137,7 @@ def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_two_millis
     slow = ("bench.line.latency_timer=0.016", "bench.camera.frame_rate=15", "bench.camera.delay_frames=0.9",
             "bench.camera.dropped=0", "priority=true")  # fmt: skip
     served = bridge(*(part for each in slow for part in ("--set", each)))
-    with in_time(first=True):
+    with in_time():
         code, out, err = do(
             f"hw check --rig --yes --json --set priority=true --port {served.port} --camera {served.camera}"
         )
@@ -190,8 +185,10 @@ def _steps_per_radian() -> float:
 @pytest.mark.skipif(not BOOT_LOADER.exists(), reason="needs arduino-core-avr (the stock boot loader)")
 def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Callable[..., Bridge]) -> None:
     walk = iter(steps())
-    assert next(walk) == "hw emulate --wrist"
-    served = bridge("--boot-loader", str(BOOT_LOADER), "--set", "bench.camera.frame_rate=30", *TENDONS_OFF)
+    hw, emulate, wrist, *options = next(walk).split()
+    assert (hw, emulate, wrist) == ("hw", "emulate", "--wrist")
+    options += ["--set", "bench.camera.frame_rate=30"]
+    served = bridge("--boot-loader", str(BOOT_LOADER), *options, *TENDONS_OFF)
 
     def here() -> str:
         return next(walk).replace("/dev/ttyACM0", served.port).replace("--camera 0", f"--camera {served.camera}")
@@ -201,7 +198,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         code, out, err = do(flash)
         assert code == 0 and "written, verified and answering" in out, err
     # a pseudo-terminal has no modem lines: the host cannot know that opening it starts a boot loader
-    served = bridge("--set", "bench.camera.frame_rate=30", *TENDONS_OFF)
+    served = bridge(*options, *TENDONS_OFF)
     check = check.replace(flash.split()[-1], served.port)
     with in_time():
         for act, state, fault in (("press", "FAULT", "ESTOP_INPUT"), ("release", "DISABLED", "none")):
@@ -218,7 +215,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         assert code == 0 and "axis 1: +68 steps" in out and "axis 1: -68 steps" in out, out + err
         code, out, err = do(here(), "yes\n")
         assert code == 0 and "is refused, on all axes" in out, err
-    served = bridge("--set", "bench.camera.frame_rate=30")  # tendons on
+    served = bridge(*options)  # tendons on
     with in_time():
         code, out, err = do(here(), "yes\n\n")
         assert code == 0 and "axis 2: +20 steps" in out, out + err
@@ -226,7 +223,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         assert code == 0 and "paid out" in out, err
         code, out, err = do(here(), "yes\n2 0.2\n\n")
         assert code == 0 and "positions (0, 0, 14, 0)" in out, out + err
-    served = bridge("--set", "bench.camera.frame_rate=30")  # its tendons as they were before
+    served = bridge(*options)  # its tendons as they were before
     with in_time():
         code, out, err = do(here(), "yes\n")
         assert code == 0 and out.startswith("This rig can run the loop of 5 ms"), out + err

@@ -17,6 +17,7 @@ from wristctl.bench.mjpeg_stream import MjpegStream
 from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.loop_priority import as_any_program
 
 _DECODED = 3e-3
 """Seconds that a viewer of the stream takes to read and decode a picture, a part of the camera's delay: 2.0 alone on
@@ -50,6 +51,7 @@ def _develop(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from wristctl.vision.scene import Scene
 
+    as_any_program()  # a camera takes nothing of this computer
     cv2.setNumThreads(1)
     camera, memory = settings.camera, FrameMemory(pictures)
     painter = Scene(camera.scene, wrist, markers, settings.plant.model)

@@ -29,6 +29,8 @@ log = logging.getLogger(__name__)
 
 _LINGER = 2.0
 """Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors."""
+_TOGETHER = FREQUENCY // 500
+"""Cycles that the wrist follows in one go."""
 
 
 class BenchServer:
@@ -48,6 +50,7 @@ class BenchServer:
         self._start, self._until = time.monotonic(), math.inf
         self._taken, self._reset = -1, -math.inf
         self._energised = False
+        self._edges: list[NDArray[np.void]] = []
         rig.chip.run(FREQUENCY // 100)
         rig.catch_up()  # so that what is to be compiled is, before real time begins
         self.camera: str | None = None
@@ -95,10 +98,17 @@ class BenchServer:
         self._until = -math.inf
 
     def _round(self, edges: NDArray[np.void], start: float) -> None:
-        """What is due about every half millisecond: `edges` are the chip's newest, its clock was 0 at `start`."""
+        """What is due again and again: `edges` are the chip's newest, its clock was 0 at `start`.
+
+        The line is seen to at once, for a client waits for it; all else once in a while.
+        """
         self._start = start
         self._line.pass_on()
-        self._rig.catch_up(edges)
+        self._edges.append(edges)
+        if self._rig.chip.cycles < self._rig.wrist.time * FREQUENCY + _TOGETHER:
+            return
+        self._rig.catch_up(np.concatenate(self._edges))
+        self._edges.clear()
         self._reset_board()
         self._take_frame()
         if self._control is not None:

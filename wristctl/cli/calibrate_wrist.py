@@ -8,7 +8,7 @@ from wristctl.studies.calibrate_wrist import CALIBRATE_WRIST
 
 app = study_command(
     CALIBRATE_WRIST,
-    shortcuts=("port", "camera", "plane", "axis", "max_deg", "real_time"),
+    shortcuts=("port", "camera", "plane", "axis", "max_deg", "real_time", "priority"),
     flags=YES,
     examples=(
         "wristctl hw calibrate wrist",

@@ -29,7 +29,7 @@ def check_rig(
     """Measure, and print the answer first. Exits with 3 where the loop cannot run."""
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
-    from wristctl.trial.loop_priority import prioritised
+    from wristctl.loop_priority import prioritised
     from wristctl.trial.patience import Patience
     from wristctl.trial.rig_facts import Pictures, measure, troubles
     from wristctl.trial.testbeds import open_testbed

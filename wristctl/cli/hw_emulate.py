@@ -62,7 +62,7 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     from tempfile import TemporaryDirectory
 
     from wristctl.config.load import load_study
-    from wristctl.trial.loop_priority import prioritised
+    from wristctl.loop_priority import prioritised
 
     study = load_study((), override, "hw-run")
     priority = prioritised(study.hw_run.priority)

@@ -84,6 +84,7 @@ class RigSettings(Section):
     baud: int = choice(250_000, "of the serial line", gt=0)
     camera: str = choice("0", "camera beside a real board: its number, or device path")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
+    priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
     sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
     homing: Homing = Homing()
@@ -132,7 +133,6 @@ class HwRunSettings(RigSettings):
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
-    priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:

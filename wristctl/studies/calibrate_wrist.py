@@ -9,7 +9,7 @@ from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.procedure import Procedure
-from wristctl.studies.rig_description import describe_rig
+from wristctl.studies.rig_description import coming_first, describe_rig
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult
 
@@ -80,12 +80,13 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     findings, study = session.findings, session.study
     settings = study.calibrate_wrist
     view = View.of(session.inputs.runs().get("optics"))
-    with session.progress("opening board and camera"):
-        testbed = open_testbed(settings, study.wrist, study.seed, view, session.operator.confirm)
-    if settings.axis is not None:
-        return _one_axis(session, testbed, settings.axis)
-    with session.progress("homing"):
-        found = calibrated(testbed, settings, study.wrist)
+    with coming_first(session, settings):
+        with session.progress("opening board and camera"):
+            testbed = open_testbed(settings, study.wrist, study.seed, view, session.operator.confirm)
+        if settings.axis is not None:
+            return _one_axis(session, testbed, settings.axis)
+        with session.progress("homing"):
+            found = calibrated(testbed, settings, study.wrist)
     findings.plain(FILE, found.plain())
     zero = found.zero
     findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")

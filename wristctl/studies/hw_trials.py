@@ -16,11 +16,11 @@ from wristctl.config.wrist import WristParameters
 from wristctl.records import LiveRun
 from wristctl.report.printed_table import Table
 from wristctl.simulation.metrics import METRICS
+from wristctl.studies.rig_description import coming_first
 from wristctl.studies.session import Session
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
-from wristctl.trial.loop_priority import prioritised
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_metrics import JUDGED, evaluated
@@ -81,10 +81,7 @@ def perform_trials(
         raise
     stopped: BaseException | None = None
     try:
-        with prioritised(settings.priority) as priority:
-            if priority:
-                session.operator.tell(priority)
-                session.findings.summary(priority)
+        with coming_first(session, settings):
             _perform(session, bench, experiment, films, trials)
     except BaseException as error:
         stopped = error

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from wristctl.loop_priority import beside_the_loop
 from wristctl.trial.camera_truth import CameraTruth
 from wristctl.vision.camera import Camera, Frame
 from wristctl.vision.marker import Sighting, Tracker
@@ -90,6 +91,7 @@ class ThreadedTracking:
 
     def _watch(self) -> None:
         try:
+            beside_the_loop()
             while not self._stop.is_set():
                 if found := self._inner.look():
                     self._seen.extend(found)

@@ -9,6 +9,7 @@ import time
 import cv2
 
 from wristctl.config.vision import Device
+from wristctl.loop_priority import beside_the_loop
 from wristctl.vision.camera import CameraError, Frame, grey_of, without_warnings
 from wristctl.vision.device_controls import asked_for, refused
 
@@ -84,6 +85,7 @@ class DeviceCamera:
             log.warning("%s keeps its own control: %s; light that changes will change its pictures", self.name, kept)
 
     def _read(self) -> None:
+        beside_the_loop()
         number = 0
         while not self._stop.is_set():
             got, picture = self._capture.read()

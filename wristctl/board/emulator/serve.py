@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from wristctl.board.emulator.atmega2560 import Atmega2560, Halted
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.config.errors import UserError
+from wristctl.loop_priority import no_long_pauses
 
 log = logging.getLogger(__name__)
 
-_QUANTUM, _IDLE_QUANTUM = 0.0005, 0.02
+_QUANTUM, _IDLE_QUANTUM = 0.00025, 0.02
 _AT_ONCE, _ON_THE_WAY = 4096, 1024
 """Bytes taken from clients in one go; bytes that wait for the chip before clients have to."""
 _FURTHEST_BEHIND = 0.1
@@ -67,7 +68,8 @@ class PtyLine:
 
     def wait(self, timeout: float) -> bool:
         """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
-        found = self._poll.poll(1e3 * timeout)
+        select.select([self._master], [], [], timeout)  # to the microsecond; a poll waits for whole milliseconds
+        found = self._poll.poll(0)
         if found and found[0][1] & select.POLLHUP:
             time.sleep(timeout)
             return False
@@ -153,6 +155,13 @@ def serve(
 
     `watch` is told what the chip's latches did, and when its clock was 0 (`time.monotonic`): later where it lagged.
     """
+    with no_long_pauses():
+        _serve(chip, line, running, watch)
+
+
+def _serve(
+    chip: Atmega2560, line: Line, running: Callable[[], bool], watch: Callable[[NDArray[np.void], float], None]
+) -> None:
     start = time.monotonic() - chip.cycles / FREQUENCY
     there = False
     while running():
