@@ -152,19 +152,19 @@ def test_the_recorded_load_is_what_the_observer_makes_of_a_payload() -> None:
 
 
 def test_noise_and_drops_have_their_statistics_and_belong_to_the_stream_not_to_the_batch() -> None:
-    many = readings(12_000, [CAMERA] * 3, [(0, 0), (0, 1), (0, 2)])
+    many = readings([12_000] * 3, [CAMERA] * 3, [(0, 0), (0, 1), (0, 2)])
     noise, seen = many[..., 0], many[..., 1]
     assert noise.std(axis=1) == pytest.approx(np.full(3, np.deg2rad(0.1)), rel=0.03)
     assert 1.0 - seen.mean() == pytest.approx(0.05, abs=0.006)
     assert np.abs(np.triu(np.corrcoef(noise), 1)).max() < 0.05
-    alone = readings(12_000, [CAMERA], [(0, 2)])
+    alone = readings([12_000], [CAMERA], [(0, 2)])
     assert (alone[0] == many[2]).all()
-    assert (readings(12_000, [CAMERA], [(1, 2)])[0, :, 0] != many[2, :, 0]).all()
+    assert (readings([12_000], [CAMERA], [(1, 2)])[0, :, 0] != many[2, :, 0]).all()
 
 
 def test_cameras_of_one_stream_scale_the_same_draws_by_their_own_noise() -> None:
     quiet, loud = (CAMERA.model_copy(update={"noise_deg": each}) for each in (0.05, 0.2))
-    first, second = readings(500, [quiet, loud], [(3, 4)] * 2)
+    first, second = readings([500, 500], [quiet, loud], [(3, 4)] * 2)
     np.testing.assert_allclose(second[:, 0], 4.0 * first[:, 0], rtol=1e-15)
     assert (first[:, 1] == second[:, 1]).all()
 
@@ -172,7 +172,7 @@ def test_cameras_of_one_stream_scale_the_same_draws_by_their_own_noise() -> None
 @pytest.mark.parametrize("burst", [1.0, 3.0, 12.0])
 def test_frames_are_lost_in_bursts_of_the_length_given(burst: float) -> None:
     sensor = Sensor(level="camera", dropped=0.2)
-    seen = readings(100_000, [sensor], [(1,)], [burst])[0, :, 1]
+    seen = readings([100_000], [sensor], [(1,)], [burst])[0, :, 1]
     assert 1.0 - seen.mean() == pytest.approx(0.2, rel=0.1)
     runs = [len(list(each)) for lost, each in itertools.groupby(seen) if lost == 0.0]
     assert np.mean(runs) == pytest.approx(max(burst, 1.25), rel=0.1)

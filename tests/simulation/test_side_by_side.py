@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
+from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import motion
@@ -36,6 +38,10 @@ def run(loops: list[Loop], wrists: list[WristParameters]) -> Outcome:
         {"plant": Plant(stiffness_scale=0.7)},
         {"actuator": TENDON.model_copy(update={"tendon_stiffness": 9e3})},
         {"sensor": LOOP.sensor.model_copy(update={"noise_deg": 0.2})},
+        {"sensor": LOOP.sensor.model_copy(update={"frame_rate": 47.0})},
+        {"sensor": LOOP.sensor.model_copy(update={"frame_rate": 200.0})},
+        {"sensor": LOOP.sensor.model_copy(update={"delay_frames": 5.0})},
+        {"plant": Plant(sensor=TrueSensor(delay_frames=0.5))},
         {"wrist": WristParameters(tension_limit=25.0)},
     ],
     ids=lambda changed: next(iter(changed)),
@@ -50,3 +56,27 @@ def test_one_that_is_otherwise_is_otherwise_beside_the_usual_one(changed: dict[s
         assert alone is not None
         assert all(one.tobytes() == alone[0].tobytes() for one in together[each::2])
     assert together[0].tobytes() != together[1].tobytes(), "it makes a difference"
+
+
+CAMERAS = st.tuples(st.floats(20.0, 200.0), st.floats(0.0, 6.0), st.floats(0.0, 6.0))
+"""Frame rate, the delay in frames that the observer believes, and the true one."""
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(CAMERAS, min_size=2, max_size=11))
+@example([(20.0, 0.0, 0.0), (23.0, 0.0, 2.0)])  # the first frame comes late, and is believed to be fresh
+def test_cameras_of_any_rates_and_delays_do_not_disturb_each_other(cameras: list[tuple[float, float, float]]) -> None:
+    loops = [
+        LOOP.model_copy(
+            update={
+                "sensor": LOOP.sensor.model_copy(update={"frame_rate": rate, "delay_frames": believed, "dropped": 0.2}),
+                "plant": Plant(sensor=TrueSensor(delay_frames=delay)),
+            }
+        )
+        for rate, believed, delay in cameras
+    ]
+    together = run(loops, [WRIST] * len(loops)).samples
+    assert together is not None
+    for own, loop in zip(together, loops, strict=True):
+        alone = run([loop], [WRIST]).samples
+        assert alone is not None and own.tobytes() == alone[0].tobytes()

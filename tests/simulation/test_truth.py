@@ -127,7 +127,7 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
     for tick in range(out.shape[0]):
         for value in range(3):
             target[value] = course.references[0, value, tick] + zero
-        seen = sense(course.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
+        seen = sense(world.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
         wanted, _, _, plus, minus = respond(control, known, seen, (low, high), 0.0, setup.period)
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
@@ -147,11 +147,12 @@ def commands_from(recorded: Batch, loop: Loop, speeds: TrueActuator) -> np.ndarr
     fresh, watch = prepared(Plant(actuator=speeds), loop), recorded.state.watch
     start, delivered = fresh.state.watch.observer, np.zeros_like(watch.observer.delivered)
     given = watch._replace(
-        turn=np.array([[len(recorded.course.schedule.captures), 0]]), observer=start._replace(delivered=delivered)
+        turn=np.array([[[recorded.world.schedule.captures.shape[1]], [0]]]),
+        observer=start._replace(delivered=delivered),
     )
     out = np.zeros((recorded.samples, 3))
-    course, state = fresh.course._replace(schedule=recorded.course.schedule), fresh.state._replace(watch=given)
-    _controller_side(fresh.setup, course, only(fresh.world), only(state), fresh.scratch(), out)
+    world, state = fresh.world._replace(schedule=recorded.world.schedule), fresh.state._replace(watch=given)
+    _controller_side(fresh.setup, fresh.course, only(world), only(state), fresh.scratch(), out)
     return out
 
 

@@ -16,7 +16,7 @@ from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
 from wristctl.simulation.disturbances import acting
-from wristctl.simulation.frames import readings, schedule
+from wristctl.simulation.frames import longest, readings, schedule, side_by_side
 from wristctl.simulation.kernel import LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch
@@ -71,7 +71,7 @@ def batch(
     start: Start | None,
     columns: int,
 ) -> Batch:
-    """The batch of `rollout`, which records so many columns; all worlds have the same structure, timing and frames."""
+    """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing."""
     filmed, (worlds, body) = worlds, _bodies(worlds)
     world = body[lanes.world]
     check_stops(worlds, max(float(np.abs(each.theta_ref).max()) for each in motions))
@@ -116,6 +116,7 @@ def batch(
         return unmoved(given, path, given - short, rest[each])
 
     goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
+    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
         model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
@@ -126,11 +127,11 @@ def batch(
         winding=of_worlds(lambda each: np.array(windings[each])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
+        schedule=frames,
     )
     kinds = list(dict.fromkeys(each.loop.disturbances for each in worlds))
     cases = [acting(each, motions[0].time) for each in kinds]
     case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[world]
-    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
@@ -145,7 +146,7 @@ def batch(
     references = np.empty((len(motions), 3, samples))
     for each, own in zip(references, motions, strict=True):
         each[0], each[1], each[2] = own.theta_ref, own.rate_ref, own.acceleration_ref
-    course = LoopCourse(references, _stacked(cases, samples), frames)
+    course = LoopCourse(references, _stacked(cases, samples))
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
 
@@ -180,27 +181,33 @@ def _watch(
     loop, count = worlds[0].loop, len(lanes.motion)
     if loop.sensor.level == "ideal":
         return None, None
-    frames = schedule(worlds[0].sensor, loop.control_period, horizon, loop.sensor)
-    longest = int((frames.arrivals - frames.dated).max() + np.diff(frames.dated).max(initial=1)) + 2
     sensors = [each.sensor for each in worlds]
+    ticks = [schedule(each.sensor, loop.control_period, horizon, each.loop.sensor) for each in worlds]
     bursts = [worlds[each].loop.plant.sensor.burst for each in lanes.world]
-    taken = readings(len(frames.captures), [sensors[each] for each in lanes.world], lanes.streams, bursts)
+    counts = [len(ticks[each].captures) for each in lanes.world]
+    taken = readings(counts, [sensors[each] for each in lanes.world], lanes.streams, bursts)
     taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
     lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
     by_block = np.moveaxis(lanes_last.reshape(*lanes_last.shape[:2], blocks, *wide), 2, 0)
+    cameras = list({id(each): each for each in ticks}.values())
+    numbers = {id(each): number for number, each in enumerate(cameras)}
+    columns = np.array([numbers[id(each)] for each in ticks])[lanes.world][order].reshape(blocks, -1)
+    of_blocks = columns if len(cameras) > 1 else columns[:1]
+    tables = side_by_side(cameras)
+    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(each[:, of_blocks], 0, 1)) for each in tables))
     gains = stationary_gains([_belief(each) for each in worlds])
     start = np.zeros((len(worlds), 3))
     start[:, 0] = [float(model.angle(q)) for q in rest]
     now = spread(start[lanes.world], count)
     observer = Observer(
-        gain=spread(gains[lanes.world], count), delivered=np.zeros((blocks, longest, 2, *wide)), fused=now,
-        now=now.copy(), at=np.zeros((blocks, 1), np.int64),
+        gain=spread(gains[lanes.world], count), delivered=np.zeros((blocks, longest(tables), 2, *wide)), fused=now,
+        now=now.copy(), at=np.zeros((blocks, 1, *wide)),
     )  # fmt: skip
-    pictures = np.zeros((blocks, len(frames.captures), *wide))
-    turn = np.zeros((blocks, 2), np.int64)
-    return Watch(np.ascontiguousarray(by_block), pictures, turn, observer), frames
+    pictures = np.zeros((blocks, taken.shape[1], *wide))
+    turn, arriving = np.zeros((blocks, 2, columns.shape[1]), np.int64), np.zeros((blocks, 3, *wide))
+    return Watch(np.ascontiguousarray(by_block), pictures, turn, arriving, observer), frames
 
 
 def _belief(world: World) -> Belief:

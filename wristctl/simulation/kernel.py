@@ -54,22 +54,22 @@ class Setup(NamedTuple):
 
 
 class LoopCourse(NamedTuple):
-    """What happens over time, on the sample grid, and the ticks of frames.
+    """What happens over time, on the sample grid.
 
     `references` [motion, (angle, rate, acceleration), sample], continued between samples by its own derivatives;
-    `acting` [case, (tip force, stiffness scale), sample] or None; `schedule` of the frames or None.
+    `acting` [case, (tip force, stiffness scale), sample] or None.
     """
 
     references: Any
     acting: Any
-    schedule: Any
 
 
 class LoopValues(NamedTuple):
     """Values that stay, [block, row, lane]; with one block only they are every block's.
 
     `plant`, `tendons`, `nonideal` and `winding` are what is, `model`, `limits` and `motor` what the controller's side
-    believes. `tendons` is a side's stiffness, None where pulls are held; `nonideal` None where nothing is.
+    believes. `tendons` is a side's stiffness, None where pulls are held; `nonideal` None where nothing is; `schedule`
+    the ticks of frames, None where sensors are ideal.
     """
 
     plant: Any
@@ -81,6 +81,7 @@ class LoopValues(NamedTuple):
     winding: Any
     gains: Any
     goals: Any
+    schedule: Any
 
 
 class LoopState(NamedTuple):
@@ -153,7 +154,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
         for tick in range(ticks):
             now_tick = sample * ticks + tick
             angle, rate = tip_angle(plant, q, rates)
-            seen = sense(course.schedule, state.watch, drive, known, now_tick, angle, rate, period)
+            seen = sense(world.schedule, state.watch, drive, known, now_tick, angle, rate, period)
             for ahead in range(1, setup.preview + 1):
                 to_come = min((now_tick + ahead) // ticks, course.references.shape[2] - 1)
                 gather_lanes(course.references, state.which, to_come, targets)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from wristctl.control.model import one_segment
 from wristctl.control.response import Estimate
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import where
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
@@ -22,7 +23,7 @@ _ONE = (0,)
 class Observer(NamedTuple):
     """One block's estimates: gain (3,), what was delivered (ring, 2), and x (3,), each with its lanes.
 
-    `fused` is x at the last fused frame, at tick `at[0]`; `now` is x at the present tick.
+    `fused` is x at the last fused frame, at each lane's tick `at` (1,); `now` is x at the present tick.
     """
 
     gain: Any
@@ -33,27 +34,38 @@ class Observer(NamedTuple):
 
 
 class Schedule(NamedTuple):
-    """Ticks at which frames are taken, at which they arrive, and at which the observer believes that they were taken,
-    (F,) each; the same for all lanes."""
+    """One block's ticks at which frames are taken, at which they arrive, and at which the observer believes that they
+    were taken, (F, lanes) each; where a lane has fewer frames than another, the rest are never taken."""
 
     captures: Any
     arrivals: Any
     dated: Any
 
 
+class ArrivingFrame(NamedTuple):
+    """An angle, and whether it is `seen` (1, not 0), taken `since` [s] after tick `captured`, negative in lanes in
+    which none arrives."""
+
+    captured: Any
+    since: Any
+    angle: Any
+    seen: Any
+
+
 class Watch(NamedTuple):
-    """One block's camera: what is added to each frame and whether it is seen (F, 2), pictures taken (F,), the next
-    frame to take and to arrive, `turn`; and the observer behind it."""
+    """One block's camera: what is added to each frame and whether it is seen (F, 2), pictures taken (F,), each lane's
+    next frame to take and to arrive, `turn` (2, lanes); rows (3,) to work on, and the observer behind it."""
 
     readings: Any
     pictures: Any
     turn: Any
+    arriving: Any
     observer: Any
 
 
 @compiled
-def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -> None:
-    """Advance x by one control period, linearly implicit in damping and stiffness."""
+def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: Any) -> None:
+    """Advance x by one control period h [s], linearly implicit in damping and stiffness; where h is 0, x stays."""
     theta = part(x, 0, _ONE)
     angle, speed, load = x[0], x[1], x[2]
     pull_plus, pull_minus = frictionless_pulls(drive, known, theta, plus, minus)
@@ -68,16 +80,30 @@ def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: float) -
 
 @compiled
 def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
-    """Take a frame of the true angle where one is due, and fuse the frame that arrives at this tick, if any."""
-    turn, readings, pictures = watch.turn, watch.readings, watch.pictures
-    taken, arrived = turn[0], turn[1]
-    if taken < len(schedule.captures) and schedule.captures[taken] == tick:
-        rows_of(pictures)[taken] = angle + rows_of(readings[taken])[0]
-        turn[0] = taken + 1
-    if arrived < turn[0] and schedule.arrivals[arrived] == tick:
-        seen, captured = rows_of(readings[arrived])[1], schedule.dated[arrived]
-        fuse(watch.observer, drive, known, (captured, tick), 0.0, rows_of(pictures)[arrived], seen, h)
-        turn[1] = arrived + 1
+    """Take a frame of the true angle in lanes where one is due, and fuse those that arrive at this tick."""
+    turn = watch.turn
+    frames, lanes = schedule.captures.shape
+    readings, pictures = watch.readings.reshape(frames, 2, lanes), watch.pictures.reshape(frames, lanes)
+    rows, arriving = rows_of(watch.arriving), watch.arriving.reshape(3, lanes)
+    at = watch.observer.at.reshape(lanes)
+    rows[1] = angle
+    begin, first, last = tick, tick, -1
+    for lane in range(lanes):
+        taken, arrived = turn[0, lane], turn[1, lane]
+        if taken < frames and schedule.captures[taken, lane] == tick:
+            pictures[taken, lane] = arriving[1, lane] + readings[taken, 0, lane]
+            taken += 1
+            turn[0, lane] = taken
+        arriving[0, lane] = -1.0
+        if arrived < taken and schedule.arrivals[arrived, lane] == tick:
+            captured = schedule.dated[arrived, lane]
+            begin, first, last = min(begin, int(at[lane])), min(first, captured), max(last, captured)
+            arriving[0, lane] = captured
+            arriving[1, lane] = pictures[arrived, lane]
+            arriving[2, lane] = readings[arrived, 1, lane]
+            turn[1, lane] = arrived + 1
+    if last >= 0:
+        fuse(watch.observer, drive, known, (begin, first, last, tick), ArrivingFrame(rows[0], 0.0, rows[1], rows[2]), h)
 
 
 @compiled
@@ -91,25 +117,29 @@ def sense(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: A
 
 
 @compiled
-def fuse(observer: Any, drive: Any, known: Any, ticks: Any, since: float, angle: Any, seen: Any, h: float) -> None:
-    """Fuse an angle (where `seen` is 1, not 0) taken `since` [s] after the first of two ticks; predict to the other.
+def fuse(observer: Any, drive: Any, known: Any, ticks: Any, frame: Any, h: float) -> None:
+    """Fuse a frame in the lanes in which one arrives, and predict from there to the present tick.
 
-    What was delivered at every tick from the last fused one on must still be in the ring.
+    `ticks` are, of these lanes, the first that was fused before, the first and the last that are captured now, and the
+    present one. What was delivered at every tick from the first one on must still be in the ring.
     """
-    captured, tick = ticks
+    begin, first, last, tick = ticks
     size = observer.delivered.shape[0]
-    gain, fused, now = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now)
-    for past in range(observer.at[0], captured):
+    gain, fused, now, at = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now), rows_of(observer.at)
+    zero = 0.0 * known.length
+    for past in range(begin, last):
         sent = rows_of(observer.delivered[past % size])
-        propagate(drive, known, fused, sent[0], sent[1], h)
-    innovation = seen * (angle - fused[0] - since * fused[1])
+        propagate(drive, known, fused, sent[0], sent[1], where((at[0] <= past) & (frame.captured > past), h, zero))
+    arrives = frame.captured >= zero
+    innovation = frame.seen * (frame.angle - fused[0] - frame.since * fused[1])
     for i in range(3):
-        fused[i] = fused[i] + gain[i] * innovation
-        now[i] = fused[i]
-    for past in range(captured, tick):
+        fresh = fused[i] + gain[i] * innovation
+        fused[i] = where(arrives, fresh, fused[i])
+        now[i] = where(arrives, fresh, now[i])
+    for past in range(first, tick):
         sent = rows_of(observer.delivered[past % size])
-        propagate(drive, known, now, sent[0], sent[1], h)
-    observer.at[0] = captured
+        propagate(drive, known, now, sent[0], sent[1], where(arrives & (frame.captured <= past), h, zero))
+    at[0] = where(arrives, frame.captured, at[0])
 
 
 @compiled

@@ -180,7 +180,8 @@ def _moves(
     bend, length = np.zeros((3, 1)), _unstretched(wrist.length, time)
     for number, (turn, stretch) in enumerate((targets - before).tolist()):
         course = kind.course(reference, time - number * reference.duration if number else time)
-        bend = bend + turn * course
+        turning = turn * course
+        bend = np.add(bend, turning, out=turning)
         if stretch:
             length = length + stretch * course
     return bend, length, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration

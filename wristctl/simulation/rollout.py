@@ -20,7 +20,6 @@ from wristctl.lanes.cores import cores
 from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
-from wristctl.simulation.frames import schedule
 from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
@@ -104,9 +103,7 @@ def rollout(
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
-    groups = by_frames(worlds, world, motions[0].horizon)
-    if controller.plain:
-        groups = [np.array([each]) for each in range(count)]
+    groups = np.arange(count).reshape((count, 1) if controller.plain else (1, count))
     done: list[Outcome] = []
     stop = stop or Event()
     for own in groups:
@@ -153,17 +150,6 @@ def structure(loop: Loop) -> tuple[object, ...]:
     """What loops of one batch have in common."""
     timing = loop.control_period, loop.steps
     return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
-
-
-def by_frames(worlds: Sequence[World], world: NDArray[np.int64], horizon: float) -> list[NDArray[np.intp]]:
-    """Rollouts whose cameras take frames at the same ticks run together."""
-    if len(worlds) == 1 or worlds[0].loop.sensor.level == "ideal":
-        return [np.arange(len(world))]
-    ticks = [schedule(each.sensor, each.loop.control_period, horizon, each.loop.sensor) for each in worlds]
-    keys = [tuple(part.tobytes() for part in each) for each in ticks]
-    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-    group = np.array([numbers[key] for key in keys])[world]
-    return [np.flatnonzero(group == number) for number in range(len(numbers))]
 
 
 def part_of(worlds: Sequence[World], lanes: Lanes, own: NDArray[np.intp]) -> tuple[list[World], Lanes]:

@@ -144,4 +144,4 @@ def observer_of(belief: Belief, ticks: int, theta: float) -> Observer:
     """One loop's observer that knows the angle [rad] of its rest, and remembers the last `ticks` periods."""
     start = np.array([theta, 0.0, 0.0])
     (gain,) = stationary_gains([belief])
-    return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1, np.int64))
+    return Observer(gain, np.zeros((ticks, 2)), start, start.copy(), np.zeros(1))

@@ -22,11 +22,11 @@ from wristctl.lanes.compiled import kernel, spelled_out
 from wristctl.lanes.lane import where
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.batch import Batch, Lanes, Start, batch
+from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.kernel import Span, drive_in, gather_lanes, run_blocks
 from wristctl.simulation.observer import sense
-from wristctl.simulation.rollout import by_frames, part_of, worlds_of
+from wristctl.simulation.rollout import worlds_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
 from wristctl.wrist.allocation import reach
@@ -69,15 +69,6 @@ class Sight(NamedTuple):
     """Bending angle beyond which a wrist has failed [rad], (count,)."""
 
 
-class _Group(NamedTuple):
-    """Loops whose cameras take frames together: their numbers, and they as blocks."""
-
-    own: NDArray[np.intp]
-    batch: Batch
-    scratch: Any
-    found: Array
-
-
 class SteppedLoops:
     """`count` loops at their first sample, one for each case, at rest where `start` says or straight.
 
@@ -97,10 +88,9 @@ class SteppedLoops:
         self.count, self.sample, self.samples = count, 0, len(motions[0].time)
         self._run: Callable[..., None] = kernel_of(run_blocks, model)
         self._look: Callable[..., None] = kernel_of(_look_blocks, model)
-        self._groups = list[_Group]()
-        for own in by_frames(worlds, world, motions[0].horizon):
-            made = batch(GIVEN, np.zeros((len(own), 1)), motions, *part_of(worlds, lanes, own), model, start, 0)
-            self._groups.append(_Group(own, made, made.scratch(), np.empty((made.blocks, _ROWS, *made.wide))))
+        self._batch = batch(GIVEN, np.zeros((count, 1)), motions, worlds, lanes, model, start, 0)
+        self._scratch = self._batch.scratch()
+        self._found: Array = np.empty((self._batch.blocks, _ROWS, *self._batch.wide))
 
     @property
     def done(self) -> bool:
@@ -109,20 +99,19 @@ class SteppedLoops:
 
     def step(self, torques: Array) -> None:
         """Hold torques (count,) [N m] until the next sample."""
-        for own, made, scratch, _ in self._groups:
-            values, given = made.world.gains.reshape(-1), torques[own]
-            values[: len(own)] = given
-            values[len(own) :] = given[-1]
-            span = Span(0, made.blocks, self.sample, self.sample + 1)
-            self._run(made.setup, made.course, made.world, made.state, scratch, span)
+        made = self._batch
+        values = made.world.gains.reshape(-1)
+        values[: self.count] = torques
+        values[self.count :] = torques[-1]
+        span = Span(0, made.blocks, self.sample, self.sample + 1)
+        self._run(made.setup, made.course, made.world, made.state, self._scratch, span)
         self.sample += 1
 
     def look(self) -> Sight:
         """What laws see now, before they answer, and what is true."""
-        rows = np.empty((self.count, _ROWS))
-        for own, made, scratch, found in self._groups:
-            self._look(made.setup, made.course, made.world, made.state, scratch, self.sample, found)
-            rows[own] = to_rows(found, len(own))
+        made = self._batch
+        self._look(made.setup, made.course, made.world, made.state, self._scratch, self.sample, self._found)
+        rows = to_rows(self._found, self.count)
         signals = rows[:, : len(NOW)]
         wanted = signals[:, NOW.index("theta_ref")]
         return Sight(signals, rows[:, _TRUE], wanted, rows[:, _WELL] <= 0.0, rows[:, _LIMIT])
@@ -144,7 +133,7 @@ def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, s
     bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(found)
     gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
     angle, rate = tip_angle(plant, q, rates)
-    seen = sense(course.schedule, state.watch, drive, known, sample * setup.ticks, angle, rate, period)
+    seen = sense(world.schedule, state.watch, drive, known, sample * setup.ticks, angle, rate, period)
     perceive(control, known, seen, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
     for i in range(_TRUE):
         out[i] = signals[i]

@@ -18,6 +18,7 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import RECORDED, Span, run_blocks
+from wristctl.simulation.observer import Schedule
 from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
@@ -115,11 +116,11 @@ class LoopTicks:
 
         Ticks at which no frame is taken or arrives are all the same one.
         """
-        frames, between = self._batch.course.schedule, None
+        between = None
         small = times * (SMALLER if "bristle" in self.names else SMALL)
         found = []
         for tick in range(self._first, self._first + self.cycle):
-            plain = frames is None or (tick not in frames.captures and tick not in frames.arrivals)
+            plain = not any(tick in each for each in self._frames())
             each = between if plain and between is not None else self._tick(tick, state, small)
             between = each if plain else between
             found.append(each)
@@ -144,11 +145,11 @@ class LoopTicks:
 
     def _shift_frame(self, tick: int, lane: int) -> bool:
         """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
-        watch, frames = self._batch.state.watch, self._batch.course.schedule
+        watch = self._batch.state.watch
         if watch is None:
             return False
-        taken = int(watch.turn[0, 0])
-        if frames.captures[taken] != tick:
+        taken = int(watch.turn[0, 0, 0])
+        if self._frames().captures[taken] != tick:
             return False
         added = np.zeros((self._count, 1))
         added[lane : lane + 2, 0] = SMALL, -SMALL
@@ -175,6 +176,11 @@ class LoopTicks:
         self._count, self._batch = count, made._replace(setup=made.setup._replace(ticks=1))
         self._scratch = made.scratch()
 
+    def _frames(self) -> Schedule:
+        """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
+        schedule = self._batch.world.schedule or Schedule(*np.zeros((3, 1, 0, 1), np.int64))
+        return Schedule(*(each[0, :, 0] for each in schedule))
+
     def _parts(self, tick: int) -> Iterator[StatePart]:
         return state_parts(self._batch, self._law.memory, tick, self._back)
 
@@ -183,10 +189,10 @@ class LoopTicks:
 
     def _count_to(self, tick: int) -> None:
         """Set the camera's counters to what they are before a tick."""
-        watch, frames = self._batch.state.watch, self._batch.course.schedule
+        watch, frames = self._batch.state.watch, self._frames()
         if watch is not None:
             taken, arrived = (int(np.searchsorted(each, tick)) for each in (frames.captures, frames.arrivals))
-            watch.turn[:] = taken, arrived
+            watch.turn[:, 0], watch.turn[:, 1] = taken, arrived
             watch.observer.at[:] = frames.dated[arrived - 1]
 
     def _run(self, begin: int, end: int) -> None:

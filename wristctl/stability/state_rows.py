@@ -55,7 +55,7 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
         yield StatePart("tendon creep", state.tendons, bristles + 1, np.full(count, _LENGTH))
         yield StatePart("spring creep", state.tendons, PATH + own * count + np.arange(k), np.full(k, _ANGLE))
     if state.watch is not None:
-        observer, taken = state.watch.observer, int(state.watch.turn[0, 0])
+        observer, taken = state.watch.observer, int(state.watch.turn[0, 0, 0])
         sizes = np.array([_ANGLE, _RATE, _ANGLE])
         yield StatePart("estimate", observer.now, np.arange(3), sizes)
         yield StatePart("estimate at the frame", observer.fused, np.arange(3), sizes)

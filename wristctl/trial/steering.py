@@ -16,7 +16,7 @@ from wristctl.control.response import Controlled, Estimate, look_ahead, respond
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import fuse, predict
+from wristctl.simulation.observer import ArrivingFrame, fuse, predict
 from wristctl.simulation.stationary_filter import Belief, observer_of
 from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
@@ -71,7 +71,8 @@ class Steering:
         if not max(int(self._observer.at[0]), self.tick - REMEMBERED + 1) <= tick <= self.tick:
             return False
         since = captured - tick * self._period
-        _fuse(self._observer, self._drive, self._model, (tick, self.tick), since, theta, self._period)
+        ticks = int(self._observer.at[0]), tick, tick, self.tick
+        _fuse(self._observer, self._drive, self._model, ticks, since, theta, self._period)
         return True
 
     def respond(self, course: Array, tick: int = 0) -> Answer:
@@ -114,7 +115,7 @@ def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float,
 def _fuse(observer: Any, drive: Any, model: Any, ticks: Any, since: float, theta: float, h: float) -> None:
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
-    fuse(observer, drive, known, ticks, since, theta + zero, 1.0 + zero, h)
+    fuse(observer, drive, known, ticks, ArrivingFrame(ticks[1] + zero, since, theta + zero, 1.0 + zero), h)
 
 
 @kernel
