@@ -19,7 +19,8 @@ PACKAGE = Path(wristctl.__file__).parent
 LAYERS = (
     "__main__", "cli", "__init__", "api", "gym", "studies", "report", "comparison", "tuning", "learning",
     "identification", "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work",
-    "lanes", "records", "config", "arrays", "interrupt", "seeds", "version",
+    "lanes", "records", "config", "arrays", "interrupt", "loop_priority", "seeds",
+    "version",
 )  # fmt: skip
 
 
