@@ -139,4 +139,4 @@ def by_phase(judged: Sequence[Judged]) -> str:
 def _cell(judged: Judged) -> str:
     timed = judged.end == "caught" and judged.phase in ("moving", "holding")
     ms = f" {1e3 * judged.seconds:.0f} ms," if timed else ""
-    return f"{judged.end},{ms} {judged.pull:.0f} N"
+    return f"{judged.end},{ms} {max(judged.pull, 0.0):.0f} N"
