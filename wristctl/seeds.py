@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+from functools import lru_cache
 
 Entropy = tuple[int, ...]
 """Of a random stream, for `numpy.random.default_rng` or `numpy.random.SeedSequence`."""
 
 
+@lru_cache(maxsize=256)
 def stream(seed: int, name: str) -> tuple[int, int]:
     """Entropy of the named random stream under a root seed."""
     return seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")

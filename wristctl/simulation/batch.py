@@ -16,7 +16,7 @@ from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
 from wristctl.simulation.disturbances import acting
-from wristctl.simulation.frames import longest, readings, schedule, side_by_side
+from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
 from wristctl.simulation.kernel import LoopCourse, LoopState, LoopValues, Scratch, Setup
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch
@@ -182,31 +182,30 @@ def _watch(
     if loop.sensor.level == "ideal":
         return None, None
     sensors = [each.sensor for each in worlds]
-    ticks = [schedule(each.sensor, loop.control_period, horizon, each.loop.sensor) for each in worlds]
+    believed, period = [each.loop.sensor for each in worlds], loop.control_period
+    tables, camera = side_by_side(sensors, believed, period, horizon)
     bursts = [worlds[each].loop.plant.sensor.burst for each in lanes.world]
-    counts = [len(ticks[each].captures) for each in lanes.world]
+    counts = frame_counts(sensors, horizon)[lanes.world].tolist()
     taken = readings(counts, [sensors[each] for each in lanes.world], lanes.streams, bursts)
     taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
     lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
     by_block = np.moveaxis(lanes_last.reshape(*lanes_last.shape[:2], blocks, *wide), 2, 0)
-    cameras = list({id(each): each for each in ticks}.values())
-    numbers = {id(each): number for number, each in enumerate(cameras)}
-    columns = np.array([numbers[id(each)] for each in ticks])[lanes.world][order].reshape(blocks, -1)
-    of_blocks = columns if len(cameras) > 1 else columns[:1]
-    tables = side_by_side(cameras)
-    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(each[:, of_blocks], 0, 1)) for each in tables))
+    cameras = camera[lanes.world][order].reshape(blocks, -1)
+    different = cameras if camera.any() else cameras[:1]
+    frames = Schedule(*(np.array([each[..., own] for own in different]) for each in tables))
     gains = stationary_gains([_belief(each) for each in worlds])
     start = np.zeros((len(worlds), 3))
     start[:, 0] = [float(model.angle(q)) for q in rest]
     now = spread(start[lanes.world], count)
     observer = Observer(
-        gain=spread(gains[lanes.world], count), delivered=np.zeros((blocks, longest(tables), 2, *wide)), fused=now,
-        now=now.copy(), at=np.zeros((blocks, 1, *wide)),
+        gain=spread(gains[lanes.world], count),
+        delivered=np.zeros((blocks, remembered(sensors, believed, period), 2, *wide)),
+        fused=now, now=now.copy(), at=np.zeros((blocks, 1, *wide)),
     )  # fmt: skip
     pictures = np.zeros((blocks, taken.shape[1], *wide))
-    turn, arriving = np.zeros((blocks, 2, columns.shape[1]), np.int64), np.zeros((blocks, 3, *wide))
+    turn, arriving = np.zeros((blocks, 2, cameras.shape[1]), np.int64), np.zeros((blocks, 3, *wide))
     return Watch(np.ascontiguousarray(by_block), pictures, turn, arriving, observer), frames
 
 

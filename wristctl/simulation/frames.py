@@ -2,56 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Sensor
 from wristctl.seeds import Entropy
 from wristctl.simulation.observer import Schedule
 
-_NEVER = np.iinfo(np.int64).max
-"""A tick."""
+_NEVER = np.iinfo(np.int64).max // 2
+"""A tick, behind which there is room for a delay."""
 
 
 def schedule(sensor: Sensor, period: float, horizon: float, believed: Sensor | None = None) -> Schedule:
-    """Ticks of one camera's frames of `horizon` [s], (F,) each; the observer dates them by the believed delay."""
-    return _schedule(sensor.frame_rate, _delay(sensor, period), _delay(believed or sensor, period), period, horizon)
+    """Ticks of one camera's frames of `horizon` [s], (F,); the observer dates them by the believed delay."""
+    found, _ = side_by_side([sensor], [believed or sensor], period, horizon)
+    return Schedule(*(each[..., 0] for each in found))
 
 
-@lru_cache(maxsize=64)
-def _schedule(frame_rate: float, late: int, believed: int, period: float, horizon: float) -> Schedule:
-    times = np.arange(int(horizon * frame_rate) + 1) / frame_rate
-    captures = np.rint(times / period).astype(np.int64)
-    arrivals = captures + late
-    found = Schedule(captures, arrivals, np.maximum(arrivals - believed, 0))
-    for each in found:
+def side_by_side(
+    sensors: Sequence[Sensor], believed: Sequence[Sensor], period: float, horizon: float
+) -> tuple[Schedule, NDArray[np.int64]]:
+    """The same of several: those that differ as columns, (F, columns), and which of them is each sensor's.
+
+    The last ticks of one with fewer frames than another never come.
+    """
+    rates = [each.frame_rate for each in sensors]
+    parts = list(zip(rates, _delays(sensors, period), _delays(believed, period), strict=True))
+    columns = {each: column for column, each in enumerate(dict.fromkeys(parts))}
+    rate, late, dated = map(np.array, zip(*columns, strict=True))
+    counts = _counts(rate, horizon)
+    frame = np.arange(counts.max())[:, None]
+    captures = np.rint(frame / rate / period).astype(np.int64)
+    captures[frame >= counts] = _NEVER
+    for each in (found := Schedule(captures, late, dated)):
         each.setflags(write=False)
-    return found
+    return found, np.array([columns[each] for each in parts])
 
 
-def side_by_side(schedules: Sequence[Schedule]) -> Schedule:
-    """Several cameras' frames as columns, (F, cameras) each; the last ticks of one with fewer frames never come."""
-    most = max(len(each.captures) for each in schedules)
-    parts = (np.full((most, len(schedules)), _NEVER) for _ in Schedule._fields)
-    for part, columns in zip(found := Schedule(*parts), zip(*schedules, strict=True), strict=True):
-        for camera, ticks in enumerate(columns):
-            part[: len(ticks), camera] = ticks
-    return found
+def frame_counts(sensors: Sequence[Sensor], horizon: float) -> NDArray[np.int64]:
+    """How many frames each takes over the horizon [s]."""
+    return _counts(np.array([each.frame_rate for each in sensors]), horizon)
 
 
-def longest(tables: Schedule) -> int:
-    """Ticks of what was delivered that an observer of any of these cameras, (F, cameras) each, must remember."""
-    behind = tables.arrivals - tables.dated
-    between = np.where(tables.dated < _NEVER, np.diff(tables.dated, axis=0, prepend=0), 0)
-    return int((behind.max(axis=0) + between.max(axis=0)).max()) + 2
+def _counts(rates: Array, horizon: float) -> NDArray[np.int64]:
+    return np.asarray(horizon * rates, np.int64) + 1
 
 
-def _delay(sensor: Sensor, period: float) -> int:
+def _delays(sensors: Sequence[Sensor], period: float) -> list[int]:
     """Control ticks between capture and use."""
-    return int(np.ceil(sensor.delay_frames / (sensor.frame_rate * period) - 1e-9))
+    return [math.ceil(each.delay_frames / (each.frame_rate * period) - 1e-9) for each in sensors]
+
+
+def remembered(sensors: Sequence[Sensor], believed: Sequence[Sensor], period: float) -> int:
+    """Ticks of what was delivered that an observer of any of these cameras must remember: from the frame before the
+    one that arrives, which is dated as late as is believed."""
+    between = [math.ceil(1.0 / (each.frame_rate * period)) for each in sensors]
+    late = zip(_delays(sensors, period), _delays(believed, period), between, strict=True)
+    return max(dated + max(own - dated, ticks) for own, dated, ticks in late) + 2
 
 
 def readings(
@@ -64,7 +76,7 @@ def readings(
     """
     bursts = bursts or [1.0] * len(sensors)
     lengths = list(zip(streams, counts, strict=True))
-    drawn = {each: _draws(*each) for each in dict.fromkeys(lengths)}
+    drawn = _draws(dict.fromkeys(lengths))
     found: Array = np.zeros((len(streams), max(counts), 2))
     for own, length, sensor, burst in zip(found, lengths, sensors, bursts, strict=True):
         normal, even = drawn[length]
@@ -85,6 +97,13 @@ def _seen(even: Array, dropped: float, burst: float) -> Array:
     return seen
 
 
-def _draws(stream: Entropy, count: int) -> tuple[Array, Array]:
-    rng = np.random.default_rng(stream)
-    return rng.standard_normal(count), rng.random(count)
+def _draws(lengths: Iterable[tuple[Entropy, int]]) -> dict[tuple[Entropy, int], tuple[Array, Array]]:
+    """So many normal and so many even draws of each stream, each from its beginning."""
+    streams, found = dict[Entropy, tuple[np.random.Generator, Any]](), {}
+    for stream, count in lengths:
+        if stream not in streams:
+            rng = np.random.default_rng(stream)
+            streams[stream] = rng, rng.bit_generator.state
+        rng, rng.bit_generator.state = streams[stream]
+        found[stream, count] = rng.standard_normal(count), rng.random(count)
+    return found

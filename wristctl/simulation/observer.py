@@ -34,12 +34,22 @@ class Observer(NamedTuple):
 
 
 class Schedule(NamedTuple):
-    """One block's ticks at which frames are taken, at which they arrive, and at which the observer believes that they
-    were taken, (F, lanes) each; where a lane has fewer frames than another, the rest are never taken."""
+    """One block's ticks at which frames are taken, (F, lanes), and how many ticks later they arrive, and are believed
+    to arrive, (lanes,) each; where a lane has fewer frames than another, the rest are never taken."""
 
     captures: Any
-    arrivals: Any
-    dated: Any
+    late: Any
+    believed: Any
+
+    @property
+    def arrivals(self) -> Any:
+        """Ticks at which frames arrive, (F, lanes)."""
+        return self.captures + self.late
+
+    @property
+    def dated(self) -> Any:
+        """Ticks at which the observer believes that they were taken, (F, lanes)."""
+        return (self.arrivals - self.believed).clip(0)
 
 
 class ArrivingFrame(NamedTuple):
@@ -95,8 +105,8 @@ def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: 
             taken += 1
             turn[0, lane] = taken
         arriving[0, lane] = -1.0
-        if arrived < taken and schedule.arrivals[arrived, lane] == tick:
-            captured = schedule.dated[arrived, lane]
+        if arrived < taken and schedule.captures[arrived, lane] + schedule.late[lane] == tick:
+            captured = max(tick - schedule.believed[lane], 0)
             begin, first, last = min(begin, int(at[lane])), min(first, captured), max(last, captured)
             arriving[0, lane] = captured
             arriving[1, lane] = pictures[arrived, lane]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float
     propagate(drive, known, x, plus + zero, minus + zero, h)
 
 
+_Value = TypeVar("_Value")
 _DOUBLINGS, _ALIKE = 20, 1e-14
 """Doublings at most, and a change of a correlation that is none."""
 
@@ -39,6 +40,19 @@ class Belief(NamedTuple):
     period: float
 
 
+class _GoesBy(NamedTuple):
+    """All of a belief that its gain depends on."""
+
+    actuator: Actuator
+    wrist: WristParameters
+    period: float
+    ticks: int
+    """From frame to frame."""
+    noise_deg: float
+    torque_noise: float
+    load_drift: float
+
+
 class _Stationary(NamedTuple):
     """What frames one after another lead to, of each belief: gain (B, 3), covariance behind a frame; transition and
     noise of a tick, (B, 3, 3)."""
@@ -50,18 +64,17 @@ class _Stationary(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _stationary(beliefs: tuple[Belief, ...]) -> _Stationary:
-    tick = np.array([_linearised(each.actuator, each.wrist, each.period) for each in beliefs])
-    period, noise_deg, torque_noise, load_drift = np.array(
-        [(each.period, each.sensor.noise_deg, each.sensor.torque_noise, each.sensor.load_drift) for each in beliefs]
-    ).T
+def _stationary(filters: tuple[_GoesBy, ...]) -> _Stationary:
+    models, which = _distinct([each[:3] for each in filters])
+    tick = np.array([_linearised(*each) for each in models])[which]
+    numbers = np.array([each[2:] for each in filters])
+    period, ticks, noise_deg, torque_noise, load_drift = numbers.T
     unknown = tick[:, 1, 2]  # rate gained in one period per unit of torque
     noise = np.zeros_like(tick)
     noise[:, 1, 1], noise[:, 2, 2] = unknown**2 * torque_noise**2 / period, load_drift**2 * period
-    ticks = np.array([_ticks_of_a_frame(each.sensor, each.period) for each in beliefs])[:, None, None]
     frame, between = np.broadcast_to(np.eye(3), tick.shape), np.zeros_like(tick)
-    for done in range(ticks.max()):
-        due = done < ticks
+    for done in range(int(ticks.max())):
+        due = (done < ticks)[:, None, None]
         frame = np.where(due, tick @ frame, frame)
         between = np.where(due, tick @ between @ _transposed(tick) + noise, between)
     variance = np.maximum(np.deg2rad(noise_deg) ** 2, 1e-12)
@@ -118,9 +131,22 @@ def _ticks_of_a_frame(sensor: Sensor, period: float) -> int:
 
 def stationary_gains(beliefs: Sequence[Belief]) -> Array:
     """The Kalman gains (B, 3) for one frame after another."""
-    different = {each: number for number, each in enumerate(dict.fromkeys(beliefs))}
-    found: Array = _stationary(tuple(different)).gain[[different[each] for each in beliefs]]
+    filters, which = _distinct([_goes_by(each) for each in beliefs])
+    found: Array = _stationary(filters).gain[which]
     return found
+
+
+def _goes_by(belief: Belief) -> _GoesBy:
+    sensor, actuator, wrist, period = belief
+    ticks = _ticks_of_a_frame(sensor, period)
+    return _GoesBy(actuator, wrist, period, ticks, sensor.noise_deg, sensor.torque_noise, sensor.load_drift)
+
+
+def _distinct(values: Sequence[_Value]) -> tuple[tuple[_Value, ...], list[int]]:
+    """Those that differ, and which of them each is."""
+    numbers = dict[_Value, int]()
+    which = [numbers.setdefault(each, len(numbers)) for each in values]
+    return tuple(numbers), which
 
 
 def expected_error(belief: Belief) -> float:
@@ -129,7 +155,7 @@ def expected_error(belief: Belief) -> float:
     That is behind a frame and the prediction from it, on average over the ticks for which it is the last to have
     arrived. Frames that are lost, and all that differs from what is believed, come on top.
     """
-    covariance, tick, noise = (each[0] for each in _stationary((belief,))[1:])
+    covariance, tick, noise = (each[0] for each in _stationary((_goes_by(belief),))[1:])
     sensor, period = belief.sensor, belief.period
     late, ticks = round(sensor.delay_frames / (sensor.frame_rate * period)), _ticks_of_a_frame(sensor, period)
     variances = []

@@ -120,7 +120,8 @@ class LoopTicks:
         small = times * (SMALLER if "bristle" in self.names else SMALL)
         found = []
         for tick in range(self._first, self._first + self.cycle):
-            plain = not any(tick in each for each in self._frames())
+            frames = self._frames()
+            plain = tick not in frames.captures and tick not in frames.arrivals
             each = between if plain and between is not None else self._tick(tick, state, small)
             between = each if plain else between
             found.append(each)
@@ -178,8 +179,9 @@ class LoopTicks:
 
     def _frames(self) -> Schedule:
         """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
-        schedule = self._batch.world.schedule or Schedule(*np.zeros((3, 1, 0, 1), np.int64))
-        return Schedule(*(each[0, :, 0] for each in schedule))
+        never = np.zeros((1, 0, 1), np.int64), *np.zeros((2, 1, 1), np.int64)
+        schedule = self._batch.world.schedule or Schedule(*never)
+        return Schedule(*(each[0, ..., 0] for each in schedule))
 
     def _parts(self, tick: int) -> Iterator[StatePart]:
         return state_parts(self._batch, self._law.memory, tick, self._back)
