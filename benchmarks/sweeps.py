@@ -1,6 +1,6 @@
 """A sweep over any leaf beside one batch of as many gains: `python benchmarks/sweeps.py`. Prints PASS or FAIL.
 
-By the wall, and of all processors together: medians of three pairs, one right after the other.
+By the wall, and of all processors together: medians of five pairs, one right after the other.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.swept_loops import swept_metrics
 from wristctl.studies.sweep_unit import simulated, sweep_units
 
-POINTS, PAIRS, MOST = 1000, 3, 1.5
+POINTS, PAIRS, MOST = 1000, 5, 1.5
 BASE = ("simulate.controller=pid-ff", "simulate.gains={Kp: 4.0, Ki: 20.0, Kd: 0.2}")
 TENDON = ("simulate.loop.actuator.level=tendon", "simulate.loop.actuator.sheath=1.0")
 CAMERA = ("simulate.loop.sensor.level=camera", "simulate.loop.control_period=5e-3")

@@ -15,7 +15,8 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion, reference_name, toward
 from wristctl.simulation.tracked_range import range_untracked
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.kinematics import arc_tip

@@ -11,7 +11,8 @@ from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
-from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.kinematics import arc_tip, chain_tip, exact_arc
 from wristctl.wrist.segments import segments

@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 
 from tests.trial.conftest import WRIST, settings_of
+from wristctl.arrays import Array
+from wristctl.config.choices import REFERENCES
+from wristctl.config.errors import UserError
+from wristctl.config.loop import Reference
+from wristctl.simulation.reference import ReferenceKind
 from wristctl.trial.trial_motions import at_rest, back, motion_of
 
 PERIOD = 5e-3
@@ -40,3 +45,12 @@ def test_a_trials_motion_is_mirrored_where_its_direction_counts_negative() -> No
     assert np.degrees(there.final) == pytest.approx(8.0) and len(there.time) == 120 and there.horizon == 0.6
     assert there.theta_ref == pytest.approx(-other.theta_ref) and there.theta_ref == pytest.approx(flexion.theta_ref)
     assert np.diff(there.time) == pytest.approx(PERIOD)
+
+
+def test_a_reference_that_is_no_number_somewhere_never_comes_to_the_motors(monkeypatch: pytest.MonkeyPatch) -> None:
+    def course(reference: Reference, time: Array) -> Array:
+        return np.array([time, np.where(time > 0.3, np.nan, 1.0), 0.0 * time])
+
+    monkeypatch.setitem(REFERENCES, "gap", ReferenceKind("for tests", course, lambda reference: "gap"))
+    with pytest.raises(UserError, match="samples that are no number"):
+        motion_of(settings_of(reference=Reference(kind="gap")), WRIST, "ulnar")

@@ -114,8 +114,8 @@ def courses(
         law, gains, motions, np.arange(len(settings)), [each.loop for each in settings],
         [each.wrist for each in settings], record="briefly", threads=threads, stop=stop,
     )  # fmt: skip
-    wanted, rests = np.array([each.theta_ref for each in motions]), np.array([each.rest for each in motions])
-    return Courses(out.columns("theta"), wanted, rests, horizons, period)
+    rests = np.array([each.rest for each in motions])
+    return Courses(out.columns("theta"), out.references[:, 0], rests, horizons, period)
 
 
 def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> dict[str, Array]:

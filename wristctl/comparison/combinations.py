@@ -16,7 +16,8 @@ from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.draws import Draws, is_random
-from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion, reference_name, toward
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.worlds import loop_facing
 from wristctl.wrist.kinematics import Inverse

@@ -18,9 +18,9 @@ from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor,
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
 from wristctl.simulation.kernel import LoopCourse, LoopState, LoopValues, Scratch, Setup
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import Observer, Schedule, Watch
-from wristctl.simulation.reference import Motion
 from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
@@ -74,11 +74,14 @@ def batch(
     """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing."""
     filmed, (worlds, body) = worlds, _bodies(worlds)
     world = body[lanes.world]
-    check_stops(worlds, max(float(np.abs(each.theta_ref).max()) for each in motions))
+    references = np.empty((len(motions), 3, len(motions[0].time)))
+    for each, own in zip(references, motions, strict=True):
+        own.angles.into(each)
+    check_stops(worlds, float(max(references[:, 0].max(), -references[:, 0].min())))
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
     k, level = model.coordinates(n), level_of(loop.actuator)
-    ticks, samples = max(1, round(sample_period(period) / period)), len(motions[0].theta_ref)
+    ticks, samples = max(1, round(sample_period(period) / period)), references.shape[2]
     followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
     wide = followed.shape[1:]
     actual = [each.plant for each in worlds]
@@ -115,7 +118,8 @@ def batch(
         path = np.append(short, np.abs(rest[each]).sum())
         return unmoved(given, path, given - short, rest[each])
 
-    goals = np.array([[m.final, m.move, m.begin, m.rest, m.horizon] for m in motions])[lanes.motion]
+    moves = np.array([[each.move, each.begin, each.rest, each.horizon] for each in motions])
+    goals = np.concatenate([references[:, 0, -1:], moves], axis=1)[lanes.motion]
     watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
@@ -143,9 +147,6 @@ def batch(
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
-    references = np.empty((len(motions), 3, samples))
-    for each, own in zip(references, motions, strict=True):
-        each[0], each[1], each[2] = own.theta_ref, own.rate_ref, own.acceleration_ref
     course = LoopCourse(references, _stacked(cases, samples))
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)

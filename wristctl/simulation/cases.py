@@ -21,12 +21,12 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.energy import energy
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
-from wristctl.simulation.reference import Motion
 from wristctl.simulation.rollout import How, Outcome, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
 
-_RECORDED_AT_ONCE = 12_000_000
+_RECORDED_AT_ONCE = 6_000_000
 """Numbers that are kept of rollouts whose samples are wanted."""
 _SPECTRA = 256
 """Loops whose spectra are worked out at once."""
@@ -129,13 +129,12 @@ def at_most(loop: Loop, followed: Motion, recorded: How) -> int:
     return max(1, _RECORDED_AT_ONCE // (columns_of(recorded, loop.plant_segments) * len(followed.time)))
 
 
-def at_once(
-    metrics: Sequence[str], outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.int64]
-) -> dict[str, Array]:
-    """Those of the metrics that are taken of the samples of many rollouts without a trajectory for each."""
-    found, step = dict[str, Array](), float(motions[0].time[1])
+def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> dict[str, Array]:
+    """Those of the metrics that are taken of the samples, `step` [s] apart, of many rollouts without a trajectory for
+    each; `which` are the references that they follow."""
+    found = dict[str, Array]()
     if "oscillation" in metrics:
-        found["oscillation"] = _oscillation(outcome, motions, which, step)
+        found["oscillation"] = _oscillation(outcome, which, step)
     if "energy" in metrics:
         found["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
     return found
@@ -157,7 +156,7 @@ def _measured(
     )  # fmt: skip
     found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
     slow = [name for name in metrics if name not in found and name not in AT_ONCE]
-    found |= at_once(metrics, outcome, motions, which)
+    found |= at_once(metrics, outcome, which, float(motions[0].time[1]))
     if slow:
         plants = [plant_of(wrist, case.loop.plant) for case in cases]
         courses = [
@@ -171,7 +170,7 @@ def _measured(
     return outcome, found
 
 
-def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.int64], step: float) -> Array:
+def _oscillation(outcome: Outcome, which: NDArray[np.int64], step: float) -> Array:
     """The metric of that name, without a trajectory for each."""
     theta = outcome.columns("theta")
     found = np.empty(len(theta))
@@ -179,6 +178,5 @@ def _oscillation(outcome: Outcome, motions: Sequence[Motion], which: NDArray[np.
         for first in range(0, len(theta), _SPECTRA):
             own = slice(first, first + _SPECTRA)
             there, followed = np.unique(which[own], return_inverse=True)
-            references = np.array([motions[each].theta_ref for each in there])
-            found[own] = oscillations(theta[own], references, followed, step)
+            found[own] = oscillations(theta[own], outcome.references[there, 0], followed, step)
     return found

@@ -19,7 +19,8 @@ from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory
-from wristctl.simulation.reference import Motion, motion, reference_name, toward
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion, reference_name, toward
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
 from wristctl.simulation.rollout import Outcome, rollout
 from wristctl.simulation.stationary_filter import Belief, expected_error

@@ -14,7 +14,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case
-from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion
 from wristctl.wrist.kinematics import Inverse
 
 

@@ -13,7 +13,7 @@ def minimum_jerk(time: Array, duration: float) -> Array:
     From Flash and Hogan, J. Neurosci. 5 (1985) 1688.
     """
     found = np.zeros((3, len(time)))
-    found[0, time >= duration] = 1.0
+    found[0] = time >= duration
     moving = np.flatnonzero((time > 0.0) & (time < duration))
     s = time[moving] / duration
     found[0, moving] = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

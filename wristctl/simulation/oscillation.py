@@ -27,8 +27,8 @@ _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
 _FIRST = np.zeros(1, np.int64)
-_ENOUGH = 0.01
-"""Between samples that show how fast a reference goes [s]: no wrist follows 50 Hz."""
+_ENOUGH = 0.02
+"""Between samples that show how fast a reference goes [s]: no wrist follows 25 Hz."""
 
 
 def oscillation(course: Trajectory) -> float:
@@ -88,8 +88,7 @@ def _remaining(
         yield own, _without_trend(theta[own, -window:])
     if rests.all():
         return
-    swing = references - references.mean(axis=1, keepdims=True)
-    frequency = _strongest(swing, step, max(1, round(_ENOUGH / step)))
+    frequency = _strongest(references, step, max(1, round(_ENOUGH / step)), references.mean(axis=1))
     windows = np.clip(np.rint(2.0 / (frequency * step)), window, samples).astype(int)
     waves = math.pi * _HARMONICS * frequency * step * windows  # a polynomial follows so many waves, and no more
     degrees = np.minimum(4 + np.rint(waves).astype(int), windows // 2)
@@ -134,10 +133,11 @@ def _without_swing(angle: Array, left: Array, trend: Array) -> Array:
     return found
 
 
-def _strongest(values: Array, step: float, every: int = 1) -> Array:
-    """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart, (L,), by one in `every`."""
-    windowed = (values * np.hanning(values.shape[1]))[:, ::every]
-    count = round(8 * values.shape[1] / every)
+def _strongest(values: Array, step: float, every: int = 1, mean: Array | float = 0.0) -> Array:
+    """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart less its mean, (L,), by one in
+    `every`."""
+    own, count = slice(None, None, every), round(8 * values.shape[1] / every)
+    windowed = (values[:, own] - np.reshape(mean, (-1, 1))) * np.hanning(values.shape[1])[own]
     power = np.abs(np.fft.rfft(windowed, count, axis=1))
     return np.asarray((np.argmax(power[:, 8:], axis=1) + 8) / (count * every * step))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
+from wristctl.simulation.motion import Angles, Motion
 from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse, arc_path, exact_arc, exact_inverse
 
@@ -63,39 +65,6 @@ def toward(reference: Reference, direction: DirectionName) -> Reference:
     return reference if DIRECTIONS[direction].sign > 0 else reference.mirrored()
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A reference on the sample grid, T samples from t = 0; SI units."""
-
-    time: Array
-    theta_ref: Array
-    rate_ref: Array
-    acceleration_ref: Array
-    theta_desired: Array
-    """The true wanted angle, which a network only approximates."""
-    tips: Array | Callable[[], Array]
-    """The wanted tip positions, (T, 2) [m], or what works them out once they are asked for."""
-    move: float
-    """Last move of the reference, signed [rad]."""
-    begin: float
-    """Time at which the last move begins."""
-    rest: float
-    """Time at which the reference rests; the horizon if it never does."""
-    horizon: float
-    outside: float = 0.0
-    """Share of samples whose tip position lies outside the domain that the network was trained on."""
-
-    @cached_property
-    def tip_desired(self) -> Array:
-        """The wanted tip position, (T, 2)."""
-        return self.tips() if callable(self.tips) else self.tips
-
-    @property
-    def final(self) -> float:
-        """Last reference angle [rad]."""
-        return float(self.theta_ref[-1])
-
-
 def motion(
     reference: Reference, wrist: WristParameters, horizon: float, period: float, network: Inverse | None = None
 ) -> Motion:
@@ -103,7 +72,7 @@ def motion(
 
     Tip targets, or angles with inverse `network` or `closed-form`, become a tip path (an arc whose angle and length
     move from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
-    What needs no network is worked out once; the arrays are read-only.
+    What needs no network is worked out once, and angles of moves when they are asked for; the arrays are read-only.
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
         return _evaluated(reference, wrist, horizon, period, network)
@@ -114,8 +83,7 @@ def motion(
 def _known(reference: Reference, length: float, range_deg: float, horizon: float, period: float) -> Motion:
     if _bends_alone(reference):
         of_any = _bending(reference, range_deg, horizon, period)
-        bend = of_any.theta_ref, of_any.rate_ref, of_any.acceleration_ref
-        return replace(of_any, tips=lambda: _tips(np.array(bend), _unstretched(length, of_any.time)))
+        return replace(of_any, tips=lambda: _tips(of_any.angles, _unstretched(length, len(of_any.time))))
     wrist = WristParameters(length=length, range_deg=range_deg)  # all that it depends on
     return _evaluated(reference, wrist, horizon, period, None)
 
@@ -142,16 +110,13 @@ def _evaluated(
 ) -> Motion:
     kind = REFERENCES[reference.kind]
     time = _grid(horizon, period)
-    bend, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
-    rest = kind.rest(reference, begin, horizon)
-    wanted, tips = bend[0], partial(_tips, bend, length)
-    angles, outside = (bend[0], bend[1], bend[2]), 0.0
-    if reference.inverse != "none":
-        found = _inverse(reference, network)(arc_path(bend, length))
-        angles, outside = (found.theta, found.rate, found.acceleration), float(np.mean(found.outside))
-    for each in (*angles, wanted, bend, length):
-        each.setflags(write=False)
-    return Motion(time, *angles, wanted, tips, move, begin, rest, horizon, outside)
+    angles, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
+    rest, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
+    if reference.inverse == "none":
+        return Motion(time, angles, tips, move, begin, rest, horizon)
+    found = _inverse(reference, network)(arc_path(angles.rows, length))
+    outside, reached = float(np.mean(found.outside)), Angles.of(found.theta, found.rate, found.acceleration)
+    return Motion(time, reached, tips, move, begin, rest, horizon, outside, angles)
 
 
 @lru_cache(maxsize=64)
@@ -161,38 +126,46 @@ def _grid(horizon: float, period: float) -> Array:
     return time
 
 
-def _tips(bend: Array, length: Array) -> Array:
-    found = arc_path(bend, length).position
+def _tips(angles: Angles, length: Array) -> Array:
+    found = arc_path(angles.rows, length).position
     found.setflags(write=False)
     return found
 
 
-def _unstretched(length: float, time: Array) -> Array:
-    return np.broadcast_to(np.array([[length], [0.0], [0.0]]), (3, len(time)))
+@lru_cache(maxsize=64)
+def _unstretched(length: float, samples: int) -> Array:
+    return np.broadcast_to(np.array([[length], [0.0], [0.0]]), (3, samples))
 
 
 def _moves(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Array, Array, float, float]:
-    """Angle and length of the arc with two derivatives (3, T), the last move [rad], and when it begins."""
-    targets = np.array(_targets(reference, kind, wrist))
-    before = np.concatenate([[[0.0, wrist.length]], targets[:-1]])
-    bend, length = np.zeros((3, 1)), _unstretched(wrist.length, time)
-    for number, (turn, stretch) in enumerate((targets - before).tolist()):
-        course = kind.course(reference, time - number * reference.duration if number else time)
-        turning = turn * course
-        bend = np.add(bend, turning, out=turning)
+) -> tuple[Angles, Array, float, float]:
+    """The angles, the length of the arc with two derivatives (3, T), the last move [rad], and when it begins."""
+    targets = [(0.0, wrist.length), *_targets(reference, kind, wrist)]
+    turns, stretches = ([to[k] - before[k] for before, to in pairwise(targets)] for k in (0, 1))
+
+    def course(number: int) -> Array:
+        return kind.course(reference, time - number * reference.duration if number else time)
+
+    def bend(out: Array) -> None:
+        np.multiply(turns[0], course(0), out=out)
+        for number in range(1, len(turns)):
+            out += turns[number] * course(number)
+        out += 0.0  # no zero is negative
+
+    length = _unstretched(wrist.length, len(time))
+    for number, stretch in enumerate(stretches):
         if stretch:
-            length = length + stretch * course
-    return bend, length, float(targets[-1, 0] - before[-1, 0]), (len(targets) - 1) * reference.duration
+            length = length + stretch * course(number)
+    return Angles(len(time), bend), length, turns[-1], (len(turns) - 1) * reference.duration
 
 
 def _whole(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Array, Array, float, float]:
+) -> tuple[Angles, Array, float, float]:
     """The same of a course that has no targets: its last move is from straight to where it ends."""
     course = kind.course(reference, time)
-    bend, length = course if course.ndim == 3 else (course, _unstretched(wrist.length, time))
+    bend, length = course if course.ndim == 3 else (course, _unstretched(wrist.length, len(time)))
     most = float(np.abs(bend[0]).max(initial=0.0))
     if most > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
         at = time[int(np.argmax(np.abs(bend[0])))]
@@ -202,7 +175,7 @@ def _whole(
             where="reference",
             fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",
         )
-    return bend, length, float(bend[0, -1]), 0.0
+    return Angles.of(*bend), length, float(bend[0, -1]), 0.0
 
 
 def _targets(reference: Reference, kind: ReferenceKind, wrist: WristParameters) -> list[tuple[float, float]]:

@@ -23,7 +23,7 @@ from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
-from wristctl.simulation.reference import Motion
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.sums import GOALS, SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
@@ -54,6 +54,8 @@ class Outcome:
     """Rollouts whose wrist left its range, or bent to no number at all."""
     until: Array
     """When they were last within it [s]: where they have failed."""
+    references: Array
+    """What was followed, angle with rate and acceleration, (motions, 3, T)."""
     kept: KeptSamples | None = None
 
     @property
@@ -122,7 +124,7 @@ def rollout(
     failed = np.concatenate([each.failed for each in done])[back]
     until = np.concatenate([each.until for each in done])[back]
     kept = [each.kept for each in done if each.kept is not None]
-    return Outcome(metrics, failed, until, KeptSamples.joined(kept, back) if kept else None)
+    return Outcome(metrics, failed, until, done[0].references, KeptSamples.joined(kept, back) if kept else None)
 
 
 def worlds_of(
@@ -181,7 +183,8 @@ def _run(
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
     kept = KeptSamples.of(done.state.record, count) if record else None
-    return Outcome(summary(totals), totals.sums["alive"] <= 0.0, totals.sums["until"], kept)
+    failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
+    return Outcome(summary(totals), failed, until, done.course.references, kept)
 
 
 def _advance(

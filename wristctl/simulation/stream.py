@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.simulation.reference import Motion
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.rollout import Outcome, rollout
 
 

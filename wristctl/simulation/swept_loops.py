@@ -20,7 +20,8 @@ from wristctl.simulation.cases import AT_ONCE, at_most, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
-from wristctl.simulation.reference import Motion, motion, toward
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
 
@@ -104,14 +105,14 @@ def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptL
 
 def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
     first = chosen[0]
-    motions = list({id(each.motion.theta_ref): each.motion for each in chosen}.values())  # which may differ in tips
-    numbers = {id(each.theta_ref): number for number, each in enumerate(motions)}
-    which = np.array([numbers[id(each.motion.theta_ref)] for each in chosen])
+    motions = list({id(each.motion.angles): each.motion for each in chosen}.values())  # which may differ in tips
+    numbers = {id(each.angles): number for number, each in enumerate(motions)}
+    which = np.array([numbers[id(each.motion.angles)] for each in chosen])
     start: Start | None = equilibrium(first.loop) if first.at_rest else None
     outcome = rollout(
         first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
         [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
         record="briefly",
     )  # fmt: skip
-    known = outcome.metrics | at_once(names, outcome, motions, which)
+    known = outcome.metrics | at_once(names, outcome, which, float(first.motion.time[1]))
     return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)

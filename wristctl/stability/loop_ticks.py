@@ -18,8 +18,8 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import RECORDED, Span, run_blocks
+from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.observer import Schedule
-from wristctl.simulation.reference import Motion
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
@@ -204,5 +204,5 @@ class LoopTicks:
 
 def _at_rest(theta: float, samples: int, period: float) -> Motion:
     still, time = np.zeros(samples), period * np.arange(samples, dtype=np.float64)
-    angle = np.full(samples, theta)
-    return Motion(time, angle, still, still, angle, np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)
+    angles = Angles.of(np.full(samples, theta), still, still)
+    return Motion(time, angles, np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)

@@ -20,7 +20,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
-from wristctl.simulation.reference import Motion
+from wristctl.simulation.motion import Motion
 from wristctl.trial.following import Following
 from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog, of_axes

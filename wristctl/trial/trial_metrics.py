@@ -10,7 +10,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.plant import Push
 from wristctl.simulation.metrics import metrics_of, summed
-from wristctl.simulation.reference import Motion
+from wristctl.simulation.motion import Motion
 from wristctl.trial.spools import on_plus_side
 from wristctl.trial.trials import Trial, push_seen, recovery
 from wristctl.wrist.directions import ACTIVE

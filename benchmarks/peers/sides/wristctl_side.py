@@ -11,7 +11,8 @@ from task import Task
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.simulation.reference import Motion, motion
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 
 

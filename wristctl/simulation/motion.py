@@ -1,0 +1,100 @@
+"""What a wrist follows: angles with two derivatives over time, worked out where they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wristctl.arrays import Array
+
+
+class Angles:
+    """Angle [rad], rate and acceleration over T samples: rows (3, T), which `work` writes into what it is given."""
+
+    def __init__(self, samples: int, work: Callable[[Array], None]) -> None:
+        self._samples, self._work = samples, work
+
+    @classmethod
+    def of(cls, angle: Array, rate: Array, acceleration: Array) -> Angles:
+        """Those that are known, (T,) each."""
+        found = cls(len(angle), lambda out: None)
+        found.rows = _fixed(np.array([angle, rate, acceleration], np.float64))
+        return found
+
+    @cached_property
+    def rows(self) -> Array:
+        """The three rows, which are kept, read-only."""
+        found = np.empty((3, self._samples))
+        self._work(found)
+        return _fixed(found)
+
+    def into(self, out: Array) -> None:
+        """Write the rows into `out` (3, T); unless they are known already, they are not kept."""
+        if "rows" in self.__dict__:
+            out[:] = self.rows
+        else:
+            self._work(out)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A reference on the sample grid, T samples from t = 0; SI units."""
+
+    time: Array
+    angles: Angles
+    """The reference with two derivatives."""
+    tips: Array | Callable[[], Array]
+    """The wanted tip positions, (T, 2) [m], or what works them out once they are asked for."""
+    move: float
+    """Last move of the reference, signed [rad]."""
+    begin: float
+    """Time at which the last move begins."""
+    rest: float
+    """Time at which the reference rests; the horizon if it never does."""
+    horizon: float
+    outside: float = 0.0
+    """Share of samples whose tip position lies outside the domain that the network was trained on."""
+    wanted: Angles | None = None
+    """What is truly wanted, where a network only approximates it."""
+
+    @property
+    def theta_ref(self) -> Array:
+        """The reference angle, (T,) [rad]."""
+        found: Array = self.angles.rows[0]
+        return found
+
+    @property
+    def rate_ref(self) -> Array:
+        """Its rate, (T,) [rad/s]."""
+        found: Array = self.angles.rows[1]
+        return found
+
+    @property
+    def acceleration_ref(self) -> Array:
+        """Its acceleration, (T,) [rad/s^2]."""
+        found: Array = self.angles.rows[2]
+        return found
+
+    @property
+    def theta_desired(self) -> Array:
+        """The true wanted angle, (T,) [rad], which a network only approximates."""
+        found: Array = (self.wanted or self.angles).rows[0]
+        return found
+
+    @cached_property
+    def tip_desired(self) -> Array:
+        """The wanted tip position, (T, 2)."""
+        return self.tips() if callable(self.tips) else self.tips
+
+    @property
+    def final(self) -> float:
+        """Last reference angle [rad]."""
+        return float(self.theta_ref[-1])
+
+
+def _fixed(rows: Array) -> Array:
+    rows.setflags(write=False)
+    return rows
