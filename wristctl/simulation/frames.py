@@ -14,7 +14,7 @@ from wristctl.config.plant import Sensor
 from wristctl.seeds import Entropy
 from wristctl.simulation.observer import Schedule
 
-_NEVER = np.iinfo(np.int64).max // 2
+_NEVER = 2**62
 """A tick, behind which there is room for a delay."""
 
 
@@ -37,8 +37,7 @@ def side_by_side(
     rate, late, dated = map(np.array, zip(*columns, strict=True))
     counts = _counts(rate, horizon)
     frame = np.arange(counts.max())[:, None]
-    captures = np.rint(frame / rate / period).astype(np.int64)
-    captures[frame >= counts] = _NEVER
+    captures = np.where(frame < counts, np.rint(frame / rate / period), _NEVER).astype(np.int64)
     for each in (found := Schedule(captures, late, dated)):
         each.setflags(write=False)
     return found, np.array([columns[each] for each in parts])
