@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import traceback
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +101,12 @@ def load(reference: str) -> tuple[Any, Foreign]:
         names = [name for name, each in own.items() if not callable(each) and not isinstance(each, ModuleType)]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
+
+
+def raised_at(error: Exception, reached_from: str, otherwise: str) -> str:
+    """FILE:LINE where code from elsewhere has raised an error, the innermost place behind our own file."""
+    places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
+    return next((each for each in places[::-1] if not each.startswith(reached_from)), otherwise)
 
 
 def installed(module: ModuleType, attribute: str) -> Foreign:

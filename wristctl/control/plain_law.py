@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import traceback
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -15,6 +14,7 @@ from numba.core import types
 from numba.experimental import function_type
 
 from wristctl.config.errors import UserError
+from wristctl.config.foreign import raised_at
 
 __all__ = ["PlainLaw"]
 _TEACHES_NUMBA = function_type
@@ -57,8 +57,7 @@ class PlainLaw(types.WrapperAddressProtocol):
         """Raise what the law has raised, or a UserError for what it has returned."""
         error, self._error = self._error, None
         if isinstance(error, Exception) and not isinstance(error, UserError):
-            places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
-            where = next((each for each in places[::-1] if not each.startswith(__file__)), self._where)
+            where = raised_at(error, __file__, self._where)
             what = f"{self._name} failed: {type(error).__name__}: {error}"
             raise UserError(what, where, "mend the law; --debug shows more") from error
         if error is not None:

@@ -14,6 +14,7 @@ from wristctl.arrays import Array
 from wristctl.config.choices import REFERENCES as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.config.errors import UserError
+from wristctl.config.foreign import raised_at
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
@@ -137,6 +138,27 @@ def _unstretched(length: float, samples: int) -> Array:
     return np.broadcast_to(np.array([[length], [0.0], [0.0]]), (3, samples))
 
 
+def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
+    """Its course; UserError for one from elsewhere that fails, or is no angle with two derivatives everywhere."""
+    name, key = reference.kind, "reference.kind"
+    if REFERENCES.belongs(name):
+        return kind.course(reference, time)
+    try:
+        found = np.asarray(kind.course(reference, time), np.float64)
+    except UserError:
+        raise
+    except Exception as error:
+        what = f"the course failed at {raised_at(error, __file__, name)}: {type(error).__name__}: {error}"
+        raise UserError(what, key, "mend it; --debug shows more") from error
+    if found.shape[-2:] != (3, len(time)):
+        what = f"the course of {name} is an array of {found.shape}, not of (3, {len(time)})"
+        raise UserError(what, key, "give angle, rate and acceleration at every time")
+    if not (sound := np.isfinite(found).all(axis=tuple(range(found.ndim - 1)))).all():
+        what = f"the course of {name} is no number at {time[~sound][0]:.4g} s"
+        raise UserError(what, key, "make it finite at every time, before its begin too")
+    return found
+
+
 def _moves(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
 ) -> tuple[Angles, Array, float, float]:
@@ -145,7 +167,7 @@ def _moves(
     turns, stretches = ([to[k] - before[k] for before, to in pairwise(targets)] for k in (0, 1))
 
     def course(number: int) -> Array:
-        return kind.course(reference, time - number * reference.duration if number else time)
+        return _course(reference, kind, time - number * reference.duration if number else time)
 
     def bend(out: Array) -> None:
         np.multiply(turns[0], course(0), out=out)
@@ -164,7 +186,7 @@ def _whole(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
 ) -> tuple[Angles, Array, float, float]:
     """The same of a course that has no targets: its last move is from straight to where it ends."""
-    course = kind.course(reference, time)
+    course = _course(reference, kind, time)
     bend, length = course if course.ndim == 3 else (course, _unstretched(wrist.length, len(time)))
     most = float(np.abs(bend[0]).max(initial=0.0))
     if most > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):

@@ -44,14 +44,16 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
 
 
 def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:
-    """UserError for the first reference that asks for more than the wrist's range."""
+    """UserError for the first reference that asks for more than the wrist's range, or whose course fails."""
+    import numpy as np
+
     from wristctl.simulation.reference import motion
 
     for number, reference in enumerate(references):
         tips = reference.tip is not None or reference.kind == "tip-path"
         plain = reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
         try:
-            motion(plain, wrist, 1.0, 0.1)
+            motion(plain, wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
         except UserError as error:
             raise error.at(f"{where.format(number)}.{error.where.removeprefix('reference.')}") from error
 
