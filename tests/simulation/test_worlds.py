@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from wristctl.comparison.combinations import ComparedRow, compare
+from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
@@ -175,3 +176,15 @@ def test_drawn_plants_lie_evenly_within_their_spreads_and_keep_no_spread() -> No
         assert values.mean() == pytest.approx(0.5 * (low + high), abs=0.05 * (high - low))
     assert np.abs(np.corrcoef([stiffness, damping, payload])[np.triu_indices(3, 1)]).max() < 0.15
     assert all(each == drawn(each, (9, 9)) for each in many[:3])
+
+
+@pytest.mark.parametrize("angle", [20.0, -20.0])
+def test_an_end_stop_within_a_references_range_is_refused(angle: float) -> None:
+    law, wrist = controller("pid-ff"), WristParameters()
+    gains, which = np.array([gains_of(law, "default")]), np.zeros(1, np.int64)
+    followed = [motion(Reference(angle_deg=angle, duration=0.02), wrist, 0.05, 1e-3)]
+    for stop in (15.0, 20.0):
+        loop = Loop(plant=Plant(end_stop_deg=stop))
+        with pytest.raises(UserError, match=rf"the end stop at {stop:g} deg lies inside the reference's range, 20 deg"):
+            rollout(law, gains, followed, which, loop, wrist)
+    assert not rollout(law, gains, followed, which, Loop(plant=Plant(end_stop_deg=20.5)), wrist).failed.any()

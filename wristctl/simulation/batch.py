@@ -77,7 +77,7 @@ def batch(
     references = np.empty((len(motions), 3, len(motions[0].time)))
     for each, own in zip(references, motions, strict=True):
         own.angles.into(each)
-    check_stops(worlds, float(max(references[:, 0].max(), -references[:, 0].min())))
+    check_stops(worlds, references[:, 0])
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
     k, level = model.coordinates(n), level_of(loop.actuator)
@@ -191,14 +191,13 @@ def _watch(
     taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
-    lanes_last = np.moveaxis(taken[order.ravel()], 0, -1)  # (F, 2, lanes)
-    by_block = np.moveaxis(lanes_last.reshape(*lanes_last.shape[:2], blocks, *wide), 2, 0)
+    by_block = np.array([np.moveaxis(taken[own], 0, -1) for own in order.reshape(blocks, -1)])  # (blocks, F, 2, lanes)
     cameras = camera[lanes.world][order].reshape(blocks, -1)
     different = cameras if camera.any() else cameras[:1]
     frames = Schedule(*(np.array([each[..., own] for own in different]) for each in tables))
     gains = stationary_gains([_belief(each) for each in worlds])
     start = np.zeros((len(worlds), 3))
-    start[:, 0] = [float(model.angle(q)) for q in rest]
+    start[:, 0] = model.angle(rest)
     now = spread(start[lanes.world], count)
     observer = Observer(
         gain=spread(gains[lanes.world], count),
@@ -207,7 +206,7 @@ def _watch(
     )  # fmt: skip
     pictures = np.zeros((blocks, taken.shape[1], *wide))
     turn, arriving = np.zeros((blocks, 2, cameras.shape[1]), np.int64), np.zeros((blocks, 3, *wide))
-    return Watch(np.ascontiguousarray(by_block), pictures, turn, arriving, observer), frames
+    return Watch(by_block.reshape(*by_block.shape[:3], *wide), pictures, turn, arriving, observer), frames
 
 
 def _belief(world: World) -> Belief:

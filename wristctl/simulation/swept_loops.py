@@ -94,12 +94,16 @@ def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
 def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptLoop]]]:
     """Loops that can run as lanes of one batch, with their numbers, as soon as there are enough of a kind."""
     waiting: dict[tuple[object, ...], tuple[list[int], list[SweptLoop]]] = {}
+    most = dict[tuple[object, ...], int]()
     for number, each in enumerate(loops):
-        numbers, own = waiting.setdefault(each.kind, ([], []))
+        kind = each.kind
+        if kind not in most:
+            most[kind] = at_most(each.loop, each.motion, "briefly")
+        numbers, own = waiting.setdefault(kind, ([], []))
         numbers.append(number)
         own.append(each)
-        if len(own) == at_most(each.loop, each.motion, "briefly"):
-            yield waiting.pop(each.kind)
+        if len(own) == most[kind]:
+            yield waiting.pop(kind)
     yield from waiting.values()
 
 

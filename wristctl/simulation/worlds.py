@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.config.errors import UserError
 from wristctl.config.keys import unit_of
 from wristctl.config.loop import Loop
@@ -53,14 +54,12 @@ def bending_limit(wrist: WristParameters, end_stop_deg: float | None = None) -> 
     return math.radians(max(wrist.range_deg, end_stop_deg or 0.0) + LEEWAY_DEG)
 
 
-def check_stops(worlds: Sequence[World], largest: float) -> None:
-    """UserError where end stops lie inside the range of a reference, which goes to `largest` [rad]."""
-    most = math.degrees(largest)
-    for world in worlds:
-        stop = world.loop.plant.end_stop_deg
-        if stop is not None and stop <= most:
-            what = f"the end stop at {stop:g} deg lies inside the reference's range, {most:.4g} deg"
-            raise UserError(what, "loop.plant.end_stop_deg", "a larger one, or a smaller motion")
+def check_stops(worlds: Sequence[World], references: Array) -> None:
+    """UserError where end stops lie inside the range of the references [rad]."""
+    stops = [each.loop.plant.end_stop_deg for each in worlds if each.loop.plant.end_stop_deg is not None]
+    if stops and min(stops) <= (most := math.degrees(np.abs(references).max())):
+        what = f"the end stop at {min(stops):g} deg lies inside the reference's range, {most:.4g} deg"
+        raise UserError(what, "loop.plant.end_stop_deg", "a larger one, or a smaller motion")
 
 
 class Mismatch(NamedTuple):
