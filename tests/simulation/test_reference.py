@@ -14,7 +14,7 @@ from wristctl.learning.network import Network, Scaler
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import motion
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.kinematics import arc_tip, chain_tip, exact_arc
+from wristctl.wrist.kinematics import arc_path, arc_tip, chain_tip, exact_arc
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()
@@ -143,3 +143,15 @@ def test_a_motion_is_worked_out_once_and_cannot_be_changed() -> None:
     longer = WristParameters().model_copy(update={"length": 0.1})
     for other in ((Reference(angle_deg=21.0), *asked[1:]), (asked[0], longer, 1.0, 1e-3), (*asked[:2], 1.1, 1e-3)):
         assert motion(*other).tip_desired.tobytes() != first.tip_desired.tobytes()
+
+
+def test_a_path_that_rests_in_between_is_what_its_samples_are_one_by_one() -> None:
+    rng = np.random.default_rng(1)
+    rows = np.repeat(rng.uniform(-0.6, 0.6, (6, 12)), rng.integers(1, 5, 12), axis=1)
+    rows[3:] += 0.1
+    rows[3, 20:] = 0.08  # the length alone changes
+    together = arc_path(rows[:3], rows[3:])
+    alone = [arc_path(rows[:3, k : k + 1], rows[3:, k : k + 1]) for k in range(rows.shape[1])]
+    for name in ("position", "velocity", "acceleration"):
+        parts = np.concatenate([getattr(each, name) for each in alone])
+        np.testing.assert_allclose(getattr(together, name), parts, rtol=1e-14, atol=1e-15)

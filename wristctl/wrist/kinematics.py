@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,14 +84,13 @@ def exact_inverse(path: TipPath) -> AnglePath:
 
 def arc_path(theta: Array, length: Array) -> TipPath:
     """Tips of an arc whose angle and length move; rows of both are value, rate and acceleration, (3, T)."""
-    (q, dq, ddq), (r, dr, ddr) = theta, length[..., None]
-    f, df, ddf = _unit_arc(q)
-    dq, ddq = dq[:, None], ddq[:, None]
-    return TipPath(
-        position=r * f,
-        velocity=dr * f + r * dq * df,
-        acceleration=ddr * f + 2.0 * dr * dq * df + r * (ddq * df + dq**2 * ddf),
-    )
+    rows = np.concatenate([theta, length])
+    moved = np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0))  # where it rests all is as before
+    q, dq, ddq, r, dr, ddr = rows[:, moved, None]
+    f, df, ddf = _unit_arc(q[:, 0])
+    velocity, acceleration = dr * f + r * dq * df, ddr * f + 2.0 * dr * dq * df + r * (ddq * df + dq**2 * ddf)
+    place = np.cumsum(moved) - 1
+    return TipPath((r * f)[place], velocity[place], acceleration[place])
 
 
 def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
@@ -98,12 +98,18 @@ def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
 
     By Gauss-Legendre quadrature: to rounding for |theta| <= 2 pi, and nothing special at 0.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    s, w = 0.5 * (nodes + 1.0), 0.5 * weights
+    nodes, weights = _gauss_legendre()
     found = np.zeros((3, len(theta)), complex)
-    for node, weight in zip(s, w, strict=True):  # a matrix product sums in an order of the processor's own
+    for node, weight in zip(nodes, weights, strict=True):  # a matrix product sums in an order of the processor's own
         wave = weight * np.exp(1j * theta * node)
         for k in range(3):
             found[k] += wave
             wave = wave * (1j * node)
     return tuple(np.stack([v.real, v.imag], axis=-1) for v in found)  # type: ignore[return-value]
+
+
+@cache
+def _gauss_legendre() -> tuple[Array, Array]:
+    """Nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
