@@ -30,11 +30,20 @@ LEAVES = {
         (),
         ("wrist.stiffness=0.5..0.8", "wrist.damping=0.05..0.2", "wrist.length=0.05..0.12", "wrist.mass=0.02..0.1",
          "wrist.hand_mass=0..0.5", "wrist.hand_offset=0.03..0.09", "wrist.tendon_radius=0.01..0.025",
-         "wrist.pretension=0..5", "wrist.tension_limit=20..100"),
+         "wrist.pretension=0..5", "wrist.tension_limit=20..100", "wrist.flexion_ratio=0.7..1.3",
+         "wrist.range_deg=45..80", "wrist.gravity.0=-9.81..9.81"),
     ),
     "gains": ((), ("simulate.gains.Kp=1..8", "simulate.gains.Ki=5..40", "simulate.gains.Kd=0.1..0.4")),
     "reference": ((), ("simulate.reference.angle_deg=5..40", "simulate.reference.duration=0.5..1.5")),
     "sine": (("simulate.reference.kind=sine",), ("simulate.reference.frequency=0.3..1",)),
+    "angles": (
+        ("simulate.reference.kind=multi-step", "simulate.reference.angles_deg=[10.0, -5.0]"),
+        ("simulate.reference.angles_deg.0=5..20",),
+    ),
+    "tip": (
+        ("simulate.reference.tip=[0.075, 0.02]", "simulate.reference.inverse=closed-form"),
+        ("simulate.reference.tip.0=0.07..0.08",),
+    ),
     "lagged actuator": (("simulate.loop.actuator.level=lagged",), ("simulate.loop.actuator.lag=0.002..0.01",)),
     "actuator": (
         TENDON,
