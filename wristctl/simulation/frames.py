@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.arrays import Array
+from wristctl.arrays import Array, distinct
 from wristctl.config.plant import Sensor
 from wristctl.seeds import Entropy
 from wristctl.simulation.observer import Schedule
@@ -32,15 +32,15 @@ def side_by_side(
     The last ticks of one with fewer frames than another never come.
     """
     rates = [each.frame_rate for each in sensors]
-    parts = list(zip(rates, _delays(sensors, period), _delays(believed, period), strict=True))
-    columns = {each: column for column, each in enumerate(dict.fromkeys(parts))}
+    parts = zip(rates, _delays(sensors, period), _delays(believed, period), strict=True)
+    columns, which = distinct(list(parts))
     rate, late, dated = map(np.array, zip(*columns, strict=True))
     counts = _counts(rate, horizon)
     frame = np.arange(counts.max())[:, None]
     captures = np.where(frame < counts, np.rint(frame / rate / period), _NEVER).astype(np.int64)
     for each in (found := Schedule(captures, late, dated)):
         each.setflags(write=False)
-    return found, np.array([columns[each] for each in parts])
+    return found, which
 
 
 def frame_counts(sensors: Sequence[Sensor], horizon: float) -> NDArray[np.int64]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from wristctl.arrays import Array
+from wristctl.arrays import Array, distinct
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
@@ -26,7 +26,6 @@ def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float
     propagate(drive, known, x, plus + zero, minus + zero, h)
 
 
-_Value = TypeVar("_Value")
 _DOUBLINGS, _ALIKE = 20, 1e-14
 """Doublings at most, and a change of a correlation that is none."""
 
@@ -65,7 +64,7 @@ class _Stationary(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _stationary(filters: tuple[_GoesBy, ...]) -> _Stationary:
-    models, which = _distinct([each[:3] for each in filters])
+    models, which = distinct([each[:3] for each in filters])
     tick = np.array([_linearised(*each) for each in models])[which]
     numbers = np.array([each[2:] for each in filters])
     period, ticks, noise_deg, torque_noise, load_drift = numbers.T
@@ -131,7 +130,7 @@ def _ticks_of_a_frame(sensor: Sensor, period: float) -> int:
 
 def stationary_gains(beliefs: Sequence[Belief]) -> Array:
     """The Kalman gains (B, 3) for one frame after another."""
-    filters, which = _distinct([_goes_by(each) for each in beliefs])
+    filters, which = distinct([_goes_by(each) for each in beliefs])
     found: Array = _stationary(filters).gain[which]
     return found
 
@@ -140,13 +139,6 @@ def _goes_by(belief: Belief) -> _GoesBy:
     sensor, actuator, wrist, period = belief
     ticks = _ticks_of_a_frame(sensor, period)
     return _GoesBy(actuator, wrist, period, ticks, sensor.noise_deg, sensor.torque_noise, sensor.load_drift)
-
-
-def _distinct(values: Sequence[_Value]) -> tuple[tuple[_Value, ...], list[int]]:
-    """Those that differ, and which of them each is."""
-    numbers = dict[_Value, int]()
-    which = [numbers.setdefault(each, len(numbers)) for each in values]
-    return tuple(numbers), which
 
 
 def expected_error(belief: Belief) -> float:
