@@ -73,6 +73,11 @@ class OpenSection(Section):
 
     model_config = ConfigDict(extra="allow")
 
+    def __hash__(self) -> int:
+        """Of what is added too, which pydantic leaves out: a sweep over it would fill one place of every cache."""
+        declared = (getattr(self, name) for name in type(self).model_fields)
+        return hash((type(self), *declared, frozenset((self.model_extra or {}).items())))
+
     def added(self) -> Mapping[str, Parameter]:
         """What entries of the table add to this section, by name."""
         raise NotImplementedError
