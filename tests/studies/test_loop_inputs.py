@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,7 @@ from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.loop_inputs import (
     check_inverses,
+    check_reach,
     check_row,
     identified,
     inverses_of,
@@ -131,3 +133,20 @@ def test_the_least_stiff_loop_says_whether_the_wrist_buckles(
         warn_if_it_buckles(findings, WRIST, [Loop(plant_segments=1), Loop(plant_segments=2)])
     assert noted == {"least_stiffness": min(stiffness), "buckles": buckles}
     assert len(caplog.messages) == buckles and (f"{min(stiffness):.3g} N m/rad" in caplog.text) == buckles
+
+
+def test_a_reference_out_of_reach_is_named_by_its_place(tmp_path: Path) -> None:
+    """Its leaf where it is a target's, itself where it is a course, and the line of a file."""
+    file = tmp_path / "walk.csv"
+    file.write_text("time [s],angle [deg]\n0,1\n1,2\n")
+    swings = Reference.model_validate({"kind": "two-sided-sine", "angle_deg": 60.0})
+    places = {
+        "compare.references.1.angle_deg": Reference(angle_deg=60.0),
+        "compare.references.1.tip": Reference(tip=(0.0, 0.08), inverse="closed-form"),
+        "compare.references.1": swings,
+        str(file): Reference(kind="recording", file=str(file)),
+    }
+    for where, wrong in places.items():
+        with pytest.raises(UserError) as caught:
+            check_reach([Reference(), wrong], WRIST, "compare.references.{}")
+        assert caught.value.where == where

@@ -55,7 +55,9 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
         try:
             motion(plain, wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
         except UserError as error:
-            raise error.at(f"{where.format(number)}.{error.where.removeprefix('reference.')}") from error
+            if not error.where.startswith("reference"):  # in a file
+                raise
+            raise error.at(where.format(number) + error.where.removeprefix("reference")) from error
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:

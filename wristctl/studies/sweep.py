@@ -140,7 +140,7 @@ def _swept(session: Session, command: str) -> Swept:
         raise UserError(
             "no point of the sweep could be computed",
             Argument("sweep", metavar="KEY=VALUES"),
-            done.poisoned[0].why,
+            f"at the first: {done.poisoned[0].why}",
             exit_code=3,
         )
     table = pd.concat(parts, ignore_index=True)

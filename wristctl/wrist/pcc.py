@@ -43,7 +43,7 @@ def _tip_pose(plant: Any, q: Any) -> Any:
 
 def _values(wrist: WristParameters, n: int) -> Array:
     if n > 1 and wrist.taper != 1.0:
-        raise UserError("segments of plant pcc are equally stiff", "taper", "plant.model: hinges, or no taper")
+        raise UserError("segments of plant pcc are equally stiff", "wrist.taper", "plant.model: hinges, or no taper")
     return segments(wrist, n)
 
 
