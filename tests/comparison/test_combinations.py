@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from wristctl.config.families import TuningWorlds, Worlds
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.simulation.closed_loop import simulate
-from wristctl.wrist.kinematics import AnglePath, TipPath, exact_inverse
+from wristctl.wrist.kinematics import AnglePath, TipPath, exact_angle
 
 PID, SOFTER = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: pid, gains: {Kp: 3, Ki: 1, Kd: 0.1}}"
 SMC = "{controller: smc, gains: exchanged}"
@@ -149,8 +147,8 @@ def test_what_a_comparison_hands_out_cannot_be_changed() -> None:
 
 def test_a_network_changes_the_reference_of_its_inverse_and_not_what_is_wanted() -> None:
     def short(path: TipPath) -> AnglePath:
-        right = exact_inverse(path)
-        return replace(right, theta=0.9 * right.theta)
+        theta = 0.9 * exact_angle(path.position)
+        return AnglePath(theta, 0.0 * theta, 0.0 * theta, theta > 1.0)
 
     asked = study("loops={one: {}}", "inverses=[closed-form, network]", "references=[{duration: 0.1}]")
     ((exact, learned),) = [condition.courses for condition in planned(asked, short)]

@@ -9,6 +9,7 @@ import pytest
 
 from wristctl.arrays import Array
 from wristctl.config.choices import REFERENCES
+from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
@@ -61,8 +62,29 @@ def test_rollouts_leave_no_rows_behind_and_use_those_that_there_are(counted: lis
         assert np.array_equal(own, each.angles.rows)
 
 
+def test_a_course_of_its_own_may_be_left_for_later() -> None:
+    """It is worked out where a batch asks for it, and its last move is from straight to where it ends."""
+    asked: dict[str, object] = {"kind": "chirp", "angle_deg": 30.0}
+    ahead = motion(Reference.model_validate(asked), WRIST, 1.0, 1e-3)
+    assert "rows" in vars(ahead.angles) and ahead.move == ahead.final == ahead.angles.rows[0, -1]
+    too_far = Reference.model_validate(asked | {"offset_deg": -25.0})
+    with pytest.raises(UserError, match="bends by 5"):
+        motion(too_far, WRIST, 1.0, 1e-3)
+    waiting = motion(too_far, WRIST, 1.0, 1e-3, later=True)
+    with pytest.raises(UserError, match="bends by 5"):
+        waiting.angles.into(np.empty((3, 1000)))
+    later = motion(Reference.model_validate(asked | {"offset_deg": 5.0}), WRIST, 1.0, 1e-3, later=True)
+    law = controller("pid-ff")
+    outcome = rollout(law, np.array([gains_of(law, "default")] * 2), [ahead, later], np.arange(2), LOOP, WRIST)
+    assert "rows" not in vars(later.angles)
+    np.testing.assert_array_equal(outcome.references[1], later.angles.rows)
+    same = rollout(law, np.array([gains_of(law, "default")]), [later], np.zeros(1, int), LOOP, WRIST)
+    for name, values in outcome.metrics.items():
+        assert values[1:].tobytes() == same.metrics[name].tobytes(), "its move was known once its rows were"
+
+
 def test_what_is_known_is_copied() -> None:
-    known = Angles.of(*np.arange(6.0).reshape(3, 2))
+    known = Angles.of(np.arange(6.0).reshape(3, 2))
     out = np.full((3, 2), np.nan)
     known.into(out)
     assert np.array_equal(out, [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0]]) and np.array_equal(known.rows, out)

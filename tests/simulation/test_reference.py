@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from wristctl.config.errors import UserError
@@ -32,11 +34,11 @@ def test_minimum_jerk_starts_and_ends_at_rest_and_derivatives_agree() -> None:
     np.testing.assert_allclose(np.gradient(m.rate_ref, m.time)[1:-1], m.acceleration_ref[1:-1], atol=2e-3)
 
 
-def test_exact_inverse_of_the_tip_path_is_the_wanted_angle() -> None:
-    direct, through_tip = evaluated(), evaluated(inverse="closed-form")
-    np.testing.assert_allclose(through_tip.theta_ref, direct.theta_ref, atol=1e-15)
-    np.testing.assert_allclose(through_tip.rate_ref, direct.rate_ref, atol=1e-13)
-    np.testing.assert_allclose(through_tip.acceleration_ref, direct.acceleration_ref, atol=1e-11)
+@given(st.floats(-0.8, 0.8), st.floats(0.05, 0.12), st.sampled_from(["step", "minimum-jerk", "sine"]))
+def test_the_wanted_angle_is_the_closed_form_inverse_of_the_wanted_tip(angle: float, length: float, kind: str) -> None:
+    x, y = (float(v) for v in arc_tip(np.array(angle), length))
+    m = evaluated(kind=kind, tip=(x, y), inverse="closed-form", duration=0.7, frequency=0.8)
+    np.testing.assert_allclose(exact_arc(m.tip_desired)[0], m.theta_ref, rtol=0.0, atol=1e-15)
 
 
 def test_a_tip_target_is_reached_whatever_its_stretch() -> None:

@@ -3,8 +3,10 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from wristctl.wrist.kinematics import TipPath, arc_tip, exact_arc, exact_inverse
+from wristctl.wrist.kinematics import arc_path, arc_tip, exact_arc
 
 
 @pytest.mark.parametrize("theta", [0.0, 1e-300, 1e-9, -3e-5, 0.5, -0.87, 3.0])
@@ -18,31 +20,23 @@ def test_arc_tip_matches_e1_in_forty_digits(theta: float) -> None:
     np.testing.assert_allclose(arc_tip(np.array(theta), np.array(0.08)), wanted, rtol=1e-15, atol=0.0)
 
 
-def test_exact_inverse_follows_an_ellipse_with_its_derivatives() -> None:
-    time, step = np.linspace(0.0, 1.0, 200), 1e-4
+@given(q=st.tuples(*[st.floats(-2.0, 2.0)] * 3), r=st.tuples(st.floats(0.04, 0.12), *[st.floats(-0.5, 0.5)] * 2))
+@example(q=(0.0, 0.0, 0.0), r=(0.08, 0.1, -0.2))
+@example(q=(0.0, 1.0, -0.3), r=(0.08, 0.0, 0.0))
+def test_velocity_and_acceleration_of_an_arcs_tip_are_its_derivatives(
+    q: tuple[float, ...], r: tuple[float, ...]
+) -> None:
+    """Numerical ones, in thirty digits, of r (exp(i q) - 1)/(i q)."""
 
-    def position(t: np.ndarray) -> np.ndarray:
-        return np.stack([0.07 + 0.008 * np.cos(5 * t), 0.03 * np.sin(5 * t)], axis=-1)
+    def place(t: mpmath.mpf) -> mpmath.mpc:
+        angle, length = (v[0] + t * (v[1] + t * v[2] / 2) for v in (q, r))
+        return length * (mpmath.expm1(1j * angle) / (1j * angle) if angle else 1)
 
-    velocity = np.stack([-0.04 * np.sin(5 * time), 0.15 * np.cos(5 * time)], axis=-1)
-    acceleration = np.stack([-0.2 * np.cos(5 * time), -0.75 * np.sin(5 * time)], axis=-1)
-    path = exact_inverse(TipPath(position(time), velocity, acceleration))
-    before, here, after = (exact_arc(position(time + k * step))[0] for k in (-1, 0, 1))
-    np.testing.assert_array_equal(path.theta, here)
-    np.testing.assert_allclose(path.rate, (after - before) / (2 * step), rtol=0, atol=1e-5)
-    np.testing.assert_allclose(path.acceleration, (after - 2 * here + before) / step**2, rtol=0, atol=1e-4)
-    assert not path.outside.any()
-
-
-def test_stretching_along_the_chord_does_not_turn_the_wrist() -> None:
-    tip = arc_tip(np.array([0.6]), np.array([0.08]))
-    path = exact_inverse(TipPath(tip, 0.3 * tip, -2.0 * tip))
-    np.testing.assert_allclose([path.rate, path.acceleration], 0.0, atol=1e-15)
-
-
-def test_tip_at_the_base_has_no_angle_and_is_flagged() -> None:
-    path = exact_inverse(TipPath(np.array([[0.0, 0.0], [0.08, 0.0]]), np.zeros((2, 2)), np.zeros((2, 2))))
-    assert path.outside.tolist() == [True, False]
+    path = arc_path(*(np.array(each)[:, None] for each in (q, r)))
+    with mpmath.workdps(30):
+        for order, found in enumerate((path.position, path.velocity, path.acceleration)):
+            wanted = complex(mpmath.diff(place, 0, order))
+            np.testing.assert_allclose(found[0], [wanted.real, wanted.imag], rtol=1e-12, atol=1e-14)
 
 
 def test_exact_arc_undoes_arc_tip() -> None:

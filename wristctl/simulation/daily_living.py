@@ -15,7 +15,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
-from wristctl.simulation.minimum_jerk import minimum_jerk
+from wristctl.simulation.minimum_jerk import smooth_stroke
 from wristctl.simulation.reference import ReferenceKind
 
 _RYU = "Ryu et al., J. Hand Surg. 16A (1991) 409"
@@ -32,12 +32,13 @@ def _task(
 
     def course(reference: Reference, time: Array) -> Array:
         angles = np.deg2rad([0.0, *ends, 0.0]) * reference.value("scale")
-        duration = reference.duration
-        whole = (len(angles) - 1) * duration
-        local = np.maximum(time - whole * np.floor(time / whole + 1e-12), 0.0)
-        found = np.zeros((3, len(time)))
-        for number, change in enumerate(np.diff(angles)):
-            found += change * minimum_jerk(local - number * duration, duration)
+        strokes = time / reference.duration
+        number = np.floor(strokes + 1e-12).astype(np.int64)
+        before = np.resize(angles[:-1], number.max(initial=0) + 2)
+        found = np.empty((3, len(time)))
+        smooth_stroke(np.maximum(strokes - number, 0.0), reference.duration, found)
+        found *= np.diff(before)[number]
+        found[0] += before[number]
         return found
 
     signs = ("extension", "flexion") if plane == "flexion" else ("radial", "ulnar")

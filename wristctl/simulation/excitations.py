@@ -15,22 +15,32 @@ _OFFSET = Parameter(0.0, "deg", "middle of the motion", mirrors=True)
 
 
 def _about(reference: Reference, swing: Array) -> Array:
-    """The middle plus the angle times a swing within -1 and 1 with its two derivatives, (3, T) [rad]."""
-    found: Array = np.deg2rad(reference.end_deg) * swing
-    found[0] += np.deg2rad(reference.value("offset_deg"))
+    """The middle plus the angle times a swing within -1 and 1 with its two derivatives, (3, T) [rad], in its place."""
+    swing *= np.deg2rad(reference.end_deg)
+    swing[0] += np.deg2rad(reference.value("offset_deg"))
+    return swing
+
+
+def _held(swing: Array) -> Array:
+    """A swing (T,) that jumps, with two derivatives."""
+    found = np.zeros((3, len(swing)))
+    found[0] = swing
     return found
 
 
-def _turning(phase: Array, rate: Array, acceleration: Array | float) -> Array:
+def _turning(phase: Array, rate: Array | float, acceleration: Array | float) -> Array:
     """The sine of a phase that moves, with two derivatives."""
-    sine, cosine = np.sin(phase), np.cos(phase)
-    return np.stack([sine, rate * cosine, acceleration * cosine - rate * rate * sine])
+    found, cosine = np.empty((3, len(phase))), np.cos(phase)
+    np.sin(phase, out=found[0])
+    np.multiply(rate, cosine, out=found[1])
+    np.subtract(acceleration * cosine, rate * rate * found[0], out=found[2])
+    return found
 
 
 def _two_sided(reference: Reference, time: Array) -> Array:
     rate = 2.0 * np.pi * reference.frequency
     phase = rate * time + np.deg2rad(reference.value("phase_deg"))
-    return _about(reference, _turning(phase, np.full_like(time, rate), 0.0))
+    return _about(reference, _turning(phase, rate, 0.0))
 
 
 def _chirp(reference: Reference, time: Array) -> Array:
@@ -49,8 +59,8 @@ def _end_frequency(reference: Reference) -> float:
 
 
 def _square(reference: Reference, time: Array) -> Array:
-    halves = np.floor(2.0 * reference.frequency * time + 1e-9)
-    return _about(reference, np.stack([np.where(halves % 2.0 == 0.0, 1.0, -1.0), 0.0 * time, 0.0 * time]))
+    periods = reference.frequency * time + 0.5e-9
+    return _about(reference, _held(np.where(periods - np.floor(periods) < 0.5, 1.0, -1.0)))
 
 
 def _random_steps(reference: Reference, time: Array) -> Array:
@@ -59,7 +69,7 @@ def _random_steps(reference: Reference, time: Array) -> Array:
         raise UserError(f"{seed:g} is no seed", "reference.seed", "a whole number, 0 or more")
     held = np.floor(time / reference.duration + 1e-9).astype(np.int64)
     drawn = np.random.default_rng(stream(int(seed), "random steps")).uniform(-1.0, 1.0, int(held.max(initial=0)) + 1)
-    return _about(reference, np.stack([drawn[held], 0.0 * time, 0.0 * time]))
+    return _about(reference, _held(drawn[held]))
 
 
 def _swing(reference: Reference) -> str:

@@ -18,10 +18,10 @@ class Angles:
         self._samples, self._work = samples, work
 
     @classmethod
-    def of(cls, angle: Array, rate: Array, acceleration: Array) -> Angles:
-        """Those that are known, (T,) each."""
-        found = cls(len(angle), lambda out: None)
-        found.rows = _fixed(np.array([angle, rate, acceleration], np.float64))
+    def of(cls, rows: Array) -> Angles:
+        """Those that are known, (3, T), which nobody may change from now on."""
+        found = cls(rows.shape[1], lambda out: None)
+        found.rows = _fixed(rows)
         return found
 
     @cached_property
@@ -48,8 +48,8 @@ class Motion:
     """The reference with two derivatives."""
     tips: Array | Callable[[], Array]
     """The wanted tip positions, (T, 2) [m], or what works them out once they are asked for."""
-    move: float
-    """Last move of the reference, signed [rad]."""
+    turn: float | None
+    """Last move of the reference, signed [rad]; None: from straight to where it ends."""
     begin: float
     """Time at which the last move begins."""
     rest: float
@@ -93,6 +93,11 @@ class Motion:
     def final(self) -> float:
         """Last reference angle [rad]."""
         return float(self.theta_ref[-1])
+
+    @property
+    def move(self) -> float:
+        """Last move of the reference, signed [rad]."""
+        return self.final if self.turn is None else self.turn
 
 
 def _fixed(rows: Array) -> Array:

@@ -33,7 +33,7 @@ _JUMP = np.deg2rad(10.0)
 """Between two samples [rad]: beyond it a spline through them swings."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """T samples of a motion, SI units: `arc` (2, T) has the angle and, of tips, the length of the arc, else 0."""
 
@@ -112,14 +112,20 @@ def _read(file: Path, column: str | None, stamp: object) -> Recording:
 
 def _course(reference: Reference, time: Array) -> Array:
     """Angle [rad] and, of tips, arc length [m], with two derivatives each: (3, T) or (2, 3, T)."""
-    recorded, scale = recording_of(reference), reference.value("scale")
-    noise = (np.deg2rad(reference.value("noise_deg")), 0.0)
-    end = recorded.time[-1]
+    found = _joined(recording_of(reference), reference.value("noise_deg"), time.tobytes()).copy()
+    found[:1] *= reference.value("scale")
+    return found if len(found) == 2 else found[0]
+
+
+@lru_cache(maxsize=4)
+def _joined(recorded: Recording, noise_deg: float, times: bytes) -> Array:
+    """The recording at those times, (2, 3, T) of tips, else (1, 3, T): a sweep of its scale splines it once."""
+    time, end = np.frombuffer(times), recorded.time[-1]
     within = np.clip(time, 0.0, end)
-    found = np.stack([_splined(recorded.time, each, sd, within) for each, sd in zip(recorded.arc, noise, strict=True)])
+    arcs = zip(recorded.arc[: 1 + recorded.of_tips], (np.deg2rad(noise_deg), 0.0), strict=False)
+    found = np.stack([_splined(recorded.time, each, noise, within) for each, noise in arcs])
     found[:, 1:, (time < 0.0) | (time > end + 1e-12)] = 0.0
-    found[0] *= scale
-    return found if recorded.of_tips else found[0]
+    return found
 
 
 def _splined(time: Array, samples: Array, noise: float, at: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from itertools import pairwise
@@ -19,8 +19,12 @@ from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.targets import Targets, targets_of
 from wristctl.wrist.directions import DIRECTIONS
-from wristctl.wrist.kinematics import Inverse, arc_path, exact_arc, exact_inverse
+from wristctl.wrist.kinematics import Inverse, arc_path
+
+_EARLY = 1e-6
+"""Before a move begins [s]: there is nothing of it by then."""
 
 
 def _never(reference: Reference, begin: float, horizon: float) -> float:
@@ -40,8 +44,7 @@ class ReferenceKind:
     """A short name of the reference: kind, duration and target."""
     rest: Callable[[Reference, float, float], float] = _never
     """When the reference rests, by when its last move begins and the horizon (which means never) [s]."""
-    targets: Literal["end", "angles_deg", "tips", "none"] = "end"
-    """Where its targets stand: one angle or tip at the end, or the leaf with several, one every `duration`."""
+    targets: Targets = "end"
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
     plane: Literal["", "ulnar", "flexion"] = ""
@@ -67,32 +70,42 @@ def toward(reference: Reference, direction: DirectionName) -> Reference:
 
 
 def motion(
-    reference: Reference, wrist: WristParameters, horizon: float, period: float, network: Inverse | None = None
+    reference: Reference,
+    wrist: WristParameters,
+    horizon: float,
+    period: float,
+    network: Inverse | None = None,
+    later: bool = False,
 ) -> Motion:
     """Evaluate a reference on the grid of `period` [s] over the horizon [s].
 
-    Tip targets, or angles with inverse `network` or `closed-form`, become a tip path (an arc whose angle and length
-    move from rest) that the inverse turns into angles; errors against theta_desired then show the inverse's own error.
-    What needs no network is worked out once, and angles of moves when they are asked for; the arrays are read-only.
+    What is wanted is one arc whose angle and length move from rest, towards angles or tips. Its closed-form inverse
+    gives that very angle back, whatever its length; a network makes its own angles of the path that its tip takes, and
+    errors against theta_desired then show the network's own. What needs no network is worked out once, and angles of
+    moves when they are asked for; with `later` also of courses without targets, which then may fail or bend too far
+    only there. The arrays are read-only.
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
-        return _evaluated(reference, wrist, horizon, period, network)
-    return _known(reference, wrist.length, wrist.range_deg, horizon, period)
+        found = _evaluated(reference, wrist, horizon, period, network)
+    else:
+        found = _known(reference, wrist.length, wrist.range_deg, horizon, period)
+    if not later and REFERENCES[reference.kind].targets == "none":
+        _ = found.theta_desired
+    return found
 
 
 @lru_cache(maxsize=64)
 def _known(reference: Reference, length: float, range_deg: float, horizon: float, period: float) -> Motion:
     if _bends_alone(reference):
         of_any = _bending(reference, range_deg, horizon, period)
-        return replace(of_any, tips=lambda: _tips(of_any.angles, _unstretched(length, len(of_any.time))))
+        return replace(of_any, tips=partial(_tips, of_any.angles, partial(_unstretched, length, len(of_any.time))))
     wrist = WristParameters(length=length, range_deg=range_deg)  # all that it depends on
     return _evaluated(reference, wrist, horizon, period, None)
 
 
 def _bends_alone(reference: Reference) -> bool:
     """Whether it asks for angles, and the length of the arc stays."""
-    targets = REFERENCES[reference.kind].targets
-    return reference.inverse == "none" and reference.tip is None and targets in ("end", "angles_deg")
+    return reference.tip is None and REFERENCES[reference.kind].targets in ("end", "angles_deg")
 
 
 @lru_cache(maxsize=64)
@@ -113,11 +126,13 @@ def _evaluated(
     time = _grid(horizon, period)
     angles, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
     rest, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
-    if reference.inverse == "none":
+    if reference.inverse != "network":
         return Motion(time, angles, tips, move, begin, rest, horizon)
-    found = _inverse(reference, network)(arc_path(angles.rows, length))
-    outside, reached = float(np.mean(found.outside)), Angles.of(found.theta, found.rate, found.acceleration)
-    return Motion(time, reached, tips, move, begin, rest, horizon, outside, angles)
+    if network is None:
+        raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")
+    found = network(arc_path(angles.rows, length()))
+    reached = Angles.of(np.array([found.theta, found.rate, found.acceleration]))
+    return Motion(time, reached, tips, move, begin, rest, horizon, float(np.mean(found.outside)), angles)
 
 
 @lru_cache(maxsize=64)
@@ -127,8 +142,8 @@ def _grid(horizon: float, period: float) -> Array:
     return time
 
 
-def _tips(angles: Angles, length: Array) -> Array:
-    found = arc_path(angles.rows, length).position
+def _tips(angles: Angles, length: Callable[[], Array]) -> Array:
+    found = arc_path(angles.rows, length()).position
     found.setflags(write=False)
     return found
 
@@ -144,7 +159,7 @@ def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
     if REFERENCES.belongs(name):
         return kind.course(reference, time)
     try:
-        found = np.asarray(kind.course(reference, time), np.float64)
+        found = np.array(kind.course(reference, time), np.float64)  # theirs may be used again
     except UserError:
         raise
     except Exception as error:
@@ -161,81 +176,55 @@ def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
 
 def _moves(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Angles, Array, float, float]:
-    """The angles, the length of the arc with two derivatives (3, T), the last move [rad], and when it begins."""
-    targets = [(0.0, wrist.length), *_targets(reference, kind, wrist)]
+) -> tuple[Angles, Callable[[], Array], float | None, float]:
+    """The angles, what gives the arc's length with two derivatives (3, T), the last move [rad], and when it begins."""
+    targets = [(0.0, wrist.length), *targets_of(reference, kind.targets, wrist)]
     turns, stretches = ([to[k] - before[k] for before, to in pairwise(targets)] for k in (0, 1))
 
-    def course(number: int) -> Array:
-        return _course(reference, kind, time - number * reference.duration if number else time)
+    def moved(by: Sequence[float], out: Array) -> None:
+        for number, each in enumerate(by):
+            begin = number * reference.duration
+            first = np.searchsorted(time, begin - _EARLY) if number else 0
+            if each and first < len(time):
+                course = _course(reference, kind, time[first:] - begin)
+                course *= each
+                out[:, first:] += course
 
     def bend(out: Array) -> None:
-        np.multiply(turns[0], course(0), out=out)
-        for number in range(1, len(turns)):
-            out += turns[number] * course(number)
-        out += 0.0  # no zero is negative
+        out[:] = 0.0
+        moved(turns, out)
 
-    length = _unstretched(wrist.length, len(time))
-    for number, stretch in enumerate(stretches):
-        if stretch:
-            length = length + stretch * course(number)
+    def length() -> Array:
+        found = _unstretched(wrist.length, len(time)).copy()
+        moved(stretches, found)
+        return found
+
     return Angles(len(time), bend), length, turns[-1], (len(turns) - 1) * reference.duration
 
 
 def _whole(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
-) -> tuple[Angles, Array, float, float]:
+) -> tuple[Angles, Callable[[], Array], float | None, float]:
     """The same of a course that has no targets: its last move is from straight to where it ends."""
-    course = _course(reference, kind, time)
-    bend, length = course if course.ndim == 3 else (course, _unstretched(wrist.length, len(time)))
-    most = float(np.abs(bend[0]).max(initial=0.0))
-    if most > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
-        at = time[int(np.argmax(np.abs(bend[0])))]
-        raise UserError(
-            f"{reference_name(reference)} bends by {np.rad2deg(most):.1f} deg at {at:.3g} s, "
-            f"beyond the wrist's range of +-{wrist.range_deg:g} deg",
-            where="reference",
-            fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",
-        )
-    return Angles.of(*bend), length, float(bend[0, -1]), 0.0
+
+    def bend(out: Array) -> None:
+        course = _course(reference, kind, time)
+        out[:] = course if course.ndim == 2 else course[0]
+        if max(out[0].max(initial=0.0), -out[0].min(initial=0.0)) > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
+            raise _beyond(reference, wrist, time, out[0])
+
+    def length() -> Array:
+        course = _course(reference, kind, time)
+        return course[1] if course.ndim == 3 else _unstretched(wrist.length, len(time))
+
+    return Angles(len(time), bend), length, None, 0.0
 
 
-def _targets(reference: Reference, kind: ReferenceKind, wrist: WristParameters) -> list[tuple[float, float]]:
-    """Angle [rad] and arc length [m] of each target in turn."""
-    if kind.targets == "tips":
-        return [_tip_target(tip, "reference.tips", wrist) for tip in reference.tips]
-    if kind.targets == "angles_deg":
-        return [_angle_target(angle, "reference.angles_deg", wrist) for angle in reference.angles_deg]
-    if reference.tip is not None:
-        return [_tip_target(reference.tip, "reference.tip", wrist)]
-    return [_angle_target(reference.end_deg, "reference.angle_deg", wrist)]
-
-
-def _angle_target(degrees: float, where: str, wrist: WristParameters) -> tuple[float, float]:
-    if abs(degrees) > wrist.range_deg:
-        raise UserError(
-            f"reference of {degrees} deg is beyond the wrist's range of +-{wrist.range_deg} deg",
-            where=where,
-            fix="ask for less, or widen wrist.range_deg",
-        )
-    return float(np.deg2rad(degrees)), wrist.length
-
-
-def _tip_target(tip: tuple[float, float], where: str, wrist: WristParameters) -> tuple[float, float]:
-    theta, arc = exact_arc(np.array(tip))
-    angle, length = float(theta), float(arc)
-    if abs(angle) > np.deg2rad(wrist.range_deg) or not 0.0 < length < np.inf:
-        raise UserError(
-            f"tip {tip} m asks for {np.rad2deg(angle):.1f} deg, beyond the range of +-{wrist.range_deg} deg",
-            where=where,
-            fix="choose a tip position within reach",
-        )
-    return angle, length
-
-
-def _inverse(reference: Reference, network: Inverse | None) -> Inverse:
-    if reference.inverse == "closed-form":
-        return exact_inverse
-    if network is None:
-        raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")
-    return network
+def _beyond(reference: Reference, wrist: WristParameters, time: Array, angle: Array) -> UserError:
+    at = int(np.argmax(np.abs(angle)))
+    return UserError(
+        f"{reference_name(reference)} bends by {np.rad2deg(abs(angle[at])):.1f} deg at {time[at]:.3g} s, "
+        f"beyond the wrist's range of +-{wrist.range_deg:g} deg",
+        where="reference",
+        fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",
+    )

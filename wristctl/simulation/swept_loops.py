@@ -62,9 +62,8 @@ def swept_loops(study: Study) -> list[SweptLoop]:
     chosen, draws = study.simulate, Draws(study.seed)
     wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction)
     law = controller(chosen.controller)
-    followed = motion(
-        toward(chosen.reference, chosen.direction), wrist, chosen.horizon, sample_period(loop.control_period)
-    )
+    asked, period = toward(chosen.reference, chosen.direction), sample_period(loop.control_period)
+    followed = motion(asked, wrist, chosen.horizon, period, later=True)
     times = chosen.repetitions if is_random(loop) else 1
     scenario = scenario_of(chosen.reference, chosen.direction)
     loops = loops_of(loop, [draws.plant(each) for each in range(times)])

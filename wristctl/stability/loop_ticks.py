@@ -203,6 +203,7 @@ class LoopTicks:
 
 
 def _at_rest(theta: float, samples: int, period: float) -> Motion:
-    still, time = np.zeros(samples), period * np.arange(samples, dtype=np.float64)
-    angles = Angles.of(np.full(samples, theta), still, still)
-    return Motion(time, angles, np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)
+    time = period * np.arange(samples, dtype=np.float64)
+    rows = np.zeros((3, samples))
+    rows[0] = theta
+    return Motion(time, Angles.of(rows), np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)

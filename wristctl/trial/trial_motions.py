@@ -35,11 +35,12 @@ def motion_of(
 def back(theta: float, duration: float, rest: float, period: float) -> Motion:
     """From theta [rad] to straight in `duration` [s], and rest there."""
     time: Array = np.arange(round((duration + rest) / period), dtype=np.float64) * period
-    course, rate, acceleration = minimum_jerk(time, duration)
-    angles = Angles.of(theta * (1.0 - course), -theta * rate, -theta * acceleration)
+    course = -theta * minimum_jerk(time, duration)
+    course[0] += theta
+    angles = Angles.of(course)
     return Motion(
         time, angles, np.zeros((len(time), 2)),
-        move=-theta, begin=0.0, rest=duration, horizon=duration + rest,
+        turn=-theta, begin=0.0, rest=duration, horizon=duration + rest,
     )  # fmt: skip
 
 

@@ -39,7 +39,7 @@ class AnglePath:
 
 
 Inverse = Callable[[TipPath], AnglePath]
-"""From tip positions to bending angles: the exact inverse or a network."""
+"""From tip positions to bending angles: a network."""
 
 
 def arc_tip(theta: Array, length: Array | float) -> Array:
@@ -70,16 +70,6 @@ def exact_arc(tip: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):  # straight back: a full circle has no chord
         length = np.hypot(tip[..., 0], tip[..., 1]) / np.sinc(theta / (2.0 * np.pi))
     return theta, length
-
-
-def exact_inverse(path: TipPath) -> AnglePath:
-    """Angles of a tip path with their exact derivatives; the base itself (0, 0) has none and is flagged."""
-    (x, y), (dx, dy), (ddx, ddy) = path.position.T, path.velocity.T, path.acceleration.T
-    square = x * x + y * y
-    with np.errstate(divide="ignore", invalid="ignore"):
-        half_rate = (x * dy - y * dx) / square
-        half_acceleration = (x * ddy - y * ddx - 2.0 * half_rate * (x * dx + y * dy)) / square
-    return AnglePath(exact_angle(path.position), 2.0 * half_rate, 2.0 * half_acceleration, square == 0.0)
 
 
 def arc_path(theta: Array, length: Array) -> TipPath:
