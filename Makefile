@@ -6,7 +6,7 @@ STUDY ?= experiments/quick.yaml
 CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
+.PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
 	test-rig test-statistics worlds clean venv mutants coverage installed
 
 run: .venv/run
@@ -71,6 +71,10 @@ test-rig: .venv/dev
 # The built wheel in an environment of its own and an empty folder: `make installed WITH=python3.13`, `OLDEST=--lowest`.
 installed: .venv/dev
 	$(BIN)/python benchmarks/installed.py $(WITH) $(OLDEST)
+
+# A sweep over each kind of leaf beside a batch of as many gains, 6 min.
+bench-sweeps: .venv/run
+	$(BIN)/python benchmarks/sweeps.py
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers

@@ -5,9 +5,11 @@ By the wall, and of all processors together: medians of five pairs, one right af
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from wristctl.simulation.swept_loops import swept_metrics
 from wristctl.studies.sweep_unit import simulated, sweep_units
 
 POINTS, PAIRS, MOST = 1000, 5, 1.5
+FOLDER = tempfile.TemporaryDirectory()
+WALK = Path(FOLDER.name) / "walk.csv"
 BASE = ("simulate.controller=pid-ff", "simulate.gains={Kp: 4.0, Ki: 20.0, Kd: 0.2}")
 TENDON = ("simulate.loop.actuator.level=tendon", "simulate.loop.actuator.sheath=1.0")
 CAMERA = ("simulate.loop.sensor.level=camera", "simulate.loop.control_period=5e-3")
@@ -36,6 +40,17 @@ LEAVES = {
     "gains": ((), ("simulate.gains.Kp=1..8", "simulate.gains.Ki=5..40", "simulate.gains.Kd=0.1..0.4")),
     "reference": ((), ("simulate.reference.angle_deg=5..40", "simulate.reference.duration=0.5..1.5")),
     "sine": (("simulate.reference.kind=sine",), ("simulate.reference.frequency=0.3..1",)),
+    "two-sided sine": (
+        ("simulate.reference.kind=two-sided-sine",),
+        ("simulate.reference.phase_deg=0..90", "simulate.reference.offset_deg=0..5"),
+    ),
+    "chirp": (("simulate.reference.kind=chirp",), ("simulate.reference.end_frequency=2..4",)),
+    "square": (("simulate.reference.kind=square",), ("simulate.reference.offset_deg=0..5",)),
+    "random steps": (("simulate.reference.kind=random-steps",), ("simulate.reference.duration=0.2..1",)),
+    "daily living": (("simulate.reference.kind=adl:jar",), ("simulate.reference.scale=0.5..1",)),
+    "recording": (
+        ("simulate.reference.kind=recording", f"simulate.reference.file={WALK}"), ("simulate.reference.scale=0.5..1.5",)
+    ),
     "angles": (
         ("simulate.reference.kind=multi-step", "simulate.reference.angles_deg=[10.0, -5.0]"),
         ("simulate.reference.angles_deg.0=5..20",),
@@ -43,6 +58,10 @@ LEAVES = {
     "tip": (
         ("simulate.reference.tip=[0.075, 0.02]", "simulate.reference.inverse=closed-form"),
         ("simulate.reference.tip.0=0.07..0.08",),
+    ),
+    "tip path": (
+        ("simulate.reference.kind=tip-path", "simulate.reference.inverse=closed-form"),
+        ("simulate.reference.tips.0.0=0.07..0.08",),
     ),
     "lagged actuator": (("simulate.loop.actuator.level=lagged",), ("simulate.loop.actuator.lag=0.002..0.01",)),
     "actuator": (
@@ -85,6 +104,9 @@ def swept(study: Study, sweep: str) -> Callable[[], object]:
 
 def main() -> None:
     """Measure each kind of leaf."""
+    time_s = np.arange(0.0, 5.0, 0.01)
+    motion_of_it = np.column_stack([time_s, 10.0 * np.sin(time_s)])
+    np.savetxt(WALK, motion_of_it, delimiter=",", header="time [s],angle [deg]", comments="")
     for kind, (others, sweeps) in LEAVES.items():
         study = load_study(overrides=[*BASE, *others])
         known = batch(study)
