@@ -33,7 +33,9 @@ def _turning(phase: Array, rate: Array | float, acceleration: Array | float) -> 
     found, cosine = np.empty((3, len(phase))), np.cos(phase)
     np.sin(phase, out=found[0])
     np.multiply(rate, cosine, out=found[1])
-    np.subtract(acceleration * cosine, rate * rate * found[0], out=found[2])
+    np.multiply(-rate * rate, found[0], out=found[2])
+    cosine *= acceleration
+    found[2] += cosine
     return found
 
 
@@ -47,7 +49,7 @@ def _chirp(reference: Reference, time: Array) -> Array:
     low, high = (2.0 * np.pi * each for each in (reference.frequency, _end_frequency(reference)))
     ramp, within = (high - low) / reference.duration, np.minimum(time, reference.duration)
     rate = low + ramp * within
-    phase = low * within + 0.5 * ramp * within**2 + high * (time - within)
+    phase = 0.5 * (low + rate) * within + high * (time - within)
     return _about(reference, _turning(phase, rate, np.where(time < reference.duration, ramp, 0.0)))
 
 

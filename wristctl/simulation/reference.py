@@ -37,7 +37,7 @@ class ReferenceKind:
 
     meaning: str
     course: Callable[[Reference, Array], Array]
-    """One move from 0 to 1 with two derivatives, (3, T), by the time (T,) since it began; 0 before.
+    """One move from 0 to 1 with two derivatives, (3, T), by the time (T,), ascending, since it began; 0 before.
 
     Without targets the angle itself [rad], or, as (2, 3, T), that and the length of the arc [m]."""
     described: Callable[[Reference], str]
@@ -97,7 +97,8 @@ def motion(
 @lru_cache(maxsize=64)
 def _known(reference: Reference, length: float, range_deg: float, horizon: float, period: float) -> Motion:
     if _bends_alone(reference):
-        of_any = _bending(reference, range_deg, horizon, period)
+        targets_of(reference, REFERENCES[reference.kind].targets, _ranging(range_deg))  # within its reach
+        of_any = _bending(reference, horizon, period)
         return replace(of_any, tips=partial(_tips, of_any.angles, partial(_unstretched, length, len(of_any.time))))
     wrist = WristParameters(length=length, range_deg=range_deg)  # all that it depends on
     return _evaluated(reference, wrist, horizon, period, None)
@@ -109,9 +110,9 @@ def _bends_alone(reference: Reference) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _bending(reference: Reference, range_deg: float, horizon: float, period: float) -> Motion:
-    """Such a motion, but for its tips: wrists of any length have the same angles, in the same arrays."""
-    return _evaluated(reference, _ranging(range_deg), horizon, period, None)
+def _bending(reference: Reference, horizon: float, period: float) -> Motion:
+    """Such a motion, but for its tips: wrists of any length and range have the same angles, in the same arrays."""
+    return _evaluated(reference, _ranging(180.0), horizon, period, None)
 
 
 @lru_cache(maxsize=64)
@@ -186,7 +187,7 @@ def _moves(
             begin = number * reference.duration
             first = np.searchsorted(time, begin - _EARLY) if number else 0
             if each and first < len(time):
-                course = _course(reference, kind, time[first:] - begin)
+                course = _course(reference, kind, time[first:] - begin if number else time)
                 course *= each
                 out[:, first:] += course
 

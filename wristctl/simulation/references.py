@@ -17,9 +17,12 @@ def _step(reference: Reference, time: Array) -> Array:
 def _sine(reference: Reference, time: Array) -> Array:
     w, found = 2.0 * np.pi * reference.frequency, np.empty((3, len(time)))
     phase = w * time
-    cosine = np.cos(phase)
-    found[0], found[1], found[2] = 1.0 - cosine, w * np.sin(phase), w * w * cosine
-    found *= 0.5
+    np.cos(phase, out=found[0])
+    np.sin(phase, out=found[1])
+    np.multiply(found[0], 0.5 * w * w, out=found[2])
+    found[1] *= 0.5 * w
+    found[0] *= -0.5
+    found[0] += 0.5
     return found
 
 
