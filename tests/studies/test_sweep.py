@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from pandas.testing import assert_frame_equal
 
 import wristctl
 from wristctl.config.errors import UserError
@@ -36,6 +37,12 @@ def at(*overrides: str) -> Simulated:
         ("simulate.reference.angle_deg", ("-20", "35"), ()),
         ("simulate.reference.frequency", ("0.6", "1.4"), ("simulate.reference.kind=sine", "simulate.horizon=2.5")),
         ("simulate.reference.kind", ("minimum-jerk", "sine"), ("simulate.horizon=2.5",)),
+        ("simulate.reference.end_frequency", ("2.0", "4.0"), ("simulate.reference.kind=chirp", "simulate.horizon=2.5")),
+        (
+            "simulate.reference.tips.1.0",
+            ("0.074", "0.077"),
+            ("simulate.reference.kind=tip-path", "simulate.reference.inverse=closed-form"),
+        ),
         ("simulate.controller", ("pid-ff", "computed-torque"), ("simulate.gains=default",)),
     ],
 )
@@ -50,6 +57,14 @@ def test_a_point_of_a_sweep_is_the_rollout_that_simulate_makes_there(
         for name in ("rmse", "chattering", "oscillation", "energy"):
             assert rows[name].to_list() == pytest.approx(alone.metrics[name].tolist(), rel=1e-12, nan_ok=True), name
         assert rows["failed"].to_list() == alone.failed.tolist()
+
+
+def test_what_is_run_in_many_batches_comes_back_in_the_order_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = wristctl.load_study(None, *FAST, *CAMERA)
+    asked = swept(study, "simulate.controller=pid-ff,pid-dob", "simulate.reference.angle_deg=5,10,20")
+    together = wristctl.simulate(asked).frame()
+    monkeypatch.setattr("wristctl.simulation.swept_loops.at_most", lambda *_: 2)
+    assert_frame_equal(wristctl.simulate(asked).frame(), together)
 
 
 def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:

@@ -75,8 +75,7 @@ class OpenSection(Section):
 
     def __hash__(self) -> int:
         """Of what is added too, which pydantic leaves out: a sweep over it would fill one place of every cache."""
-        declared = (getattr(self, name) for name in type(self).model_fields)
-        return hash((type(self), *declared, frozenset((self.model_extra or {}).items())))
+        return hash((*self.__dict__.values(), frozenset((self.model_extra or {}).items())))
 
     def added(self) -> Mapping[str, Parameter]:
         """What entries of the table add to this section, by name."""

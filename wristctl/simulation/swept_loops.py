@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import motion, toward
-from wristctl.simulation.rollout import rollout, structure
+from wristctl.simulation.rollout import Outcome, rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
 
 
@@ -80,10 +81,12 @@ def swept_metrics() -> list[str]:
 
 def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
     """Run all loops, those that differ in numbers alone side by side."""
-    names, order, done = swept_metrics(), list[int](), list[SweptMetrics]()
-    for numbers, own in _pieces(loops):
-        order += numbers
-        done.append(_run(own, names))
+    names, order, judged = swept_metrics(), list[int](), list[Future[SweptMetrics]]()
+    with ThreadPoolExecutor(1) as beside:  # judges while the next ones are laid out, which takes one processor
+        for numbers, own in _pieces(loops):
+            order += numbers
+            judged.append(beside.submit(_judged, names, *_run(own)))
+    done = [each.result() for each in judged]
     back = np.argsort(order, kind="stable")
     metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in names}
     failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in done), strict=True))
@@ -106,7 +109,8 @@ def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptL
     yield from waiting.values()
 
 
-def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
+def _run(chosen: Sequence[SweptLoop]) -> tuple[Outcome, NDArray[np.int64], float]:
+    """What became of them, which reference each followed, and the time between samples [s]."""
     first = chosen[0]
     motions = list({id(each.motion.angles): each.motion for each in chosen}.values())  # which may differ in tips
     numbers = {id(each.angles): number for number, each in enumerate(motions)}
@@ -117,5 +121,9 @@ def _run(chosen: Sequence[SweptLoop], names: Sequence[str]) -> SweptMetrics:
         [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
         record="briefly",
     )  # fmt: skip
-    known = outcome.metrics | at_once(names, outcome, which, float(first.motion.time[1]))
+    return outcome, which, float(first.motion.time[1])
+
+
+def _judged(names: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> SweptMetrics:
+    known = outcome.metrics | at_once(names, outcome, which, step)
     return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)
