@@ -39,8 +39,8 @@ def at(*overrides: str) -> Simulated:
         ("simulate.reference.kind", ("minimum-jerk", "sine"), ("simulate.horizon=2.5",)),
         ("simulate.reference.end_frequency", ("2.0", "4.0"), ("simulate.reference.kind=chirp", "simulate.horizon=2.5")),
         (
-            "simulate.reference.tips.1.0",
-            ("0.074", "0.077"),
+            "simulate.reference.duration",
+            ("0.1", "0.25"),
             ("simulate.reference.kind=tip-path", "simulate.reference.inverse=closed-form"),
         ),
         ("simulate.controller", ("pid-ff", "computed-torque"), ("simulate.gains=default",)),

@@ -198,7 +198,7 @@ def _watch(
     by_block = np.array([np.moveaxis(taken[own], 0, -1) for own in order.reshape(blocks, -1)])  # (blocks, F, 2, lanes)
     cameras = camera[lanes.world][order].reshape(blocks, -1)
     different = cameras if camera.any() else cameras[:1]
-    frames = Schedule(*(np.array([each[..., own] for own in different]) for each in tables))
+    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(each[..., different], -2, 0)) for each in tables))
     gains = stationary_gains([_belief(each) for each in worlds])
     start = np.zeros((len(worlds), 3))
     start[:, 0] = model.angle(rest)

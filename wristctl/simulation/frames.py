@@ -37,8 +37,11 @@ def side_by_side(
     rate, late, dated = map(np.array, zip(*columns, strict=True))
     counts = _counts(rate, horizon)
     frame = np.arange(counts.max())[:, None]
-    captures = np.where(frame < counts, np.rint(frame / rate / period), _NEVER).astype(np.int64)
-    for each in (found := Schedule(captures, late, dated)):
+    ticks = frame / rate
+    ticks /= period
+    np.rint(ticks, out=ticks)
+    ticks[frame >= counts] = _NEVER
+    for each in (found := Schedule(ticks.astype(np.int64), late, dated)):
         each.setflags(write=False)
     return found, which
 
