@@ -106,3 +106,11 @@ def test_a_sweep_that_cannot_be_is_named(sweep: list[str], told: str) -> None:
         for point in points_of(axes):
             study_at(study, axes, point)
     assert raised.value.exit_code == 2
+
+
+def test_what_a_kind_of_reference_adds_has_its_unit() -> None:
+    study = load_study([], ["simulate.reference.kind=chirp"])
+    units = {name: unit_at(study, ("simulate", "reference", name)) for name in ("end_frequency", "offset_deg", "seed")}
+    assert units == {"end_frequency": "1/s", "offset_deg": "deg", "seed": "1"}
+    daily = study.simulate.reference.model_copy(update={"kind": "adl:jar"})
+    assert unit_at(daily, ("scale",)) == "1" and unit_at(daily, ("frequency",)) == "1/s"

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 from wristctl.config.errors import UserError, meant
 from wristctl.config.families import Range
 from wristctl.config.keys import home_of, keys_of, section_keys, unit_of
-from wristctl.config.section import Section
+from wristctl.config.section import OpenSection, Section
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument
@@ -103,7 +103,8 @@ def unit_at(begin: Section, path: Sequence[str]) -> str:
             return "1"
         field = keys_of(type(section)).get(part)
         if field is None:
-            return "1"
+            added = section.added() if isinstance(section, OpenSection) else {}
+            return (added[part].unit if part in added else "") or "1"
         section = getattr(section, _names(type(section))[part])
     return (unit_of(field) if field else "") or "1"
 
