@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pandas.testing import assert_frame_equal
@@ -10,6 +12,7 @@ from pandas.testing import assert_frame_equal
 import wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.simulation import swept_loops
 from wristctl.studies.simulate import Simulated
 
 FAST = (
@@ -65,6 +68,29 @@ def test_what_is_run_in_many_batches_comes_back_in_the_order_of_its_points(monke
     together = wristctl.simulate(asked).frame()
     monkeypatch.setattr("wristctl.simulation.swept_loops.at_most", lambda *_: 2)
     assert_frame_equal(wristctl.simulate(asked).frame(), together)
+
+
+def test_no_batch_is_run_before_all_but_the_last_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The samples of a long sweep would fill the memory of a machine that runs faster than it judges."""
+    seen, run, judged = list[str](), swept_loops._run, swept_loops._judged
+
+    def slowly(*given: Any) -> Any:
+        time.sleep(0.05)
+        found = judged(*given)
+        seen.append("judged")
+        return found
+
+    def told(*given: Any) -> Any:
+        seen.append("run")
+        return run(*given)
+
+    monkeypatch.setattr(swept_loops, "at_most", lambda *_: 1)
+    monkeypatch.setattr(swept_loops, "_run", told)
+    monkeypatch.setattr(swept_loops, "_judged", slowly)
+    wristctl.simulate(swept(wristctl.load_study(None, *FAST), "simulate.reference.angle_deg=5,10,15,20,25"))
+    for number, at in enumerate(k for k, what in enumerate(seen) if what == "run"):
+        assert seen[:at].count("judged") >= number - 1
+    assert seen.count("run") == seen.count("judged") == 5
 
 
 def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:

@@ -118,7 +118,8 @@ def batch(
         path = np.append(short, np.abs(rest[each]).sum())
         return unmoved(given, path, given - short, rest[each])
 
-    goals = np.array([_goals(*each) for each in zip(motions, references[:, 0, -1], strict=True)])[lanes.motion]
+    ends = zip(motions, references[:, 0, -1], strict=True)
+    goals = np.array([[end, own.move_to(end), own.begin, own.rest, own.horizon] for own, end in ends])[lanes.motion]
     watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
@@ -149,11 +150,6 @@ def batch(
     course = LoopCourse(references, _stacked(cases, samples))
     setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
-
-
-def _goals(followed: Motion, final: float) -> tuple[float, ...]:
-    move = final if followed.turn is None else followed.turn
-    return final, move, followed.begin, followed.rest, followed.horizon
 
 
 def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:

@@ -97,7 +97,11 @@ class Motion:
     @property
     def move(self) -> float:
         """Last move of the reference, signed [rad]."""
-        return self.final if self.turn is None else self.turn
+        return self.move_to(self.final)
+
+    def move_to(self, final: float) -> float:
+        """The same by its last angle [rad], where that is known."""
+        return final if self.turn is None else self.turn
 
 
 def _fixed(rows: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import NamedTuple
 
 import numpy as np
@@ -85,11 +85,13 @@ def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
     with ThreadPoolExecutor(1) as beside:  # judges while the next ones are laid out, which takes one processor
         for numbers, own in _pieces(loops):
             order += numbers
-            judged.append(beside.submit(_judged, names, *_run(own)))
-    done = [each.result() for each in judged]
+            done = _run(own)
+            wait(judged[-1:])  # of what is kept of samples there is never more than two batches'
+            judged.append(beside.submit(_judged, names, *done))
+    found = [each.result() for each in judged]
     back = np.argsort(order, kind="stable")
-    metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in names}
-    failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in done), strict=True))
+    metrics = {name: np.concatenate([each.metrics[name] for each in found])[back] for name in names}
+    failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in found), strict=True))
     return SweptMetrics(metrics, failed, until)
 
 

@@ -1,4 +1,4 @@
-"""One constant-curvature arc in the plane (E1), its inverse, and both along paths; NumPy, any batch shape."""
+"""One constant-curvature arc in the plane (E1), its inverse, and its tip along paths; NumPy, any batch shape."""
 
 from __future__ import annotations
 
