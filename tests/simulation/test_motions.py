@@ -19,7 +19,7 @@ from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import motion, reference_name, toward
 from wristctl.simulation.tracked_range import range_untracked
 from wristctl.simulation.trajectory import Trajectory
-from wristctl.wrist.kinematics import arc_tip
+from wristctl.wrist.kinematics import arc_tip, exact_arc
 
 WRIST = WristParameters()
 WIDE = WRIST.model_copy(update={"range_deg": 70.0})
@@ -166,6 +166,8 @@ def test_recorded_tips_are_the_arcs_that_end_there(tmp_path: Path) -> None:
     np.testing.assert_allclose(m.tip_desired[::10], np.column_stack([x, y]), atol=1e-12)
     for name in ("theta_ref", "rate_ref", "acceleration_ref"):
         np.testing.assert_allclose(getattr(through, name), getattr(m, name), atol=1e-8)
+    smaller = np.stack(exact_arc(recorded(file, scale=0.5).tip_desired[::10]))  # it bends less, and is as long
+    np.testing.assert_allclose(smaller, [0.5 * np.deg2rad(ANGLE), length], atol=1e-12)
 
 
 def test_a_smoothing_spline_takes_noise_out_of_the_acceleration(tmp_path: Path) -> None:
