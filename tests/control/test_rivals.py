@@ -19,8 +19,9 @@ from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.kernel import RECORDED
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 
 WRIST = WristParameters(gravity=(-8.0, 3.0))
 MOVE = Reference(angle_deg=30.0, duration=0.5)

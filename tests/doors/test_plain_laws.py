@@ -19,8 +19,9 @@ from wristctl.control.computed_torque import COMPUTED_TORQUE
 from wristctl.control.law import Controller, Gain
 from wristctl.control.plain_model import plain_one_segment
 from wristctl.control.table import CONTROLLERS
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 
 WRIST = WristParameters()
 

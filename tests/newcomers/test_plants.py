@@ -19,8 +19,9 @@ from wristctl.config.plant import Actuator, Disturbances, Plant, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.wrist.plant import PLANTS, PlantModel, poses
 
 __all__ = ["host_on"]  # a fixture of the bench's tests

@@ -83,7 +83,7 @@ def _spooled(
             row[0] = row[0] + q[i]
             row[1] = row[1] + rate[i]
         row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[3]
-        alive = advance_or_stop(segment, q, rate, given, tendons, h + zero, alive)
+        alive, _ = advance_or_stop(segment, q, rate, given, tendons, h + zero, alive)
 
 
 def spooled(

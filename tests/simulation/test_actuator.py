@@ -14,8 +14,9 @@ from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
 

@@ -10,8 +10,9 @@ from wristctl.config.plant import Disturbances, Drift, Plant, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.disturbances import acting
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 

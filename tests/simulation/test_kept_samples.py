@@ -11,8 +11,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import How, Outcome, rollout
+from wristctl.simulation.rollout import How, rollout
 
 SAMPLES, COLUMNS = 7, 3
 

@@ -10,8 +10,9 @@ from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueWrist
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 
 
 def test_a_tendon_that_is_held_relaxes_as_one_maxwell_branch_does() -> None:

@@ -18,8 +18,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.frames import readings, schedule
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.simulation.stationary_filter import Belief, expected_error, stationary_gains
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.compiled_model import linearised, terms

@@ -10,8 +10,9 @@ from wristctl.config.plant import Actuator, Plant, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.simulation.batch import sample_period
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.wrist.statics import equilibrium
 
 WRIST = WristParameters()

@@ -13,8 +13,9 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 
 WRIST = WristParameters()
 TENDON = Actuator(level="tendon", sheath=1.0)

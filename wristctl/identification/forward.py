@@ -69,7 +69,7 @@ def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, sta
             reeled[now, 1] + own[taut + 1],
             reeled[now, 3] + own[taut + 3],
         )
-        alive = advance_or_stop(plant, q, rate, given, tendons, spools.h + zero, alive)
+        alive, _ = advance_or_stop(plant, q, rate, given, tendons, spools.h + zero, alive)
 
 
 def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int, model: PlantModel = PCC) -> Array:

@@ -23,7 +23,8 @@ from wristctl.simulation.energy import energy
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
-from wristctl.simulation.rollout import How, Outcome, columns_of, rollout, structure
+from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.rollout import How, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
 
 _RECORDED_AT_ONCE = 6_000_000

@@ -20,9 +20,10 @@ from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion, reference_name, toward
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.rollout import rollout
 from wristctl.simulation.stationary_filter import Belief, expected_error
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import loop_facing, loops_of, plant_of

@@ -32,6 +32,10 @@ class KeptSamples(NamedTuple):
         places = [each.places + np.array([first, 0]) for first, each in zip(before.tolist(), kept, strict=False)]
         return cls([part for each in kept for part in each.parts], np.concatenate(places)[order])
 
+    def rows(self, rollouts: NDArray[np.int64]) -> KeptSamples:
+        """Some of the rollouts, in this order; nothing is copied."""
+        return KeptSamples(self.parts, self.places[rollouts])
+
     def column(self, number: int) -> Array:
         """One column of every rollout, (count, T)."""
         found = np.empty((len(self.places), self.parts[0].shape[1]))

@@ -33,7 +33,7 @@ angle that the law sees, and the load that its observer estimates. theta is nan 
 
 BRIEFLY = RECORDED[:4]
 """Those of them that are recorded where no more are asked for."""
-_ALIVE = SUMS.index("alive")
+_ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
 _COLUMNS, _BRIEFLY = len(RECORDED), len(BRIEFLY)
 _SIDE = float(TENDONS_PER_SIDE)
 _NAN = float("nan")
@@ -190,7 +190,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                         row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, known, now_tick, given_plus, given_minus, period)
             for _ in range(setup.substeps):
-                sum_[_ALIVE] = advance_or_stop(plant, q, rates, reeled, tendons, h, sum_[_ALIVE])
+                sum_[_ALIVE], error = advance_or_stop(plant, q, rates, reeled, tendons, h, sum_[_ALIVE])
+                sum_[_STEP_ERROR] = sum_[_STEP_ERROR] + error
 
 
 @compiled

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from threading import Event
 from typing import Literal
 
@@ -20,10 +19,12 @@ from wristctl.lanes.cores import cores
 from wristctl.lanes.stoppable_threads import stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
+from wristctl.simulation.convergence import has_kinks, more_finely, settled
 from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.sums import GOALS, SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
@@ -43,40 +44,6 @@ def columns_of(record: How, coordinates: int) -> int:
     if record == "briefly":
         return len(BRIEFLY)
     return len(RECORDED) + coordinates if record else 0
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Metrics of each rollout, shape (count,), and, where recorded, its samples."""
-
-    metrics: dict[str, Array]
-    failed: NDArray[np.bool_]
-    """Rollouts whose wrist left its range, or bent to no number at all."""
-    until: Array
-    """When they were last within it [s]: where they have failed."""
-    references: Array
-    """What was followed, angle with rate and acceleration, (motions, 3, T)."""
-    kept: KeptSamples | None = None
-
-    @property
-    def samples(self) -> Array | None:
-        """All that was recorded of all, (count, T, columns)."""
-        return None if self.kept is None else self.kept.all()
-
-    def column(self, name: str, rollout: int) -> Array:
-        """One recorded column of one rollout, (T,)."""
-        assert self.kept is not None
-        return self.kept.rollout(rollout)[:, RECORDED.index(name)].copy()
-
-    def columns(self, name: str) -> Array:
-        """One recorded column of all, (count, T)."""
-        assert self.kept is not None
-        return self.kept.column(RECORDED.index(name))
-
-    def coordinates(self, rollout: int) -> Array:
-        """The plant's coordinates, the angles of its segments, (T, q) [rad]."""
-        assert self.kept is not None
-        return self.kept.rollout(rollout)[:, len(RECORDED) :].copy()
 
 
 def rollout(
@@ -100,31 +67,39 @@ def rollout(
     what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
     ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
     (count,) are the entropies of the cameras' noise; all meet the same where none is given. Where another thread sets
-    `stop`, the outcome comes soon and is of no use. Raises what a plain law has raised; such rollouts run one by one.
+    `stop`, the outcome comes soon and is of no use. Where a loop's `substeps` are null and its integration step
+    turns out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`). Raises what
+    a plain law has raised; such rollouts run one by one.
     """
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
-    groups = np.arange(count).reshape((count, 1) if controller.plain else (1, count))
-    done: list[Outcome] = []
     stop = stop or Event()
-    for own in groups:
-        before = sum(map(len, (each.failed for each in done)))
+    everyone = np.arange(count)
 
-        def so_far(share: float, before: int = before, size: int = len(own)) -> None:
-            if progress is not None:
-                progress((before + share * size) / count)
+    def run(rollouts: NDArray[np.int64], times: int, progress: Callable[[float], None] | None = None) -> Outcome:
+        groups = [rollouts[at : at + 1] for at in range(len(rollouts))] if controller.plain else [rollouts]
+        parts = list[Outcome]()
+        for number, group in enumerate(groups):
 
-        part = part_of(worlds, lanes, own)
-        done.append(_run(controller, gains[own], motions, *part, start, record, threads, so_far, stop))
-    if len(done) == 1:
-        return done[0]
-    back = np.argsort(np.concatenate(groups), kind="stable")
-    metrics = {name: np.concatenate([each.metrics[name] for each in done])[back] for name in done[0].metrics}
-    failed = np.concatenate([each.failed for each in done])[back]
-    until = np.concatenate([each.until for each in done])[back]
-    kept = [each.kept for each in done if each.kept is not None]
-    return Outcome(metrics, failed, until, done[0].references, KeptSamples.joined(kept, back) if kept else None)
+            def so_far(share: float, number: int = number) -> None:
+                if progress is not None:
+                    progress((number + share) / len(groups))
+
+            there, own, followed = *part_of(worlds, lanes, group), motions
+            if times > 1:
+                there = [World(more_finely(world.loop, times), world.wrist) for world in there]
+                numbers, motion = np.unique(own.motion, return_inverse=True)
+                followed, own = [motions[number] for number in numbers], own._replace(motion=motion)
+            parts.append(_run(controller, gains[group], followed, there, own, start, record, threads, so_far, stop))
+        return Outcome.joined(parts, np.arange(len(rollouts)))
+
+    outcome = run(everyone, 1, progress)
+    if stop.is_set():
+        return outcome
+    by_hand = np.array([there.loop.substeps is not None for there in worlds])[world]
+    kinked = np.array([has_kinks(there.loop) for there in worlds])[world]
+    return settled(outcome, run, by_hand, kinked, stop)
 
 
 def worlds_of(
@@ -184,7 +159,8 @@ def _run(
     totals = Totals(*named, loop.control_period)
     kept = KeptSamples.of(done.state.record, count) if record else None
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
-    return Outcome(summary(totals), failed, until, done.course.references, kept)
+    steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
+    return Outcome(summary(totals), failed, until, done.course.references, steps, error, drift, kept)
 
 
 def _advance(

@@ -120,7 +120,7 @@ def _move(model: Any, lanes: Any, told: Any, timing: Any, out: Any, cut: Any) ->
         rates = zero
         for i in range(n):
             rates = rates + rate[i] * rate[i]
-        alive = advance_or_stop(segment, q, rate, given, tendons, timing.h + zero, alive)
+        alive, _ = advance_or_stop(segment, q, rate, given, tendons, timing.h + zero, alive)
         for i in range(n):
             rates = rates + rate[i] * rate[i]
         end = memory[0], memory[1], memory[2]

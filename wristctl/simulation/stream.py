@@ -11,7 +11,8 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.rollout import Outcome, rollout
+from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.rollout import rollout
 
 
 def stream(

@@ -19,9 +19,9 @@ from wristctl.lanes.rows import rows_named, rows_of
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "plus", "minus", "alive",
-    "until",
+    "until", "step_error",
 )  # fmt: skip
-"""Running sums of a lane, of which metrics are made."""
+"""Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]."""
 
 GOALS = ("final", "move", "begin", "rest", "horizon")
 """What metrics need of the reference: final angle and last move [rad], when it begins and rests, horizon [s]."""
@@ -30,7 +30,7 @@ goals_of = rows_named(GOALS)
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _PLUS, _MINUS, _ALIVE,
-    _UNTIL,
+    _UNTIL, _STEP_ERROR,
 ) = range(len(SUMS))  # fmt: skip
 
 

@@ -22,8 +22,9 @@ from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion, toward
-from wristctl.simulation.rollout import Outcome, rollout, structure
+from wristctl.simulation.rollout import rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
 
 

@@ -13,15 +13,20 @@ from wristctl.wrist.plant import advance, path_along, within
 
 @spelled_out
 def advance_or_stop(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any, alive: Any) -> Any:
-    """`advance`, but a plant that leaves what it can be stays where it was for good; which are still alive."""
+    """`advance`, but a plant that leaves what it can be stays where it was for good.
+
+    Returns which are still alive, and an estimate of the step's error as an angle [rad]: of a plant that leaves what it
+    can be in this step 1, of one that is not alive 0.
+    """
     before = lanes_like(q)
     for i in range(len(q)):
         before[i] = q[i]
-    advance(plant, q, rate, given, tendons, h)
+    of_bend, of_rate = advance(plant, q, rate, given, tendons, h)
     zero = 0.0 * alive
-    alive = where(within(plant, q), alive, zero)
+    well = where(within(plant, q), alive, zero)
+    error = where(well > zero, abs(of_bend) + h * abs(of_rate), alive)
     for i in range(len(q)):
-        q[i] = where(alive > zero, q[i], before[i])
-        rate[i] = where(alive > zero, rate[i], zero)
+        q[i] = where(well > zero, q[i], before[i])
+        rate[i] = where(well > zero, rate[i], zero)
     settle(tendons, q, given, path_along(tendons, plant, q))
-    return alive
+    return well, error

@@ -118,8 +118,11 @@ def _parameters_of(model: Any, rows: Any) -> Any:
     return parameters
 
 
-def advance(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> None:
+def advance(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> Any:
     """Move coordinates and rates on by h [s] with `given` (plus, minus) held.
+
+    Returns an estimate of the step's error in the bending angle and in its rate [rad, rad/s], as an embedded solution
+    of lower order gives it.
 
     These are pulls [N] where `tendons` is None, else what elastic tendons have reeled in [m]: their pulls at any place
     are `wristctl.wrist.elastic.pulls_along`'s, and end stops are `wristctl.wrist.yielding`'s.

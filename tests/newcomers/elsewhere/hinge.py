@@ -78,7 +78,7 @@ def _travel(rod: Any, q: Any) -> Any:
 
 
 @compiled
-def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> None:
+def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> Any:
     plus, minus = pulls_along(tendons, given, _travel(rod, q))
     torque, x, v = rod.offset * (plus - minus), q[0], rate[0]
     a1 = _acceleration(rod, x, v, torque)
@@ -90,6 +90,7 @@ def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> N
     a4 = _acceleration(rod, x + h * v3, v4, torque)
     q[0] = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
     rate[0] = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    return q[0] - (x + h * v2), rate[0] - (v + h * a2)  # the midpoint rule's, of second order
 
 
 @compiled

@@ -1,0 +1,121 @@
+"""Whether a rollout's integration step is short enough, and how short it has to be where it is not.
+
+A rollout is in doubt in two cases. RODAS3 carries an embedded solution of second order; where a loop is smooth the sum
+of its differences over all steps is far above the error of the angle, so that a small sum clears a rollout. It is large
+where a torque jumps from limit to limit at every tick, where a wrist is light or a period long. What it cannot see are
+the kinks of friction, backlash and end stops: with these a loop whose tensions keep swinging is in doubt as well.
+
+A rollout in doubt runs again with 2, 4, 8, ... times as many steps, until its numbers stay what they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import Event
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.simulation.outcome import Outcome
+
+FINER = (2, 4, 8, 16, 32, 64)
+"""How many times as many steps are tried, in this order."""
+RELATIVE, ABSOLUTE = 0.01, float(np.deg2rad(0.002))
+"""Share of itself, or angle [rad], within which an RMSE is right."""
+HALF = 0.5
+"""Share of that by which it may still change when the step is halved."""
+AT_THE_END = 10.0
+"""How many times as much the mean error at the end may: of a wrist that swings there the horizon cuts off a part."""
+DOUBT, KINKS = 3.0, 8.0
+"""Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
+times as much where forces have kinks, which the estimate takes for errors."""
+SWINGS = 2.0
+"""How often tensions go through their whole range and back, from which a loop with kinks is in doubt [1/s]."""
+
+Rollouts = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+def tolerance(angles: Array) -> Array:
+    """By how much angles [rad] may be off [rad]: 1 % of themselves, or 0.002 deg."""
+    sizes: Array = np.fmax(RELATIVE * np.abs(angles), ABSOLUTE)
+    return sizes
+
+
+def _swinging(outcome: Outcome) -> Mask:
+    """Rollouts whose tensions keep swinging, (count,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        swings = outcome.metrics["chattering"] / (2.0 * outcome.metrics["peak_tension"])
+    keep: Mask = swings > SWINGS
+    return keep
+
+
+def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
+    """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
+    most = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
+    doubtful: Mask = outcome.step_error > most
+    return doubtful | (kinked & _swinging(outcome))
+
+
+def agree(one: Outcome, other: Outcome) -> Mask:
+    """Rollouts that tell the same in both, (count,): RMSE and error at the end, and whether and when they failed."""
+    same = (one.failed == other.failed) & (np.abs(one.until - other.until) <= RELATIVE * other.until)
+    for name, share in (("rmse", HALF), ("steady_state", HALF * AT_THE_END)):
+        coarse, fine = one.metrics[name], other.metrics[name]
+        same &= (np.abs(coarse - fine) <= share * tolerance(fine)) | (np.isnan(coarse) & np.isnan(fine))
+    return same
+
+
+def _difference(one: Outcome, other: Outcome) -> Array:
+    """Greater difference of RMSE and of error at the end, (count,) [rad]; inf where only one has them."""
+    apart = [np.abs(one.metrics[name] - other.metrics[name]) for name in ("rmse", "steady_state")]
+    found: Array = np.nan_to_num(np.maximum(*apart), nan=np.inf)
+    return found
+
+
+def has_kinks(loop: Loop) -> bool:
+    """Whether forces on the wrist have kinks: friction and slack of elastic tendons, or end stops."""
+    return loop.actuator.level == "tendon" or loop.plant.end_stop_deg is not None
+
+
+def more_finely(loop: Loop, times: int) -> Loop:
+    """The loop with so many times the integration steps."""
+    return loop.model_copy(update={"substeps": times * loop.steps})
+
+
+def settled(
+    outcome: Outcome, run: Callable[[Rollouts, int], Outcome], by_hand: Mask, kinked: Mask, stop: Event
+) -> Outcome:
+    """The outcome with the rollouts that are in doubt taken at steps that are short enough.
+
+    `run` takes some of the rollouts at so many times the steps. A rollout has converged where its numbers stay the same
+    twice in a row; the longest of these steps is taken. Where that never happens the shortest is, and the rollout is
+    marked; so is, without trying all of them, a loop with kinks (`kinked`, (count,)) that swings at three steps and at
+    each differently: it is chaotic. Steps given `by_hand` (count,) stay; such a rollout is marked where half of the
+    step tells something else.
+    """
+    doubtful = in_doubt(outcome, kinked)
+    given, left = np.flatnonzero(doubtful & by_hand), np.flatnonzero(doubtful & ~by_hand)
+    if len(given):
+        before, fine = outcome.rows(given), run(given, 2)
+        outcome.drift[given] = np.where(agree(before, fine), 0.0, _difference(before, fine))
+    before, earlier = outcome.rows(left), outcome.rows(left)
+    stayed, chaotic = np.zeros(len(left), bool), kinked[left] & _swinging(before)
+    for times in FINER:
+        if not len(left) or stop.is_set():
+            return outcome
+        fine = run(left, times)
+        same = agree(before, fine)
+        chaotic &= _swinging(fine) & ~same
+        given_up = chaotic if times > FINER[0] else np.zeros(len(left), bool)
+        if times == FINER[-1]:
+            given_up = ~(same & stayed)
+        fine.drift[given_up] = np.maximum(_difference(before, fine), _difference(earlier, fine))[given_up]
+        for over, result in ((given_up, fine), (same & stayed, earlier)):
+            outcome = outcome.replaced(left[over], result.rows(np.flatnonzero(over)))
+        rest = np.flatnonzero(~given_up & ~(same & stayed))
+        left, stayed, chaotic = left[rest], same[rest], chaotic[rest]
+        earlier, before = before.rows(rest), fine.rows(rest)
+    return outcome

@@ -1,0 +1,98 @@
+"""What becomes of rollouts: metrics, who has failed, how finely they were integrated, and what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.simulation.kept_samples import KeptSamples
+from wristctl.simulation.kernel import RECORDED
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Metrics of each rollout, shape (count,), and, where recorded, its samples."""
+
+    metrics: dict[str, Array]
+    failed: NDArray[np.bool_]
+    """Rollouts whose wrist left its range, or bent to no number at all."""
+    until: Array
+    """When they were last within it [s]: where they have failed."""
+    references: Array
+    """What was followed, angle with rate and acceleration, (motions, 3, T)."""
+    steps: NDArray[np.int64]
+    """Integration steps in a control period, (count,)."""
+    step_error: Array
+    """Sum of the estimated errors of all steps, as an angle, (count,) [rad]."""
+    drift: Array
+    """By how much RMSE or error at the end still change at the shortest steps tried, (count,) [rad]; 0: converged."""
+    kept: KeptSamples | None = None
+
+    @property
+    def unconverged(self) -> NDArray[np.bool_]:
+        """Rollouts whose numbers depend on the integration step, (count,)."""
+        changing: NDArray[np.bool_] = self.drift > 0.0
+        return changing
+
+    @property
+    def samples(self) -> Array | None:
+        """All that was recorded of all, (count, T, columns)."""
+        return None if self.kept is None else self.kept.all()
+
+    def column(self, name: str, rollout: int) -> Array:
+        """One recorded column of one rollout, (T,)."""
+        assert self.kept is not None
+        return self.kept.rollout(rollout)[:, RECORDED.index(name)].copy()
+
+    def columns(self, name: str) -> Array:
+        """One recorded column of all, (count, T)."""
+        assert self.kept is not None
+        return self.kept.column(RECORDED.index(name))
+
+    def coordinates(self, rollout: int) -> Array:
+        """The plant's coordinates, the angles of its segments, (T, q) [rad]."""
+        assert self.kept is not None
+        return self.kept.rollout(rollout)[:, len(RECORDED) :].copy()
+
+    def rows(self, rollouts: NDArray[np.int64]) -> Outcome:
+        """Some of the rollouts, in this order."""
+        return replace(
+            self,
+            metrics={name: values[rollouts] for name, values in self.metrics.items()},
+            failed=self.failed[rollouts],
+            until=self.until[rollouts],
+            steps=self.steps[rollouts],
+            step_error=self.step_error[rollouts],
+            drift=self.drift[rollouts],
+            kept=None if self.kept is None else self.kept.rows(rollouts),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Outcome], order: NDArray[np.int64]) -> Outcome:
+        """The rollouts of all parts after each other, in this order; references are the first part's."""
+
+        def together(values: Sequence[NDArray[Any]]) -> NDArray[Any]:
+            return np.concatenate(values)[order]
+
+        kept = [part.kept for part in parts if part.kept is not None]
+        return cls(
+            {name: together([part.metrics[name] for part in parts]) for name in parts[0].metrics},
+            together([part.failed for part in parts]),
+            together([part.until for part in parts]),
+            parts[0].references,
+            together([part.steps for part in parts]),
+            together([part.step_error for part in parts]),
+            together([part.drift for part in parts]),
+            KeptSamples.joined(kept, order) if kept else None,
+        )
+
+    def replaced(self, rollouts: NDArray[np.int64], others: Outcome) -> Outcome:
+        """The same with `others` in the place of these rollouts."""
+        order = np.arange(len(self.failed))
+        order[rollouts] = len(order) + np.arange(len(rollouts))
+        return Outcome.joined([self, others], order) if len(rollouts) else self
