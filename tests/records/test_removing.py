@@ -11,9 +11,9 @@ import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.records import InputRun, Run, open_run, start_run
+from wristctl.records import InputRun, Run, open_run, start, start_run
 from wristctl.records.leftovers import clear, leftovers, lost_repetitions, lost_tags
-from wristctl.records.lock import LOCK, RunLock
+from wristctl.records.lock import LOCK, RunLock, delete_folder
 from wristctl.records.query import entries
 from wristctl.records.remove import foreign, removable, remove
 from wristctl.records.tags import change_tags, read_tags
@@ -102,3 +102,42 @@ def test_the_scratch_folders_of_killed_replays_are_found_and_no_others(
     held.release()
     clear(next(lost_repetitions()))
     assert not killed.exists() and list(lost_repetitions()) == []
+
+
+def test_a_killed_signing_changes_nothing_and_is_cleared_away(make: Make, results: Path) -> None:
+    run = make()
+    left = run.path / ".SHA256SUMS.sig.part"
+    left.write_bytes(b"half a signature")
+    assert run.problems() == [] and foreign(run) == []
+    (found,) = leftovers(results)
+    clear(found)
+    assert not left.exists() and run.problems() == []
+    (run.path / "data" / left.name).write_bytes(b"elsewhere it is an added file")
+    assert [name for name, _ in run.problems()] == [f"data/{left.name}"] and not list(leftovers(results))
+
+
+def test_of_two_who_delete_a_folder_the_second_leaves_it_to_the_first(tmp_path: Path) -> None:
+    folder = tmp_path / ".run.removed"
+    (folder / "data").mkdir(parents=True)
+    held = RunLock(folder)
+    delete_folder(folder)
+    assert folder.is_dir() and list(leftovers(tmp_path)) == []
+    held.release()
+    clear(next(leftovers(tmp_path)))
+    assert not folder.exists()
+
+
+def test_a_run_begins_although_its_empty_folder_was_taken_away(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Path] = []
+    original = start._new_directory
+
+    def taken_away(*given: str) -> Path:
+        made.append(original(*given))  # type: ignore[arg-type]
+        if len(made) == 1:
+            clear(next(leftovers(results)))
+        return made[-1]
+
+    monkeypatch.setattr(start, "_new_directory", taken_away)
+    with start_run("tune", Study(), "", results) as run:
+        run.metric("rmse", 1.0)
+    assert len(made) == 2 and [each.state for each in entries(results)] == ["ok"]

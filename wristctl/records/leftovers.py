@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -13,10 +12,11 @@ from typing import NamedTuple
 from wristctl.records.files import PART
 from wristctl.records.index import TEMPORARY, dated, run_names
 from wristctl.records.live import RESERVE
-from wristctl.records.lock import LOCK, is_locked
+from wristctl.records.lock import LOCK, delete_folder, is_locked
 from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, SUMS
 from wristctl.records.remove import REMOVED
 from wristctl.records.run import Run
+from wristctl.records.seal import SIGNING
 from wristctl.records.sealed_files import INPUTS
 from wristctl.records.tags import change_tags, known_tags
 
@@ -38,10 +38,12 @@ class Leftover(NamedTuple):
 def leftovers(results: Path) -> Iterator[Leftover]:
     """Half-deleted runs, half-written files, the reserves of crashed runs, and folders in which no run began."""
     for path in sorted(results.glob(".*")):
+        if is_locked(path):
+            continue
         if path.name.endswith(REMOVED) and path.is_dir():
             yield Leftover(path, "a run that was being deleted", _size(path))
         elif path.name.startswith(TEMPORARY) or path.name.endswith(PART):
-            yield Leftover(path, "a file that was being written", _size(path))
+            yield Leftover(path, "a file or folder that was being written", _size(path))
     for name in run_names(results):
         run = Run(results / name)
         if run.path.is_symlink() or is_locked(run.path) or not os.access(run.path, os.R_OK | os.X_OK):
@@ -52,7 +54,7 @@ def leftovers(results: Path) -> Iterator[Leftover]:
         sealed = (run.path / SUMS).exists()
         for path in sorted(run.path.rglob(".*")):
             unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
-            if unfinished or path == run.path / LOCK:
+            if unfinished or path in (run.path / LOCK, run.path / SIGNING):
                 yield Leftover(path, "left by a run that was killed", _size(path))
 
 
@@ -74,7 +76,7 @@ def lost_tags(results: Path) -> dict[str, list[str]]:
 def clear(found: Leftover) -> None:
     """Delete it."""
     if found.path.is_dir() and not found.path.is_symlink():
-        shutil.rmtree(found.path)
+        delete_folder(found.path)
     else:
         found.path.unlink(missing_ok=True)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -96,6 +95,14 @@ class Environment(ManifestPart):
     packages_sha256: str
 
 
+class TakenOver(ManifestPart):
+    """Units of work of a run that was resumed: how many were taken over, and how many were computed again to check."""
+
+    run: str
+    taken_over: int = 0
+    computed_again: int = 0
+
+
 class Timing(ManifestPart):
     """UTC times; wall and processor time [s], largest resident memory [MB]."""
 
@@ -122,7 +129,7 @@ SCHEMA = "wristctl.run/1"
 class Manifest(ManifestPart):
     """Everything about one run but its results."""
 
-    schema_: str = Field(default=SCHEMA, alias="schema", pattern=r"^wristctl\.run/[0-9]{1,6}$")
+    schema_: str = Field(default=SCHEMA, alias="schema", pattern=f"^{SCHEMA}$")
     id: str
     kind: str
     label: str
@@ -139,18 +146,9 @@ class Manifest(ManifestPart):
     environment: Environment
     inputs: list[Input] = []
     outputs: list[Output] = []
+    units: TakenOver | None = None
+    """None: no run was resumed that keeps units of work"""
     numerics: dict[str, Any] = {}
     timing: Timing
     result_sha256: str | None = None
     fingerprint: str
-
-    @property
-    def newer(self) -> bool:
-        """Whether a later wristctl made it, which may mean things that this one does not know."""
-        return int(self.schema_.rpartition("/")[2]) > int(SCHEMA.rpartition("/")[2])
-
-
-def is_newer(content: bytes) -> bool:
-    """Whether what cannot be read as a manifest is one of a later wristctl."""
-    found = re.search(rb'"schema": *"wristctl\.run/([0-9]{1,6})"', content)
-    return found is not None and int(found[1]) > int(SCHEMA.rpartition("/")[2])

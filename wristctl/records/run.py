@@ -15,15 +15,14 @@ from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.config.wording import Call
-from wristctl.records.files import files_below
+from wristctl.records.files import LINK, files_below
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
-from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of, is_newer
+from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
 from wristctl.records.seal import (
     ADDED,
     ADDED_FOLDER,
     CHANGED,
-    LINK,
     MISSING,
     faults_of_files,
     faults_of_manifest,
@@ -73,9 +72,8 @@ class Run:
         try:
             return Manifest.model_validate_json(content)
         except (ValidationError, RecursionError) as error:
-            if is_newer(content):
-                raise UserError("made by a newer wristctl than this one", str(file), "upgrade wristctl") from error
-            raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
+            fix = (*NAME_A_RUN, ", or upgrade wristctl where a newer one made it")
+            raise UserError("not a manifest of a run that this wristctl knows", str(file), fix) from error
 
     @property
     def kind(self) -> str:

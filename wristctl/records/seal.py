@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.records.files import files_below, sha256_of, sha256_of_list, sync, write_text
+from wristctl.config.system_errors import fix_to_read
+from wristctl.records.files import LINK, NOT_PLAIN, PART, files_below, sha256_of, sha256_of_list, sync, write_text
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, SIGNATURE, SOURCES, SUMS, Manifest
 
@@ -22,9 +23,10 @@ REQUIRED = (MANIFEST, CONFIG, PACKAGES, SOURCES)
 
 CHANGED, MISSING = "hash does not match what was sealed", "sealed file is missing"
 ADDED, ADDED_FOLDER = "file was added after sealing", "folder was added after sealing"
-LINK, NOT_PLAIN = "is a link, and a run holds files only", "is no plain file"
 UNREADABLE = "cannot be read: "
-_BESIDE = (SUMS, SIGNATURE, LOCK)
+SIGNING = f".{SIGNATURE}{PART}"
+"""What stays where `runs sign` was killed."""
+_BESIDE = (SUMS, SIGNATURE, SIGNING, LOCK)
 """What stands beside the files that are sealed; a lock stays where a process was killed at the very end."""
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
@@ -49,7 +51,7 @@ def read_seal(folder: Path) -> dict[str, str] | None:
 
 def unreadable(error: OSError, file: Path) -> UserError:
     """The user's error of a file that may be as it was, if only it could be read."""
-    return UserError(f"{UNREADABLE}{error.strerror}", str(file), "ask its owner to let you read it")
+    return UserError(f"{UNREADABLE}{error.strerror or error}", str(file), fix_to_read(error))
 
 
 def write_seal(folder: Path, known: dict[str, str]) -> None:
