@@ -19,7 +19,6 @@ from wristctl.config.wording import Argument
 from wristctl.interrupt import deferred
 from wristctl.lanes.cores import cores
 from wristctl.work.serving import serve_parent
-from wristctl.work.slurm import SlurmProfile
 
 EXECUTOR = Argument("executor", metavar="WHO")
 KINDS = "serial, processes, processes:N, dask://host:port or module:factory"
@@ -78,9 +77,6 @@ class Workers:
             return cls(named, many, lambda: _processes(many))
         if named.startswith("dask://"):
             return cls(named, 1, lambda: _dask(named.removeprefix("dask://")))
-        if named.startswith("slurm:"):
-            profile = SlurmProfile.read(Path(named.removeprefix("slurm:")))
-            return cls(named, 1, lambda: _slurm(profile))
         if _PLACE.fullmatch(named):
             factory = _factory(named)
             return cls(named, 1, lambda: _of_factory(named, factory))
@@ -128,12 +124,6 @@ def _dask(address: str) -> Iterator[Pool]:
         yield _of_client(client, address)
     finally:
         client.close(timeout=2)
-
-
-@contextmanager
-def _slurm(profile: SlurmProfile) -> Iterator[Pool]:
-    with profile.client() as client:
-        yield _of_client(client, client.scheduler.addr.removeprefix("tcp://"))
 
 
 def _of_client(client: Any, address: str) -> Pool:
