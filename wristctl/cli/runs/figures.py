@@ -16,7 +16,8 @@ from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError, meant
-from wristctl.config.wording import Argument
+from wristctl.config.system_errors import writing
+from wristctl.config.wording import TO, Argument
 from wristctl.records import Run, open_run
 from wristctl.records.index import DRAWN
 from wristctl.records.overview import read_overview
@@ -56,13 +57,8 @@ def figures(
         found = redrawn(run, partial(progress, console, quiet=quiet)).figures
         _check_names(names or (), found, run)
         chosen = list(names or found)
-        try:
+        with writing(folder, TO):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            give = Argument("to", metavar="FOLDER")
-            raise UserError(
-                f"cannot write there: {error.strerror}", str(folder), ("name another with ", give)
-            ) from error
         with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as done:
             for count, name in enumerate(chosen, start=1):
                 made = found[name]

@@ -15,6 +15,7 @@ from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS, Refs
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
+from wristctl.config.wording import TO
 from wristctl.records import Run, open_run
 from wristctl.records.files import write_text
 from wristctl.records.index import DRAWN
@@ -63,10 +64,10 @@ def report(
     drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
     text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
     try:
-        write_text(file, text)
+        write_text(file, text, TO)
     except UserError as error:
         if to:
-            raise UserError(error.what, error.where, "name another file with --to") from error
+            raise
         _log.warning("%s (%s): the page is written here", error.what, error.where)
         file = Path(file.name)
         write_text(file, text)
