@@ -5,7 +5,9 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -141,3 +143,42 @@ def test_a_run_begins_although_its_empty_folder_was_taken_away(results: Path, mo
     with start_run("tune", Study(), "", results) as run:
         run.metric("rmse", 1.0)
     assert len(made) == 2 and [each.state for each in entries(results)] == ["ok"]
+
+
+def test_many_who_delete_the_same_folders_are_in_nobodys_way(tmp_path: Path) -> None:
+    folders = [tmp_path / f".{number}.removed" for number in range(60)]
+    for folder in folders:
+        (folder / "data").mkdir(parents=True)
+        for name in ("run.json", "data/a.csv", "data/b.csv"):
+            (folder / name).write_text("x")
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(lambda _: [delete_folder(folder) for folder in folders], range(6)))
+    assert list(leftovers(tmp_path)) == []
+    for folder in folders:
+        delete_folder(folder)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_gc_takes_nothing_from_who_is_writing_tags_and_passes_over_what_is_gone_meanwhile(
+    make: Make, results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, found = make(), []
+
+    def written(path: Path, text: str) -> None:
+        part = path.with_name(f".{path.name}.part")
+        part.write_text(text)
+        found.extend(leftovers(results))
+        clearing.append(Thread(target=clear, args=(found[0],)))
+        clearing[0].start()
+        clearing[0].join(0.05)
+        part.rename(path)
+
+    clearing: list[Thread] = []
+    with monkeypatch.context() as patch:
+        patch.setattr("wristctl.records.tags.write_text", written)
+        assert change_tags(results, run.id, add=["x"]) == ["x"]
+    clearing[0].join()
+    assert [each.path.name for each in found] == [".tags.json.part"] and read_tags(results) == {run.id: ["x"]}
+    monkeypatch.setattr("wristctl.records.leftovers._size", lambda path: path.with_name("gone").stat().st_size)
+    (results / ".old.removed").mkdir()
+    assert list(leftovers(results)) == []

@@ -12,6 +12,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 LOCK = ".lock"
 _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
@@ -83,14 +84,36 @@ def delete_folder(directory: Path) -> None:
     the folder, and waits for its lock, finds that it is gone.
     """
     descriptor = None
-    with suppress(OSError):  # a full disk has no room for a lock, and may have some again after this
+    try:
         descriptor = os.open(directory / LOCK, os.O_CREAT | os.O_RDWR | os.O_NONBLOCK, 0o666)
+    except FileNotFoundError:
+        return
+    except OSError:  # a full disk has no room for a lock, and may have some again after this
+        pass
     try:
         if descriptor is None or _taken(descriptor):
-            shutil.rmtree(directory)
+            _empty(directory)
+            shutil.rmtree(directory, onerror=_unless_another_did)
     finally:
         if descriptor is not None:
             os.close(descriptor)
+
+
+def _empty(directory: Path) -> None:
+    """Delete all but the lock, which goes last: who takes it then finds nothing, or a folder that is gone."""
+    with suppress(FileNotFoundError):
+        for each in sorted(directory.iterdir()):
+            if each.is_dir() and not each.is_symlink():
+                shutil.rmtree(each, onerror=_unless_another_did)
+            elif each.name != LOCK:
+                each.unlink(missing_ok=True)
+
+
+def _unless_another_did(function: Any, path: str, raised: Any) -> None:
+    """Raise what a deletion met, unless another process has deleted the same, or is about to."""
+    error = raised[1]
+    if not isinstance(error, FileNotFoundError) and getattr(error, "errno", 0) != errno.ENOTEMPTY:
+        raise error
 
 
 def _taken(descriptor: int) -> bool:
