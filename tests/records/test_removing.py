@@ -14,7 +14,7 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, open_run, start, start_run
-from wristctl.records.leftovers import clear, leftovers, lost_repetitions, lost_tags
+from wristctl.records.leftovers import Leftover, clear, leftovers, lost_repetitions, lost_tags
 from wristctl.records.lock import LOCK, RunLock, delete_folder
 from wristctl.records.query import entries
 from wristctl.records.remove import foreign, removable, remove
@@ -151,8 +151,13 @@ def test_many_who_delete_the_same_folders_are_in_nobodys_way(tmp_path: Path) -> 
         (folder / "data").mkdir(parents=True)
         for name in ("run.json", "data/a.csv", "data/b.csv"):
             (folder / name).write_text("x")
+
+    def clear_all(_: int) -> None:
+        for folder in folders:
+            delete_folder(folder)
+
     with ThreadPoolExecutor(6) as pool:
-        list(pool.map(lambda _: [delete_folder(folder) for folder in folders], range(6)))
+        list(pool.map(clear_all, range(6)))
     assert list(leftovers(tmp_path)) == []
     for folder in folders:
         delete_folder(folder)
@@ -162,7 +167,8 @@ def test_many_who_delete_the_same_folders_are_in_nobodys_way(tmp_path: Path) -> 
 def test_gc_takes_nothing_from_who_is_writing_tags_and_passes_over_what_is_gone_meanwhile(
     make: Make, results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, found = make(), []
+    run = make()
+    found: list[Leftover] = []
 
     def written(path: Path, text: str) -> None:
         part = path.with_name(f".{path.name}.part")
