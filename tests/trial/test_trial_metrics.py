@@ -151,12 +151,11 @@ def test_without_any_truth_nothing_true_is_known() -> None:
 def test_a_trial_of_several_moves_is_judged_by_its_last_one(before: float, final: float) -> None:
     """A perfect follower, and one that leaves the target by a tenth of the move until half a second after a push."""
     reference, goals = multi_step(before, final, 0.6, HORIZON)
-    rows = np.stack([reference, 0.0 * reference, 0.0 * reference])
-    followed = Motion(
-        1e-3 * np.arange(len(reference)), Angles.of(rows), np.zeros((len(reference), 2)), goals.move, goals.begin,
-        goals.rest, HORIZON,
-    )  # fmt: skip
-    time, trial = followed.time, Trial(0, "ulnar", 0, 2.0, 0)
+    rows: Array = np.stack([reference, 0.0 * reference, 0.0 * reference])
+    time: Array = 1e-3 * np.arange(len(reference))
+    tips = np.zeros((len(time), 2))
+    followed = Motion(time, Angles.of(rows), tips, goals.move, goals.begin, goals.rest, HORIZON)
+    trial = Trial(0, "ulnar", 0, 2.0, 0)
 
     def judged(error: Array) -> dict[str, float]:
         load = 0.3 + 0.1 * ((time >= 2.0) & (time < 2.4))
