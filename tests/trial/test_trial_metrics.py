@@ -152,7 +152,7 @@ def test_a_trial_of_several_moves_is_judged_by_its_last_one(before: float, final
     """A perfect follower, and one that leaves the target by a tenth of the move until half a second after a push."""
     reference, goals = multi_step(before, final, 0.6, HORIZON)
     rows: Array = np.stack([reference, 0.0 * reference, 0.0 * reference])
-    time: Array = 1e-3 * np.arange(len(reference))
+    time: Array = 1e-3 * np.arange(float(len(reference)))
     tips = np.zeros((len(time), 2))
     followed = Motion(time, Angles.of(rows), tips, goals.move, goals.begin, goals.rest, HORIZON)
     trial = Trial(0, "ulnar", 0, 2.0, 0)
