@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.values import one_move
 from wristctl.comparison.box import continuous_settings, courses, drawn_settings, react
 from wristctl.comparison.deciding_leaf import deciding, split
 from wristctl.comparison.held_tick import arrives_by_rule, overshoot_of_a_tick
@@ -92,7 +93,7 @@ def test_readings_are_the_metrics_of_their_names() -> None:
     still = np.full((5000, 2), 3.0)
     for rest in (0.0, 0.6):
         found = readings(courses_of(theta, rest))
-        known = metrics_of(1e-3, theta[:5000], np.full(5000, 0.5), still, 0.5, rest)
+        known = metrics_of(1e-3, theta[:5000], np.full(5000, 0.5), still, one_move(0.5, rest, 5.0))
         for name, values in found.items():
             assert values[0] == pytest.approx(known[name], rel=1e-9), (name, rest)
 
