@@ -10,7 +10,7 @@ from pathlib import Path
 import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
-LONGEST = 250
+LONGEST = 400
 GENERATED = {"board/messages.py"}
 
 SHARED_FILE_NAMES = {
