@@ -161,6 +161,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "rmse_desired": pytest.approx(0.02),
         "tip_rmse_mm": pytest.approx(math.sqrt(0.9 * 9.0 + 0.1 * 25.0)),
         "tip_steady_mm": pytest.approx(5.0),
+        "missing": 0.0,
         "oscillation": pytest.approx(0.0, abs=1e-15),
         "hunting": pytest.approx(math.nan, nan_ok=True),
         "observer_consistency": pytest.approx(math.nan, nan_ok=True),

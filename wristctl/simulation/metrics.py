@@ -16,6 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.simulation.arrival import missing
 from wristctl.simulation.energy import course_energy
 from wristctl.simulation.motion import Goals
 from wristctl.simulation.oscillation import hunting, oscillation
@@ -158,6 +159,12 @@ STEADY_STATE = Metric(
     lambda of: of.sums["late"] / of.sums["late_count"],
     heading="steady [rad]",
     floor=_ANGLE,
+)
+MISSING = Metric(
+    "",
+    "mean |e| at the end as a share of the largest reference: more than a fifth does not arrive",
+    of_trajectory=missing,
+    floor=1e-3,
 )
 OVERSHOOT = Metric(
     "%",
