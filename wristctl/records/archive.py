@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.config.errors import UserError
+from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.records.files import PART, replacing, sync
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
-from wristctl.records.seal import read_seal, unreadable
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
 _ID = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}")

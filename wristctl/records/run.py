@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
+from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.config.study import Study
 from wristctl.config.wording import Call
 from wristctl.records.files import files_below
@@ -27,8 +28,6 @@ from wristctl.records.seal import (
     MISSING,
     faults_of_files,
     faults_of_manifest,
-    read_seal,
-    unreadable,
 )
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
+from wristctl.config.sha256sums import UNREADABLE, unreadable
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.manifest import SIGNATURE, SUMS
-from wristctl.records.seal import UNREADABLE, unreadable
 from wristctl.records.signature import RunSignature, is_signed, signature
 from wristctl.studies.counting import no_event
 
