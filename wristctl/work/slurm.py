@@ -13,9 +13,10 @@ from wristctl.config.errors import UserError, meant
 from wristctl.config.strict_yaml import parse_yaml
 from wristctl.config.wording import Argument
 from wristctl.lanes.kernel_folder import NAMED
+from wristctl.work.serving import SAFE_PATH
 
-_KERNELS = f"export {NAMED}=${{TMPDIR:-/tmp}}/wristctl-kernels-$USER"
-"""Kernels are compiled for the node's own processor, and kept there."""
+_BEFORE = (f"export {NAMED}=${{TMPDIR:-/tmp}}/wristctl-kernels-$USER", f"export {SAFE_PATH}=1")
+"""Kernels are compiled for the node's own processor, and kept there; no worker looks for modules where it begins."""
 _INSTALL = "pip install 'wristctl[cluster]'"
 _EXAMPLE = "jobs: 4, cores: 16, processes: 16, memory: 32GB, queue: NAME, walltime: 02:00:00"
 
@@ -46,7 +47,7 @@ class SlurmProfile:
         if missing or not isinstance(jobs, int) or jobs < 1:
             raise UserError(f"a profile says {', '.join(missing) or 'how many jobs'}", str(file), _EXAMPLE)
         given = {name: list(each) if isinstance(each, tuple) else each for name, each in data.items() if name != "jobs"}
-        prologue = [_KERNELS, *given.pop("job_script_prologue", [])]
+        prologue = [*_BEFORE, *given.pop("job_script_prologue", [])]
         return cls(jobs, {**given, "job_script_prologue": prologue})
 
     def job_script(self, scheduler: str = "tcp://SCHEDULER:8786") -> str:
