@@ -59,11 +59,21 @@ def run(tmp_path: Path) -> Run:
     return carrier(tmp_path, "simulate", {"controller": CARRIED, "gains": "default"})
 
 
+def _noting(asked: list[str]) -> Callable[[str], bool]:
+    """Somebody who notes what is asked, and says no."""
+
+    def ask(shown: str) -> bool:
+        asked.append(shown)
+        return False
+
+    return ask
+
+
 @pytest.mark.parametrize("left", LEFT_OVERS)
 def test_the_code_of_what_is_left_of_a_run_asks(run: Run, tmp_path: Path, left: str) -> None:
     LEFT_OVERS[left](run.path)
     asked = list[str]()
-    with asking(lambda shown: bool(asked.append(shown))), pytest.raises(UserError, match="nobody has said"):
+    with asking(_noting(asked)), pytest.raises(UserError, match="nobody has said"):
         load(f"{run.path / LAW_FILE}:STRANGE")
     assert len(asked) == 1 and not (tmp_path / MARK).exists()
 
@@ -109,7 +119,7 @@ def test_names_of_a_runs_files_forge_no_lines_of_the_question(run: Run, tmp_path
     odd.write_text("")
     (run.path / "SHA256SUMS").unlink()
     asked = list[str]()
-    with asking(lambda shown: bool(asked.append(shown))), pytest.raises(UserError):
+    with asking(_noting(asked)), pytest.raises(UserError):
         load(f"{run.path / LAW_FILE}:STRANGE")
     (shown,) = asked
     assert len(shown.splitlines()) == 4 and "\x1b" not in shown

@@ -39,7 +39,7 @@ class RealTimeBench:
 
     def __init__(self, processes: Sequence[BaseProcess], control: Connection, address: str, pictures: Path) -> None:
         self._processes, self._control = processes, control
-        self.transport = SerialTransport(address, BAUD)
+        self.transport = SerialTransport(address, BAUD, emulated=True)
         self.camera = SharedCamera(pictures)
 
     def __enter__(self) -> Self:

@@ -74,7 +74,9 @@ class Run:
         except (ValidationError, RecursionError) as error:
             if is_newer(content):
                 raise UserError("made by a newer wristctl than this one", str(file), "upgrade wristctl") from error
-            raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
+            place = ".".join(map(str, error.errors()[0]["loc"])) if isinstance(error, ValidationError) else ""
+            where = f"{file}: {place[:100]}" if place else str(file)
+            raise UserError("not a manifest of a wristctl run", where, NAME_A_RUN) from error
 
     @property
     def kind(self) -> str:
