@@ -66,11 +66,17 @@ def placed(value: Any, document: Path | None) -> Any:
         return value
     file, attribute = split(value)
     whole = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
-    home = run_around(document) if document else None
-    if home and not whole.resolve().is_relative_to(home.resolve()):
-        fix = "name a law of your own in a study file of your own"
-        raise UserError("the configuration of a run names code outside the run", str(whole), fix)
+    if document:
+        check_within(whole, document)
     return f"{whole}:{attribute}"
+
+
+def check_within(named: Path, document: Path) -> None:
+    """Raises UserError where a document that is part of a run names code, or another document, outside the run."""
+    home = run_around(document)
+    if home and not named.resolve().is_relative_to(home.resolve()):
+        fix = "name it in a study file of your own"
+        raise UserError("the configuration of a run names code outside the run", str(named), fix)
 
 
 def check_trust(leaves: Iterable[Any], document: Path | None = None) -> None:

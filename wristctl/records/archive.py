@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.config.errors import UserError
+from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.config.system_errors import writing
 from wristctl.config.wording import FILE
 from wristctl.records.files import PART, replacing, sync, sync_all
@@ -28,7 +29,6 @@ from wristctl.records.lineage import input_run
 from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
-from wristctl.records.seal import read_seal, unreadable
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
 MOST_FILES = 50_000

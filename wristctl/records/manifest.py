@@ -1,10 +1,14 @@
-"""run.json: what was run, on what, by which code, where, and what came out."""
+"""run.json: what was run, on what, by which code, where, and what came out.
+
+What others act on (ids, kinds, roles, hashes, names of files) has one form, and a manifest with another is none.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from pathlib import PurePosixPath
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
 SIGNATURE = "SHA256SUMS.sig"
@@ -27,6 +31,21 @@ def command_of(kind: str) -> str:
     return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
 
 
+def _inside(name: str) -> str:
+    """A name of a file in the run."""
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts or "\0" in name:
+        raise ValueError("leads out of the run")
+    return name
+
+
+RunId = Annotated[str, Field(pattern=r"^[0-9]{8}T[0-9]{6}Z-[A-Za-z0-9_.-]{1,200}$")]
+"""It begins with the UTC time at which the run began."""
+_Kind = Annotated[str, Field(pattern=r"^[a-z]{1,20}(-[a-z]{1,20}){0,3}$")]
+_Role = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,40}(\[[0-9]{1,4}\])?$")]
+_Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+_Inside = Annotated[str, AfterValidator(_inside)]
+
+
 class ManifestPart(BaseModel):
     """A part of the manifest. What a later version adds is passed over: see docs/runs.md on compatibility."""
 
@@ -44,21 +63,21 @@ class Column(ManifestPart):
 class Output(ManifestPart):
     """A file that the run wrote; volatile ones (wall times, reports) stand outside the result hash."""
 
-    path: str
-    sha256: str
+    path: _Inside
+    sha256: _Digest
     bytes: int
     volatile: bool = False
     columns: list[Column] = []
 
 
 class Input(ManifestPart):
-    """An earlier run that this one read; `result_sha256` says what was in it."""
+    """An earlier run that this one read; `result_sha256` says what was in it, and is empty of one that was stopped."""
 
-    role: str
-    kind: str
-    run: str
+    role: _Role
+    kind: _Kind
+    run: RunId
     path: str
-    result_sha256: str
+    result_sha256: _Digest | Literal[""]
 
 
 class Code(ManifestPart):
@@ -73,7 +92,7 @@ class Code(ManifestPart):
     dirty: bool | None = None
     patch_sha256: str | None = None
     tree_sha256: str
-    foreign: dict[str, str] = {}
+    foreign: dict[_Inside, _Digest] = {}
 
 
 class Environment(ManifestPart):
@@ -130,8 +149,8 @@ class Manifest(ManifestPart):
     """Everything about one run but its results."""
 
     schema_: str = Field(default=SCHEMA, alias="schema", pattern=f"^{SCHEMA}$")
-    id: str
-    kind: str
+    id: RunId
+    kind: _Kind
     label: str
     state: EndState = "running"
     exit_code: int | None = None

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.sha256sums import read_seal
 from wristctl.records.lineage import dependents
 from wristctl.records.lock import delete_folder
 from wristctl.records.run import Run
-from wristctl.records.seal import added, read_seal
+from wristctl.records.seal import added
 from wristctl.records.tags import change_tags, known_tags
 
 REMOVED = ".removed"

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
+from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.config.study import Study
 from wristctl.config.wording import Call
 from wristctl.records.files import LINK, files_below
@@ -26,8 +27,6 @@ from wristctl.records.seal import (
     MISSING,
     faults_of_files,
     faults_of_manifest,
-    read_seal,
-    unreadable,
 )
 
 if TYPE_CHECKING:
@@ -73,7 +72,9 @@ class Run:
             return Manifest.model_validate_json(content)
         except (ValidationError, RecursionError) as error:
             fix = (*NAME_A_RUN, ", or upgrade wristctl where a newer one made it")
-            raise UserError("not a manifest of a run that this wristctl knows", str(file), fix) from error
+            place = ".".join(map(str, error.errors()[0]["loc"])) if isinstance(error, ValidationError) else ""
+            where = f"{file}: {place[:100]}" if place else str(file)
+            raise UserError("not a manifest of a run that this wristctl knows", where, fix) from error
 
     @property
     def kind(self) -> str:

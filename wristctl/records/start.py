@@ -173,7 +173,7 @@ def _begin(
         Input(
             role=each.role,
             kind=each.run.kind,
-            run=each.run.id,
+            run=each.run.manifest.id,
             path=str(each.run.path),
             result_sha256=each.run.result_hash,
         )
