@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant, nearest
+from wristctl.config.printable import printable
 from wristctl.config.wording import OUT, Call, Phrase
 from wristctl.records.index import RESULTS, indexed, run_names
 from wristctl.records.manifest import MANIFEST, command_of
@@ -76,7 +77,8 @@ def _readable(path: Path) -> Run:
         run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
     with suppress(UserError):
         if run.manifest.newer:
-            _log.warning("%s was made by a newer wristctl: what this one does not know of it is passed over", run.id)
+            what = "was made by a newer wristctl: what this one does not know of it is passed over"
+            _log.warning("%s %s", printable(run.id), what)
     return run
 
 
