@@ -92,9 +92,17 @@ def test_a_script_that_is_not_the_pages_own_would_not_run(browser: Browser, fore
     assert browser.run("return window.PWNED || 0") == 0
 
 
+@pytest.mark.parametrize("many", [False, True], ids=["one run", "several runs"])
+def test_a_page_that_is_looked_at_in_a_terminal_moves_nothing(foreign: Run, many: bool) -> None:
+    text = several_page([foreign, foreign]) if many else page(foreign, foreign.manifest)
+    assert {each for each in text if not each.isprintable()} == {"\n"}
+
+
 VERBS = [
-    ["ls"], ["show", "RUN"], ["lineage", "RUN"], ["diff", "RUN", "DATA"], ["diff", "DATA", "RUN"], ["verify"],
-    ["replay", "RUN"], ["tag", "RUN", "a\x1bb"], ["rm", "\x1b[2J"], ["gc"], ["report", "\x1b[2J\n"],
+    ["ls"], ["ls", "--columns", "id,about,label,started"], ["show", "RUN"], ["table", "RUN"],
+    ["table", "RUN", "--latex"],
+    ["lineage", "RUN"], ["diff", "RUN", "DATA"], ["diff", "DATA", "RUN"], ["verify"], ["replay", "RUN"],
+    ["tag", "RUN", "a\x1bb"], ["rm", "\x1b[2J"], ["gc"], ["report", "\x1b[2J\n"],
 ]  # fmt: skip
 
 

@@ -27,7 +27,7 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> 
         return
     print(resolved, end="")
     for line in [*plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
-        print(f"# {line}")
+        print(f"# {printable(line)}")
 
 
 def print_result(
