@@ -11,7 +11,7 @@ from typing import Any
 
 from tests.doors.conftest import HELPER, LAW
 from wristctl.config.foreign import Foreign
-from wristctl.config.study import Study
+from wristctl.config.load import load_study
 from wristctl.records import Run, start_run
 from wristctl.records.manifest import Manifest
 from wristctl.records.seal import result_hash, write_seal
@@ -30,8 +30,9 @@ def carrier(folder: Path, kind: str, section: Mapping[str, Any]) -> Run:
     hashes = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(sources.iterdir())}
     foreign = Foreign(sources / "strange.py", "STRANGE", hashes, sources)
     agreed = os.environ.get("WRISTCTL_TRUSTED_CODE")
-    plain = json.loads(json.dumps(section).replace(CARRIED, foreign.reference))
-    study = Study.model_validate({kind: plain}, by_alias=True, by_name=False)
+    document = sources / "study.yaml"
+    document.write_text(json.dumps({kind: section}).replace(CARRIED, foreign.reference))
+    study = load_study([document])
     with start_run(kind, study, "", folder / "results", ["wristctl", kind], foreign=[foreign]) as live:
         live.file("data/gains.json").write_text('{"strange": {"Kp": 4.0, "Kd": 0.2}}')
         live.metric("rmse", 0.1)
