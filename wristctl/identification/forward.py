@@ -44,11 +44,12 @@ class SupposedWrist(NamedTuple):
 
 class Reeled(NamedTuple):
     """What the spools have reeled in (T, 4) [m], held over each step of h [s], and how many steps a wrist has to settle
-    on the first of them."""
+    on the first of them; `clock` is the time at first [s], None where nothing slips, breaks or has backlash."""
 
     lengths: Any
     h: float
     settle: int
+    clock: Any
 
 
 @compiled
@@ -66,9 +67,7 @@ def _worn(clock: Any, tendons: Any, plant: Any, q: Any, given: Any, time: Any) -
     )
 
 
-def _advance(
-    model: Any, values: Any, tendon: Any, spools: Any, clock: Any, memory: Any, state: Any, angle: Any, cut: Any
-) -> None:
+def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
     plant, own = parameters_of(model, rows_of(values)), rows_of(tendon)
     zero = 0.0 * own[0]
     tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
@@ -87,7 +86,7 @@ def _advance(
             reeled[now, 1] + own[taut + 1],
             reeled[now, 3] + own[taut + 3],
         )
-        reached = _worn(clock, tendons, plant, q, given, k * spools.h + zero)
+        reached = _worn(spools.clock, tendons, plant, q, given, k * spools.h + zero)
         alive = advance_or_stop(plant, q, rate, reached, tendons, spools.h + zero, alive)
 
 
@@ -104,10 +103,10 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
     tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
-    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h))
+    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), clock)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
     for value, tendon, angle in zip(values, tendons, found, strict=True):
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
-        advance(model, value, tendon, spools, clock, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
+        advance(model, value, tendon, spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
     return to_rows(found, len(candidates))
