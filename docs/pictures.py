@@ -105,10 +105,10 @@ def main() -> None:
         "network). Loops: `exact` is the model as its own plant, torque held for a microsecond, no limits; `sampled` "
         "the same at 1 kHz with 60 N tendons; `default` a four-segment plant under the one-segment model.\n\n"
         + table(results)
-        + "\n\nThe printed gains do not move the wrist. With P1 and P2 exchanged (a hypothesis) the paper's RMSE lies "
-        "between those of the two moves on the exact loop; sampled at 1 kHz the same gains slam the tendons at every "
-        "tick, and on the four-segment plant at 60 N they do not arrive: up to 53.9 N, or behind an observer, they do, "
-        "and [in one setting](best_case.md) they give all three numbers of T2 within 2 %.\n"
+        + "\n\nThe printed SMC gains do not move the wrist. With P1 and P2 exchanged (a hypothesis) the paper's RMSE "
+        "lies between those of the two moves on the exact loop; sampled at 1 kHz the same gains slam the tendons at "
+        "every tick. Whether they bring a four-segment wrist to 30 deg turns on the tension limit and on how the rate "
+        "is measured: [the paper at its best](best_case.md).\n"
     )
 
 

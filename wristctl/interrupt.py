@@ -94,6 +94,12 @@ def deferred() -> Iterator[None]:
             signal.raise_signal(each)
 
 
+def from_outside(error: BaseException) -> bool:
+    """Whether an exception is Ctrl-C or SIGTERM, and not a KeyboardInterrupt that some code has raised by itself."""
+    heard = _around[-1].asked if _around else signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    return isinstance(error, KeyboardInterrupt) and heard
+
+
 def undisturbed() -> Any:
     """Within the block (main thread only) Ctrl-C and SIGTERM are ignored."""
     return _handled(dict.fromkeys((signal.SIGINT, signal.SIGTERM, signal.SIGALRM), signal.SIG_IGN))

@@ -54,6 +54,10 @@ def _ends_with(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> No
     monkeypatch.setattr(app, "get_command", lambda _: lambda **_given: act())
 
 
+class _Odd(BaseException):
+    """No Exception."""
+
+
 def _fail(error: BaseException) -> NoReturn:
     raise error
 
@@ -64,6 +68,7 @@ def _fail(error: BaseException) -> NoReturn:
         (lambda: None, 0, ""),
         (lambda: 5, 5, ""),
         (lambda: _fail(KeyboardInterrupt()), 130, ""),
+        (lambda: _fail(_Odd("x")), 1, "error: bug in wristctl: _Odd: x"),
         (lambda: _fail(ZeroDivisionError("by\nhand")), 1, "error: bug in wristctl: ZeroDivisionError: by hand"),
     ],
 )

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from tests.cli.conftest import Call
-from wristctl.comparison.paper import T2
+from wristctl.comparison.paper import T2, Ends
 from wristctl.comparison.verdicts import of_sample
 from wristctl.config.audit import VerdictName
 from wristctl.config.load import load_study
@@ -29,8 +29,8 @@ def test_ledger_holds_every_table_and_every_gap_of_the_paper() -> None:
     ids = {claim.id for claim in load_study([LEDGER]).audit.claims}
     gaps = {name.split("-")[0] for name in ids if name.startswith("C")}
     assert gaps == {f"C{k}" for k in range(1, 18)}
-    assert sum(name.startswith("T1-") for name in ids) == 28 + 4
-    assert sum(name.startswith("T2-") for name in ids) == 15
+    assert sum(name.startswith("T1-") for name in ids) == 28 + 4 + 1
+    assert sum(name.startswith("T2-") for name in ids) == 15 + 1
     assert sum(name.startswith("X-") for name in ids) == 9 + 4
     assert sum(name.startswith("O-") for name in ids) == 3 * math.comb(5, 2) + 3
 
@@ -50,10 +50,9 @@ def test_ledger_orders_the_rows_of_t2_as_it_prints_them_and_judges_no_law_that_i
 def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, tmp_path: Path) -> None:
     """On the ledger without the rivals, whose rollouts on the exact loop take long."""
     data = yaml.safe_load(LEDGER.read_text())
-    named = ("mrac", "gvsc", "nc")
     claims = [
         claim for claim in data["audit"]["claims"]
-        if claim.get("controller") not in named and claim.get("than", "").split("/")[0] not in named
+        if claim.get("part_of") != "T2-named" and claim["id"] != "T2-named"
     ]  # fmt: skip
     (tmp_path / "claims.yaml").write_text(yaml.safe_dump({"audit": {"claims": claims}}))
     code, _, _ = call("audit", "claims.yaml")
@@ -65,16 +64,15 @@ def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, 
     trade_off, exchanged, printed = (judged[name] for name in ("C15-trade-off", "C5-exchanged", "C5-printed"))
     assert trade_off["verdict"] == "open" and "--selection" in trade_off["reason"]
     assert printed["exact_verdict"] == "contradicted" and printed["default_verdict"] == "worse than the paper"
+    for name in ("C5-printed", "C9", "O-rmse-printed", "O-steady-state-printed"):
+        assert judged[name]["verdict"] == "contradicted", "what fails on every loop is one verdict"
     assert exchanged["exact_verdict"] == "reproduced" and exchanged["exact_mark"] == "not physical"
     assert exchanged["exact_low"] < 2.7e-4 < exchanged["exact_high"] and "1.07e+05 N on a step" in exchanged["reason"]
-    assert exchanged["default_verdict"] == "worse than the paper"
     steady = {law: judged[f"T2-{law}-steady-state"] for law in ("smc", "pid")}
     for law, found in steady.items():
         assert found["sampled_verdict"] == "reproduced" and found["exact_verdict"] == "better than the paper", law
         assert judged[f"T2-{law}-settling"]["sampled_verdict"] == "not specified enough"
-    assert judged["X-soft-springs-smc"]["default_verdict"] == "better than the paper", (
-        "what was there before is no gain"
-    )
+    assert judged["X-soft-springs-smc"]["sampled_verdict"] == "does not hold", "what was there before is no gain"
     shown = json.loads((run.path / "evidence.json").read_text())
     assert list(shown)[:3] == ["exact", "sampled", "default"]
     assert all(open_run(each).kind == "compare" for each in shown.values())
@@ -86,12 +84,17 @@ def test_trainings_decide_the_claims_on_networks_and_are_cited(call: Call, tmp_p
     """On trainings far too short, whose numbers the verdicts must follow."""
     data = yaml.safe_load(LEDGER.read_text())
     claims = [claim for claim in data["audit"]["claims"] if claim["evidence"] in ("table1", "selection")]
-    claims = [claim for claim in claims if "relu" not in claim["id"]]
+    claims = [claim | {"part_of": ""} for claim in claims if "relu" not in claim["id"]]
     (tmp_path / "claims.yaml").write_text(yaml.safe_dump({"audit": {"claims": claims}}))
     form = "hidden: [4], epochs: 2"
     rows = "".join(
         f"    - {{name: {kind}-{name}, preset: t1-{name}, {form}{more}}}\n"
-        for kind, more in (("printed", ""), ("scaled", ", optimiser: adamw, standardise: true"))
+        for kind, more in (
+            ("raw-coupled", ""),
+            ("raw-decoupled", ", optimiser: adamw"),
+            ("scaled-coupled", ", standardise: true"),
+            ("scaled-decoupled", ", optimiser: adamw, standardise: true"),
+        )
         for name in ("sigmoid", "tanh")
     )
     (tmp_path / "rows.yaml").write_text(f"gen-data: {{samples: 40}}\ntrain:\n  seeds: 2\n  workers: 1\n  rows:\n{rows}")
@@ -105,19 +108,20 @@ def test_trainings_decide_the_claims_on_networks_and_are_cited(call: Call, tmp_p
     table = run.data("claims").set_index("claim")
     assert code == 0 and set(table["verdict"]) <= set(VERDICTS)
     assert json.loads((run.path / "evidence.json").read_text()) == {"table1": table1.id, "selection": selection.id}
-    found = table1.metrics["printed-tanh_median_train_loss"]
+    found = table1.metrics["raw-coupled-tanh_median_train_loss"]
     assert found["interval"] is None, "two seeds hold no median"
     loss = table.loc["T1-tanh-training-loss"]
     assert loss["low"] == loss["high"] == found["value"] and loss["shown_by"] == "table1"
     assert loss["verdict"] == "not specified enough" and "on what scale" in loss["reason"]
     ratio = table.loc["T1-tanh-validation-below-training"]
-    assert ratio["verdict"] == of_sample(0.409, float(str(ratio["low"])), None).verdict
+    beside = of_sample(Ends(0.3778, 0.4419), float(str(ratio["low"])), None).verdict
+    assert ratio["verdict"] == "not specified enough" and beside.replace("reproduced", "holds") in ratio["reason"]
     depth = selection.metrics["c15_chosen_depth"]["value"]
-    assert table.loc["C15-trade-off", "verdict"] == ("reproduced" if depth == 3 else "worse than the paper")
-    assert table.loc["C16-printed", "verdict"] == "worse than the paper", "two seeds cannot support it"
+    assert table.loc["C15-trade-off", "verdict"] == ("reproduced" if depth == 3 else "does not hold")
+    assert table.loc["C16-raw-coupled", "verdict"] == "does not hold", "two seeds cannot support it"
 
     code, _, err = call("audit", "claims.yaml", "--table1", selection.id)
-    assert code == 2 and "needs the metric 'printed-sigmoid_median_gradient_norm'" in err and "table1.yaml" in err
+    assert code == 2 and "needs the metric 'raw-coupled-sigmoid_median_gradient_norm'" in err and "table1.yaml" in err
 
     (tmp_path / "claims.yaml").unlink()
     (tmp_path / "elsewhere").mkdir()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -36,6 +37,30 @@ def test_the_identified_wrist_is_written_for_each_program(call: Call, identified
     assert code == 0 and out.strip() == "wrist_chain.m", err
     text = Path("wrist_chain.m").read_text()
     assert "stiffness = 4.0;" in text and "alike = 2;" in text and re.search(f"run {identified.id} identified", text)
+
+
+@pytest.mark.parametrize(("program", "file"), [("matlab", "wrist_chain.m"), ("mujoco", "wrist.xml")])
+@pytest.mark.parametrize("name", ["x\n!touch PWN\n%", "a---><x/><!--", "b\x1b[2J\r%{"])
+def test_a_folders_name_stays_within_its_comment(
+    call: Call, tmp_path: Path, program: str, file: str, name: str
+) -> None:  # fmt: skip
+    with start_run("simulate", load_study([]), "", tmp_path / "results") as live:
+        pass
+    honest, odd = Run(live.path), tmp_path / name.replace("/", ":")
+    assert call("export-model", str(honest.path), "--to", program)[0] == 0
+    plain = Path(file).read_text().splitlines()
+    Path(file).unlink()
+    shutil.copytree(honest.path, odd)
+    with pytest.MonkeyPatch.context() as lenient:  # a copied folder is refused, as it is not the run's: see past that
+        lenient.setattr("wristctl.records.run.faults_of_manifest", lambda *given: [])
+        assert call("export-model", str(odd), "--to", program)[0] == 0
+    text = Path(file).read_text()
+    changed = [line for line in text.splitlines() if line not in plain]
+    assert len(text.splitlines()) == len(plain) and len(changed) == 1 and text.replace("\n", "").isprintable()
+    if program == "matlab":
+        assert changed[0].startswith("%   the wrist of run ")
+    else:
+        ElementTree.fromstring(text)
 
 
 def test_a_run_that_took_over_an_identification_gives_that_wrist(call: Call, identified: Run) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -34,6 +35,7 @@ def again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., list
         called: list[list[str]] = []
 
         def run(command: list[str], **given: Any) -> SimpleNamespace:
+            assert given.pop("env") == {**os.environ, "WRISTCTL_NO_HARDWARE": "yes"}
             assert given == {"stdout": subprocess.DEVNULL, "preexec_fn": end_with_parent}
             called.append(command)
             if value is not None:
@@ -59,6 +61,19 @@ def test_the_command_is_called_with_its_configuration_inputs_and_changes(call: C
         "--out", str(scratch),
         "--set", f'train.data="{data.path}"', "--set", "epochs=3", "--label", "replay",
     ]  # fmt: skip
+
+
+def test_inputs_are_named_where_the_command_finds_them(call: Call, again: Any) -> None:
+    """Several by one leaf, and those of a command that works on another's section."""
+    tuned, rigs = _made("tune"), [_made("hw-run"), _made("hw-run")]
+    many = _made("identify", inputs=tuple(InputRun(f"runs[{at}]", run) for at, run in enumerate(rigs)))
+    looped = _made("analyse", inputs=(InputRun("tuned", tuned),))
+    called = again()
+    for run in (many, looped):
+        call("runs", "replay", run.id)
+    named = [command[command.index("--set") + 1] for command in called]
+    paths = json.dumps([str(run.path) for run in rigs])
+    assert named == [f"identify.runs={paths}", f'simulate.tuned="{tuned.path}"']
 
 
 def test_the_same_files_are_identical_and_nothing_is_kept(call: Call, again: Any) -> None:
@@ -131,6 +146,6 @@ def test_a_repetition_never_moves_real_motors(call: Call, again: Any, kind: str)
     code, _, err = call("runs", "replay", live.path.name)
     assert code == 3 and "never moves real motors" in err and "wristctl runs report" in err and not called
     emulated = _made(kind)
-    for port in ("port=/dev/ttyACM0", f"{kind}.port = /dev/ttyACM0"):
+    for port in ("port=/dev/ttyACM0", f"{kind}.port=/dev/ttyACM0", f"{kind}={{port: /dev/ttyACM0}}"):
         code, _, err = call("runs", "replay", emulated.id, "--set", port)
         assert code == 3 and "never moves real motors" in err and not called

@@ -84,10 +84,12 @@ def test_lineage_is_a_tree_and_its_users_as_lines_or_as_an_object(call: Call, da
 
 def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run, network: Run) -> None:
     with start_run("tune", Study(), "c") as live:
-        out = f"{data.id}  as sealed\n{network.id}  as sealed\n{live.id}  as sealed\n"
-        assert sorted(call("runs", "verify")[1].splitlines()) == sorted(out.splitlines()), (
-            "one that goes on is not wrong"
-        )
+        out = f"{data.id}  as sealed\n{network.id}  as sealed\n{live.id}  is running\n"
+        code, said, _ = call("runs", "verify")
+        assert code == 0 and sorted(said.splitlines()) == sorted(out.splitlines()), "one that goes on is not wrong"
+        told = json.loads(call("runs", "verify", "--json")[1])["runs"]
+        assert told[data.id] == [] and told[live.id], "nor is it as sealed"
+        assert call("runs", "verify", live.id, "--signed")[0] == 3
     (data.path / "data" / "x.txt").write_text("five")
     (network.path / "SHA256SUMS").unlink()
     code, out, err = call("runs", "verify", data.id, network.id)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from wristctl.report.latex import latex_table
 from wristctl.report.printed_table import Table
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
@@ -31,6 +32,16 @@ def test_a_narrow_terminal_gets_the_columns_below_each_other() -> None:
 
 def test_counts_are_whole_whatever_library_made_them() -> None:
     assert Table("", ("n", "ok"), [(np.int64(123456), np.True_)]).text().splitlines()[-1] == "123456  yes"
+
+
+def test_no_text_in_a_table_forges_a_line_or_moves_a_cursor() -> None:
+    odd = "a\x1b]0;b\x07\nforged  ok\u2028\x85c\u202e"
+    table = Table(odd, (odd, "n"), [(odd, 1.0), (None, 2.0)])
+    for text, lines in (
+        (table.text(), 6),
+        (latex_table(table), latex_table(Table("a", ("a", "n"), table.rows)).count("\n") + 1),
+    ):
+        assert len(text.splitlines()) == lines and all(each.isprintable() for each in text.splitlines()), text
 
 
 def test_a_table_without_rows_shows_its_columns() -> None:

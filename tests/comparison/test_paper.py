@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.comparison.paper import EXPERIMENT, T1, T2, verdict
+from wristctl.comparison.paper import EXPERIMENT, T1, T2, rounded, verdict
 from wristctl.config.load import load_study
 
 LEDGER = Path(__file__).parents[2] / "experiments" / "claims.yaml"
@@ -31,13 +31,15 @@ def test_the_tables_print_what_the_ledger_claims() -> None:
 
 @pytest.mark.parametrize("name", T2)
 def test_within_a_factor_of_one_and_a_half_counts_as_reproduced(name: str) -> None:
+    """From the ends of what the printed digits may stand for."""
     rmse, settling, steady_state = T2[name]
     at = {"reproduced": 1.5 * (1.0 - HAIR), "not reproduced": 1.5 * (1.0 + HAIR)}
     for said, factor in at.items():
-        for near in (factor, 1.0 / factor):
-            assert verdict(name, near * rmse, settling, steady_state) == said
-            assert verdict(name, rmse, near * settling, steady_state) == said
-        assert verdict(name, rmse, settling, factor * steady_state) == said
+        for near in (rounded(rmse).high * factor, rounded(rmse).low / factor):
+            assert verdict(name, near, settling, steady_state) == said
+        for near in (rounded(settling).high * factor, rounded(settling).low / factor):
+            assert verdict(name, rmse, near, steady_state) == said
+        assert verdict(name, rmse, settling, factor * rounded(steady_state).high) == said
     assert verdict(name, rmse, settling, 0.0) == "reproduced", "a smaller steady-state error is as good"
 
 
@@ -48,3 +50,20 @@ def test_what_diverges_or_never_settles_is_not_reproduced_and_strangers_have_no_
         assert verdict("smc", rmse, never, steady_state) == "not reproduced"
         assert verdict("smc", rmse, settling, never) == "not reproduced"
     assert verdict("feedforward", rmse, settling, steady_state) == ""
+
+
+@pytest.mark.parametrize(
+    ("printed", "low", "high"),
+    [
+        (2.7e-4, 2.65e-4, 2.75e-4),
+        (2.31e-4, 2.305e-4, 2.315e-4),
+        (1.3e-3, 1.25e-3, 1.35e-3),
+        (3.0, 2.5, 3.5),
+        (3.18, 3.175, 3.185),
+        (1e4, 9999.5, 10000.5),
+        (99.7, 99.65, 99.75),
+        (1e-10, 0.5e-10, 1.5e-10),
+    ],
+)
+def test_a_printed_number_may_be_half_a_unit_of_its_last_digit_off(printed: float, low: float, high: float) -> None:
+    assert rounded(printed) == (low, high)

@@ -9,12 +9,15 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from wristctl.comparison.paper import Ends
 from wristctl.comparison.statistics import spread
-from wristctl.comparison.verdicts import of_numbers, of_ordering, of_sample, of_settling
+from wristctl.comparison.verdicts import joint, of_numbers, of_ordering, of_sample, of_settling
+from wristctl.config.audit import VerdictName
 
 HAIR = 1e-9
 NEVER = math.nan
 OPEN, BETTER, WORSE = "not specified enough", "better than the paper", "worse than the paper"
+FAILS = "does not hold"
 
 
 @pytest.mark.parametrize(
@@ -66,13 +69,13 @@ def test_a_range_holds_finite_numbers_only() -> None:
 
 def test_bounds_hold_at_their_value_and_not_a_hair_beyond() -> None:
     assert of_numbers(1e-6, [1e-6, 0.0], "at most").verdict == "reproduced"
-    assert of_numbers(1e-6, [1e-6 * (1 + HAIR)], "at most").verdict == WORSE
+    assert of_numbers(1e-6, [1e-6 * (1 + HAIR)], "at most").verdict == FAILS
     assert of_numbers(1e-6, [1e-6, 2e-6], "at most").verdict == OPEN
     assert of_numbers(1e-6, [0.0, NEVER], "at most").verdict == OPEN
     assert of_numbers(1.0, [1.0], "at least").verdict == "reproduced"
-    assert of_numbers(1.0, [1.0 - HAIR], "at least").verdict == WORSE
+    assert of_numbers(1.0, [1.0 - HAIR], "at least").verdict == FAILS
     assert of_numbers(3.0, [3.0], "exactly").verdict == "reproduced"
-    assert of_numbers(3.0, [4.0], "exactly").verdict == WORSE
+    assert of_numbers(3.0, [4.0], "exactly").verdict == FAILS
 
 
 def test_a_perfect_follower_of_any_motion_reproduces_no_settling_time() -> None:
@@ -98,14 +101,14 @@ def test_after_a_step_settling_times_compare_as_any_number() -> None:
         ([1.0, 1.0], [2.0, 9.0], "reproduced"),
         ([1.0, 1.0], [2.0, 1.05 * (1 + HAIR)], "reproduced"),
         ([1.0, 1.0], [2.0, 1.05 * (1 - HAIR)], OPEN),
-        ([2.0, 9.0], [1.0, 1.0], WORSE),
+        ([2.0, 9.0], [1.0, 1.0], FAILS),
         ([1.0, 2.0], [2.0, 1.0], OPEN),
         ([1.0, 1.0], [1.0, 1.0], OPEN),
         ([0.0], [0.0], OPEN),
         ([0.0], [1.0], "reproduced"),
-        ([1.0], [0.0], WORSE),
+        ([1.0], [0.0], FAILS),
         ([1.0], [NEVER], "reproduced"),
-        ([NEVER], [1.0], WORSE),
+        ([NEVER], [1.0], FAILS),
         ([NEVER], [NEVER], OPEN),
     ],
 )
@@ -141,8 +144,45 @@ def test_seeds_that_disagree_decide_nothing() -> None:
 
 
 def test_a_fit_of_two_thirds_is_not_nearly_one() -> None:
-    assert of_sample(0.95, 0.68, (0.6, 0.8), "at least").verdict == WORSE
+    assert of_sample(0.95, 0.68, (0.6, 0.8), "at least").verdict == FAILS
     assert of_sample(0.95, 0.97, (0.95, 1.0), "at least").verdict == "reproduced"
     assert of_sample(0.95, 0.97, (0.95 * (1 - HAIR), 1.0), "at least").verdict == "open"
     assert of_sample(3.0, 3.0, None, "exactly").verdict == "reproduced"
-    assert of_sample(3.0, 4.0, None, "exactly").verdict == WORSE
+    assert of_sample(3.0, 4.0, None, "exactly").verdict == FAILS
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "one"),
+    [
+        (["contradicted", WORSE, WORSE], "contradicted"),
+        ([FAILS, "contradicted"], "contradicted"),
+        ([FAILS, WORSE], FAILS),
+        ([WORSE, WORSE], WORSE),
+        (["reproduced", "reproduced"], "reproduced"),
+        (["reproduced", "contradicted"], OPEN),
+        (["reproduced", BETTER], OPEN),
+        (["contradicted", OPEN], OPEN),
+        (["open", FAILS], "open"),
+        (["open", "reproduced"], "open"),
+        (["open", "reproduced", FAILS], OPEN),
+        ([], None),
+    ],
+)
+def test_what_fails_everywhere_is_one_verdict_and_else_what_differs_decides(
+    verdicts: list[VerdictName], one: str | None
+) -> None:
+    assert joint(verdicts) == one == joint(verdicts[::-1])
+
+
+def test_no_verdict_turns_on_the_rounding_of_a_printed_number() -> None:
+    printed = Ends(1.15, 1.25)  # 1.2
+    for ours, verdict in ((1.875, "reproduced"), (1.875 * (1 + HAIR), WORSE), (1.15 / 1.5 * (1 - HAIR), BETTER)):
+        assert of_numbers(printed, [ours]).verdict == verdict == of_sample(printed, ours, None).verdict
+    assert of_settling(printed, [1.875], [0.0]).verdict == "reproduced"
+    for ours, verdict in ((1.15, "reproduced"), (1.2, OPEN), (1.25, OPEN), (1.25 * (1 + HAIR), FAILS), (NEVER, FAILS)):
+        found = of_numbers(printed, [ours], "at most")
+        assert found.verdict == verdict and ("rounding" in found.reason) == (verdict == OPEN)
+    for ours, verdict in ((1.25, "reproduced"), (1.2, OPEN), (1.15 * (1 - HAIR), FAILS)):
+        assert of_numbers(printed, [ours], "at least").verdict == verdict
+    assert of_sample(printed, 1.2, (1.16, 1.24), "at most").verdict == "open"
+    assert of_numbers(printed, [1.0, 2.0], "at most").reason == "holds on some motions only"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -147,3 +148,11 @@ def test_studies_that_call_the_closed_form_exact_still_read() -> None:
     assert study.compare.inverses == ("network", "closed-form") and study.simulate.reference.inverse == "closed-form"
     with pytest.raises(UserError, match="closed-form"):
         load_study([], ["compare.inverses=[closed-from]"])
+
+
+@pytest.mark.parametrize("name", ["../../evil", "a/b", ".hidden", "", "x" * 61, "a\n", "a\0b"])
+def test_a_family_whose_name_is_none_for_a_file_is_refused_before_any_work(name: str) -> None:
+    with pytest.raises(UserError, match="is no name for a family") as caught:
+        load_study([], [f"families={json.dumps({name: {}})}"])
+    assert caught.value.exit_code == 2 and "families" in caught.value.where
+    assert list(load_study([], ['families={"my rig-2.5": {}}']).families) == ["my rig-2.5"]

@@ -9,10 +9,12 @@ import osqp
 import pytest
 from scipy import sparse
 
+from tests.control.test_laws import inertia_and_load, torque
 from wristctl.config.wrist import WristParameters
+from wristctl.control.disturbance_observer import VALUES
 from wristctl.control.law import NOW, now_of, signals_of
 from wristctl.control.model import one_segment_terms
-from wristctl.control.mpc import HORIZON, TURNS, plan
+from wristctl.control.mpc import HORIZON, MPC, TURNS, plan
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import reach
@@ -112,3 +114,19 @@ def test_an_unconstrained_plan_is_the_linear_law(zeta: float) -> None:
     now[NOW.index("period")] = 1e-5
     given = Problem(now, np.array([0.1, -0.3, 50.0, zeta, -1e9, 1e9]), 1.0)
     assert planned(given, 2000) == pytest.approx(-2.0 * zeta * 50.0 * -0.3 - 50.0**2 * 0.1, rel=2e-3)
+
+
+@pytest.mark.parametrize("load", [-0.3, 0.0, 0.3])
+@pytest.mark.parametrize("theta", [-0.5, 0.5])
+def test_a_law_that_wants_all_gets_what_tendons_reach_whatever_load_it_makes_out(theta: float, load: float) -> None:
+    """M v + load of the model - d, at either end of the box of v, is the end of what tendons reach."""
+    rate, ends = -0.4, {"torque_low": -0.9, "torque_high": 0.7}
+    inertia, modelled = inertia_and_load(theta, rate)
+    memory = np.zeros(MPC.memory)
+    memory[:VALUES] = load, inertia * rate, 1.0  # the momentum is what that load makes it
+    wanted = torque("mpc", (100.0, 1.0, 50.0), memory, theta=theta, rate=rate, period=5e-3, **ends)
+    assert memory[0] == pytest.approx(load, abs=1e-12)
+    assert wanted == pytest.approx(ends["torque_low" if theta > 0.0 else "torque_high"], rel=1e-9)
+    v = (wanted - modelled + load) / inertia
+    least, most = ((ends[each] - modelled + load) / inertia for each in ("torque_low", "torque_high"))
+    assert least * (1.0 + 1e-9) <= v <= most * (1.0 + 1e-9) and abs(v) < 100.0**2 * abs(theta)

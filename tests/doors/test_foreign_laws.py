@@ -18,7 +18,9 @@ from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.control.vetting import call_law
+from wristctl.interrupt import interrupts
 from wristctl.lanes.frozen_values import frozen_values
+from wristctl.records import list_runs
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.studies.adopted import adopt, adopted, adoption, sources_in
@@ -328,3 +330,44 @@ def test_a_runs_configuration_holds_every_setting_of_its_laws(tmp_path: Path) ->
     assert done.run is not None
     text = (done.run.path / "config.yaml").read_text()
     assert re.search(r"^laws:.*\n  springy:\n    spring: 2.0", text, re.MULTILINE)
+
+
+ENDINGS = ("SystemExit", "GeneratorExit", "KeyboardInterrupt", "type('Odd', (BaseException,), {})")
+
+
+@pytest.mark.parametrize("raised", ENDINGS)
+def test_a_file_that_will_not_be_imported_is_named_whatever_it_raises(stranger: Path, raised: str) -> None:
+    (stranger / "strange.py").write_text(f"raise {raised}\n{LAW}")
+    with pytest.raises(UserError, match=r"strange\.py cannot be loaded") as caught, interrupts():
+        named(stranger, "strange.py:STRANGE")
+    assert caught.value.where == f"{stranger}/strange.py:1"
+
+
+@pytest.mark.parametrize("where", ["__init__", "propose", "learn"])
+def test_what_an_optimiser_from_elsewhere_raises_is_said_of_it(tmp_path: Path, where: str) -> None:
+    text = (Path(face.__file__).parent / "cli/templates/optimiser.py.txt").read_text()
+    text = text.replace("@name@", "mine").replace("@OBJECT@", "Mine").replace("@Title@", "Mine")
+    parts = {"__init__": "(self, *given)", "propose": "(self)", "learn": "(self, values)"}
+    ends = f"    def {where}{parts[where]}:\n        raise SystemExit(0)\n"
+    (tmp_path / "mine.py").write_text(f"{text}\n\nclass Ends(Mine):\n    name = 'ends'\n\n{ends}")
+    (tmp_path / "study.yaml").write_text(
+        "tune: {controllers: [pid], optimiser: mine.py:Ends, candidates: 2, iterations: 2, horizon: 0.1, finalists: 1, "
+        "loops: {fast: {plant_segments: 1}}, scenarios: [{loop: fast, reference: {kind: step, angle_deg: 20}}]}"
+    )
+    with pytest.raises(UserError, match="the optimiser ends failed: SystemExit: 0") as caught:
+        face.tune(face.load_study(tmp_path / "study.yaml"), out=tmp_path / "results")
+    assert caught.value.where.startswith(f"{tmp_path}/mine.py:")
+    states = [(run.state, run.manifest.exit_code) for run in list_runs(tmp_path / "results")]
+    assert states == ([] if where == "__init__" else [("failed", 2)]), "one that cannot be made is known before"
+
+
+def test_a_law_that_ends_the_program_ends_its_run_as_failed_with_its_name(stranger: Path) -> None:
+    law = "def law(now, wrist, gains, memory):\n    exit() if abs(now.theta) < 1e-9 else None\n    return 0.0\n"
+    more = "ENDS = Controller('ends', law, 'a stranger', GAINS, PRESETS, plain=True)\n"
+    (stranger / "strange.py").write_text(f"{LAW}\n{law}\n{more}")
+    given = ("--controller", "strange.py:ENDS", "--gains", "default", "--set", "horizon=0.1")
+    done = wristctl(stranger, "simulate", *given)
+    assert done.returncode == 2 and "ends(py) failed: SystemExit" in done.stderr and "Traceback" not in done.stderr
+    assert f"{stranger}/strange.py:" in done.stderr
+    (run,) = list_runs(stranger / "results")
+    assert run.state == "failed" and run.manifest.error is not None and run.manifest.error.what.startswith("ends(py)")

@@ -49,9 +49,16 @@ tune:
 
 def test_new_writes_over_nothing_and_takes_no_name_that_is_taken(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("mine")
-    for name, told in (("mine", "there is such a file already"), ("pid", "already"), ("My Law", "is no name")):
+    for name, told in (
+        ("mine", "there is such a file already"),
+        ("pid", "already"),
+        ("My Law", "is no name"),
+        ("class", "Python"),
+    ):
         done = wristctl(tmp_path, "new", "controller", name)
         assert done.returncode == 2 and told in done.stderr
+    done = wristctl(tmp_path, "new", "reference", "import")
+    assert done.returncode == 2 and "Python" in done.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["mine.py"] and (tmp_path / "mine.py").read_text() == "mine"
 
 

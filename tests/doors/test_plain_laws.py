@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from wristctl.control.computed_torque import COMPUTED_TORQUE
 from wristctl.control.law import Controller, Gain
 from wristctl.control.plain_model import plain_one_segment
 from wristctl.control.table import CONTROLLERS
+from wristctl.interrupt import from_outside, interrupts
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -130,6 +132,39 @@ def test_what_it_raises_ends_the_rollout_there() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         run(plain(interrupted), np.zeros((1, 0)))
+
+
+class Odd(BaseException):
+    """As a library may have one."""
+
+
+@pytest.mark.parametrize(
+    "raised", [SystemExit, SystemExit("bye"), GeneratorExit, KeyboardInterrupt, Odd("x")], ids=repr
+)
+def test_whatever_it_raises_is_the_laws_and_only_ctrl_c_the_users(raised: BaseException) -> None:
+    def ends(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        raise raised
+
+    name = (raised if isinstance(raised, type) else type(raised)).__name__
+    with pytest.raises(UserError, match=f"plainly.py. failed: {name}") as caught, interrupts():
+        run(plain(ends), np.zeros((1, 0)))
+    assert "test_plain_laws.py" in caught.value.where
+
+    def pressed(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        signal.raise_signal(signal.SIGINT)
+        return 0.0
+
+    with pytest.raises(KeyboardInterrupt), interrupts():
+        run(plain(pressed), np.zeros((1, 0)))
+
+
+def test_in_a_worker_that_leaves_ctrl_c_to_its_parent_no_interrupt_is_the_users() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert not from_outside(KeyboardInterrupt())
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert from_outside(KeyboardInterrupt()) and not from_outside(SystemExit())
 
 
 def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:

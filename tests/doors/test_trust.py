@@ -83,6 +83,10 @@ def test_a_run_replays_identically_from_its_copy_once_it_is_trusted(stranger: Pa
     done = wristctl(stranger, "runs", "replay", run.id, "--trust-code")
     assert done.returncode == 0 and f"{run.id}: identical" in done.stdout, done.stderr
     assert run.manifest.code.foreign["code/strange/helper.py"] in done.stderr
+    for drawn in (("figures", run.id, "--format", "svg"), ("report", run.id, "--all-figures")):
+        done = wristctl(stranger, "runs", *drawn, "--trust-code")
+        assert done.returncode == 0, done.stderr
+    assert list((stranger / "results").glob("figures-*/*.svg"))
 
 
 def test_on_a_terminal_a_person_is_shown_files_and_hashes_and_asked(stranger: Path) -> None:

@@ -21,6 +21,7 @@ from wristctl.identification.intervals import (
     long_run,
 )
 from wristctl.identification.rehearsal import spools
+from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.wrist.statics import equilibrium
@@ -32,7 +33,7 @@ def test_the_forward_model_repeats_the_closed_loop_from_its_spools() -> None:
     followed = motion(reference, UPRIGHT, 1.0, 1e-3)
     loop, law = Loop(actuator=TENDONS), controller("feedforward")
     done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, UPRIGHT, record=True, threads=1)
-    reeled = np.repeat(spools(UPRIGHT, reference, TENDONS, 1.0), 2, axis=1)
+    reeled = np.repeat(spools(UPRIGHT, reference, TENDONS, 1.0, motor_of(TENDONS)), 2, axis=1)
     found = angles([SupposedWrist(UPRIGHT, TENDONS)], reeled, 1e-3, 4)[0]
     assert np.abs(found).max() > 0.3
     np.testing.assert_allclose(found, done.column("theta", 0), rtol=0.0, atol=1e-12)

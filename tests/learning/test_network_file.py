@@ -141,6 +141,14 @@ def test_weights_that_are_not_finite_are_the_users_error(network: Network, tmp_p
     rejected(path, "1.weight holds numbers that are not finite")
 
 
+@pytest.mark.parametrize(("name", "size"), [("BF16", 2), ("F8_E4M3", 1), ("Q99", 8)])
+def test_an_array_of_a_type_that_numpy_has_not_is_the_users_error(tmp_path: Path, name: str, size: int) -> None:
+    header = json.dumps({"0.weight": {"dtype": name, "shape": [1], "data_offsets": [0, size]}}).encode()
+    file = tmp_path / "network.safetensors"
+    file.write_bytes(len(header).to_bytes(8, "little") + header + bytes(size))
+    rejected(file, "not a readable safetensors file")
+
+
 @pytest.mark.parametrize("change", ["missing", "single"])
 def test_missing_or_single_precision_array_is_the_users_error(file: Path, change: str) -> None:
     tensors, told = load_file(file), header(file)

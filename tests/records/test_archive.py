@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import os
 import stat
+import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.config.system_errors import fix_of, fix_to_read
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.archive import PACK, SCHEMA, pack, unpack
+from wristctl.records.leftovers import clear, leftovers
+from wristctl.records.lock import LOCK, delete_folder
 
 Make = Callable[..., Run]
 Entries = dict[str, bytes]
+ID = "20250101T000000Z-tune-abc"
 
 
 @pytest.fixture
@@ -112,7 +121,7 @@ def test_a_name_that_leads_elsewhere_is_refused_before_anything_is_written(
     with pytest.raises(UserError, match="a name that leads elsewhere") as caught:
         unpack(other, tmp_path / "colleague")
     assert caught.value.exit_code == 2
-    assert {path for path in tmp_path.rglob("*") if path not in before} == {tmp_path / "colleague"}
+    assert set(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize("mode", [stat.S_IFLNK | 0o777, stat.S_IFIFO | 0o644, stat.S_IFCHR | 0o644])
@@ -163,11 +172,15 @@ def test_another_run_of_the_same_id_is_not_written_over(packed: tuple[list[Run],
         (b"{", "is not valid JSON"),
         (b"[" * 100_000, "is not valid JSON"),
         (b'{"runs": ["a"]}', "names no runs"),
-        (json.dumps({"schema": "wristctl.pack/9", "run": "a", "runs": ["a"]}).encode(), "by another wristctl"),
+        (json.dumps({"schema": "wristctl.pack/9", "run": ID, "runs": [ID]}).encode(), "by another wristctl"),
         (json.dumps({"schema": SCHEMA, "run": "..", "runs": [".."]}).encode(), "a name that is no run's id"),
         (json.dumps({"schema": SCHEMA, "run": "a/b", "runs": ["a/b"]}).encode(), "a name that is no run's id"),
         (json.dumps({"schema": SCHEMA, "run": 3, "runs": [3]}).encode(), "a name that is no run's id"),
-        (json.dumps({"schema": SCHEMA, "run": "a", "runs": ["a", "a"]}).encode(), "a name that is no run's id"),
+        *(
+            (json.dumps({"schema": SCHEMA, "run": name, "runs": [name]}).encode(), "a name that is no run's id")
+            for name in ("tags.json", "figures-x", "latest", "20259901T000000Z-tune-abc", "20250101T000000Z", ID + "/x")
+        ),
+        (json.dumps({"schema": SCHEMA, "run": ID, "runs": [ID, ID]}).encode(), "a name that is no run's id"),
     ],
 )
 def test_what_is_no_archive_of_runs_is_said(told: bytes | None, what: str, tmp_path: Path) -> None:
@@ -188,8 +201,158 @@ def test_no_zip_a_broken_one_and_one_that_swells_are_refused(packed: tuple[list[
         with pytest.raises(UserError, match="no archive of runs"):
             unpack(tmp_path / name, tmp_path / "colleague")
     with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(PACK, json.dumps({"schema": SCHEMA, "run": "a", "runs": ["a"]}))
-        archive.writestr("a/zeros", bytes(50_000_000))
+        archive.writestr(PACK, json.dumps({"schema": SCHEMA, "run": ID, "runs": [ID]}))
+        archive.writestr(f"{ID}/zeros", bytes(50_000_000))
     with pytest.raises(UserError, match="far more than its size"):
         unpack(tmp_path / "bomb.zip", tmp_path / "colleague")
+    assert not (tmp_path / "colleague").exists()
+
+
+@pytest.mark.parametrize("faulty", [0, 2], ids=["an ancestor's copy", "its own copy"])
+def test_a_run_that_is_here_already_is_checked(packed: tuple[list[Run], Path], tmp_path: Path, faulty: int) -> None:
+    chain, file = packed
+    here = unpack(file, tmp_path / "colleague")
+    damaged = here.new[faulty].path / "metrics.json"
+    damaged.write_text(damaged.read_text().replace("0", "1"))
+    with pytest.raises(UserError) as caught:
+        unpack(file, tmp_path / "colleague")
+    assert caught.value.exit_code == 3 and str(damaged) in str(caught.value)
+    assert sorted(os.listdir(tmp_path / "colleague")) == sorted(each.id for each in chain)
+
+
+def test_a_signed_archive_signs_the_copy_that_is_here_and_replaces_no_signature(
+    packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    chain, file = packed
+    first, signed = unpack(file, tmp_path / "colleague").new, "SHA256SUMS.sig"
+    (first[1].path / signed).write_bytes(b"ours")
+    for run in chain[1:]:
+        (run.path / signed).write_bytes(b"theirs")
+    pack(chain[-1], tmp_path / "signed.zip")
+    again = unpack(tmp_path / "signed.zip", tmp_path / "colleague")
+    assert [each.id for each in again.signed] == [chain[2].id]
+    assert (first[1].path / signed).read_bytes() == b"ours" and (first[2].path / signed).read_bytes() == b"theirs"
+    assert not (first[0].path / signed).exists() and all(each.problems() == [] for each in first)
+
+
+def test_an_archive_of_too_many_files_is_neither_written_nor_begun(
+    packed: tuple[list[Run], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chain, file = packed
+    with zipfile.ZipFile(file) as archive:
+        count = len(archive.namelist())
+    monkeypatch.setattr("wristctl.records.archive.MOST_FILES", count)
+    assert unpack(file, tmp_path / "first").new and pack(chain[-1], tmp_path / "same.zip")
+    monkeypatch.setattr("wristctl.records.archive.MOST_FILES", count - 1)
+    with pytest.raises(UserError, match=f"{count - 1}"):
+        unpack(file, tmp_path / "second")
+    with pytest.raises(UserError, match=f"{count - 1}"):
+        pack(chain[-1], tmp_path / "other.zip")
+    assert not (tmp_path / "second").exists() and not (tmp_path / "other.zip").exists()
+
+
+def test_gc_leaves_a_running_unpack_alone_and_clears_away_a_killed_one(
+    packed: tuple[list[Run], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results, seen = tmp_path / "colleague", []
+
+    def hashed(run: Run) -> list[tuple[str, str]]:
+        seen.append(list(leftovers(results)))
+        return []
+
+    monkeypatch.setattr(Run, "problems", hashed)
+    assert len(unpack(packed[1], results).new) == 3
+    assert seen == [[], [], []] and not list(results.glob(".*"))
+    killed = results / ".unpack-abc.part"
+    killed.mkdir()
+    (killed / LOCK).touch()
+    (found,) = leftovers(results)
+    clear(found)
+    assert not killed.exists()
+
+
+def test_a_scratch_folder_that_gc_took_away_while_it_was_empty_is_made_again(
+    packed: tuple[list[Run], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def taken_away(**options: Any) -> str:
+        made.append(tempfile.mkdtemp(**options))
+        if len(made) == 1:
+            delete_folder(Path(made[0]))
+        return made[-1]
+
+    monkeypatch.setattr("wristctl.records.archive.tempfile", SimpleNamespace(mkdtemp=taken_away))
+    assert len(unpack(packed[1], tmp_path / "colleague").new) == 3 and len(made) == 2
+
+
+def broken_piece(content: bytes) -> bytes:
+    """Of an archive whose largest entry is no deflated data any more."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        largest = max(archive.infolist(), key=lambda each: each.compress_size)
+    begin = largest.header_offset + 30 + len(largest.filename)
+    return content[:begin] + bytes([0xFF]) * 8 + content[begin + 8 :]
+
+
+def test_damaged_data_and_entries_that_cannot_stand_side_by_side_are_refused_in_words(
+    packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    chain, file = packed
+    (tmp_path / "damaged.zip").write_bytes(broken_piece(file.read_bytes()))
+    with pytest.raises(UserError, match="no archive of runs"):
+        unpack(tmp_path / "damaged.zip", tmp_path / "colleague")
+    for name, what in {"run.json/x": "a file and a folder", "x" * 1001: "a name of more than"}.items():
+        more = {f"{chain[0].id}/{name}": b""}
+        other = rewritten(file, more.__ror__)
+        with pytest.raises(UserError, match=what):
+            unpack(other, tmp_path / "colleague")
     assert os.listdir(tmp_path / "colleague") == []
+
+
+def test_what_is_no_file_is_refused_at_once_and_a_file_for_a_folder_in_words(
+    packed: tuple[list[Run], Path], tmp_path: Path
+) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    for odd in (Path("/dev/zero"), tmp_path / "fifo", tmp_path):
+        with pytest.raises(UserError, match="no plain file"):
+            unpack(odd, tmp_path / "colleague")
+    (tmp_path / "file").write_text("mine")
+    for results, number in {tmp_path / "file": errno.EEXIST, tmp_path / "file/x": errno.ENOTDIR}.items():
+        with pytest.raises(UserError, match=os.strerror(number)) as caught:
+            unpack(packed[1], results)
+        assert (
+            caught.value.fix == UserError("", "", fix_of(OSError(number, ""))).fix
+            and str(results) in caught.value.where
+        )
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+NUMBERS = (errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ENOSPC, errno.EACCES, errno.EROFS)
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=errno.errorcode.get)
+@pytest.mark.parametrize("operation", ["open", "mkdir", "rename"])
+def test_what_the_system_refuses_while_unpacking_is_said_of_the_results_folder(
+    packed: tuple[list[Run], Path], tmp_path: Path, number: int, operation: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = tmp_path / "colleague"
+    results.mkdir()
+    original = getattr(Path, operation)
+
+    def refused(path: Path, *args: Any, **options: Any) -> Any:
+        if ".unpack-" in str(path) and (operation != "open" or args[:1] == ("xb",)):
+            raise OSError(number, os.strerror(number), str(path))
+        return original(path, *args, **options)
+
+    monkeypatch.setattr(Path, operation, refused)
+    with pytest.raises(UserError, match=f"cannot write: {os.strerror(number)}") as caught:
+        unpack(packed[1], results)
+    assert caught.value.fix == UserError("", "", fix_of(OSError(number, ""))).fix and str(results) in caught.value.where
+    assert os.listdir(results) == [], "all or none"
+
+
+def test_the_words_for_each_refusal_differ_and_none_of_a_missing_path_asks_an_owner() -> None:
+    fixes = [UserError("", "", fix_of(OSError(number, ""))).fix for number in NUMBERS]
+    assert len(set(fixes)) == len(NUMBERS) - 1, "no permission and read-only need the same"
+    to_read = {number: UserError("", "", fix_to_read(OSError(number, ""))).fix for number in NUMBERS}
+    assert [number for number, fix in to_read.items() if "owner" in fix] == [errno.EACCES]

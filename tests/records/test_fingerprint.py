@@ -15,9 +15,17 @@ from wristctl.records.files import sha256_of_list
 from wristctl.records.manifest import Code, Environment
 from wristctl.records.start import fingerprint
 
-CODE = Code(version="1", commit="c", branch="main", dirty=False, tree_sha256="t")
+CODE = Code(
+    version="1",
+    commit="c",
+    branch="main",
+    dirty=False,
+    tree_sha256="t",
+    foreign={"code/pd.py": "f", "code/gains.py": "h"},
+)
 ENVIRONMENT = Environment(
     python="3.11.7", os="Linux-6.1", machine="x86_64", cpu="cpu", cores=2, threads={"OMP_NUM_THREADS": "1"},
+    features=["avx2", "fma"], settings={"NUMBA_CPU_NAME": "generic"},
     packages={"numpy": "2.0", "scipy": "1.15"}, packages_sha256="p",
 )  # fmt: skip
 INPUTS = {"network": "n", "tuned": "g"}
@@ -41,6 +49,14 @@ def _fingerprint(
         {"environment": ENVIRONMENT.model_copy(update={"python": "3.12.0"})},
         {"environment": ENVIRONMENT.model_copy(update={"machine": "arm64"})},
         {"environment": ENVIRONMENT.model_copy(update={"cpu": "another"})},
+        {"environment": ENVIRONMENT.model_copy(update={"features": ["avx2"]})},
+        {"environment": ENVIRONMENT.model_copy(update={"features": []})},
+        {"environment": ENVIRONMENT.model_copy(update={"settings": {"NUMBA_CPU_NAME": "skylake"}})},
+        {"environment": ENVIRONMENT.model_copy(update={"settings": {"OPENBLAS_CORETYPE": "generic"}})},
+        {"environment": ENVIRONMENT.model_copy(update={"settings": {}})},
+        {"code": CODE.model_copy(update={"foreign": CODE.foreign | {"code/gains.py": "other"}})},
+        {"code": CODE.model_copy(update={"foreign": {"code/pd.py": "f"}})},
+        {"code": CODE.model_copy(update={"foreign": {}})},
         {"environment": ENVIRONMENT.model_copy(update={"threads": {"OMP_NUM_THREADS": "2"}})},
         {"environment": ENVIRONMENT.model_copy(update={"packages": {"numpy": "2.1", "scipy": "1.15"}})},
     ],

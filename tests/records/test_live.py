@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import logging
+import os
 import resource
 import shutil
 import sys
@@ -17,10 +19,10 @@ import pytest
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.records import Run, start_run, stream
-from wristctl.records.files import sha256_of_list
+from wristctl.records.files import sha256_of_list, write_text
 from wristctl.records.journal import jsonable
 from wristctl.records.lock import RunLock, is_locked
-from wristctl.records.manifest import Manifest
+from wristctl.records.manifest import Manifest, TakenOver
 
 
 def test_a_stream_is_the_seed_and_eight_bytes_of_the_names_hash() -> None:
@@ -155,3 +157,48 @@ def test_a_run_whose_folder_is_gone_listens_no_longer(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="removed, moved or replaced"), start_run("tune", Study(), out=tmp_path) as run:
         shutil.rmtree(run.path)
     assert not logging.getLogger("wristctl").handlers
+
+
+@pytest.mark.parametrize("odd", ["link to a file", "link to a folder", "dangling link", "fifo"])
+def test_a_run_with_anything_but_files_fails_and_says_so(results: Path, tmp_path: Path, odd: str) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere/x").write_text("x")
+    with pytest.raises(UserError) as caught, start_run("tune", Study(), "", results) as live:
+        live.metric("rmse", 1.0)
+        place = live.file("data/odd.bin")
+        if odd == "fifo":
+            os.mkfifo(place)
+        else:
+            names = {"link to a file": "elsewhere/x", "link to a folder": "elsewhere", "dangling link": "gone"}
+            place.symlink_to(tmp_path / names[odd])
+    assert caught.value.exit_code == 3 and caught.value.where == str(place)
+    run = Run(live.path)
+    assert run.state == "failed" and run.manifest.error is not None and run.manifest.error.where == str(place)
+    assert [each.path for each in run.manifest.outputs] == ["metrics.json"]
+    assert [name for name, _ in run.problems()] == ["data/odd.bin"], "and nothing else is wrong with it"
+
+
+def test_what_was_computed_elsewhere_stands_in_manifest_and_readme(results: Path) -> None:
+    with start_run("study", Study(), "", results) as live:
+        live.took_over("20260101T000000Z-study-1", 4, 1)
+        live.took_over("20260101T000000Z-study-1", 3, 1)
+    units = Run(live.path).manifest.units
+    assert units == TakenOver(run="20260101T000000Z-study-1", taken_over=7, computed_again=2)
+    (line,) = [each for each in (live.path / "README.md").read_text().splitlines() if each.startswith("7 units")]
+    assert "20260101T000000Z-study-1" in line and "2 more" in line
+
+
+def test_a_new_file_whose_folder_cannot_be_synced_is_absent_and_an_old_one_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(path: Path) -> None:
+        if path == tmp_path:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.write_text("before")
+    monkeypatch.setattr("wristctl.records.files.sync", refused)
+    for file in (old, new):
+        with pytest.raises(UserError, match="Input/output error"):
+            write_text(file, "after")
+    assert [each.name for each in tmp_path.iterdir()] == ["old"]

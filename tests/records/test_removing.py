@@ -5,15 +5,17 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.records import InputRun, Run, open_run, start_run
-from wristctl.records.leftovers import clear, leftovers, lost_repetitions, lost_tags
-from wristctl.records.lock import LOCK, RunLock
+from wristctl.records import InputRun, Run, open_run, start, start_run
+from wristctl.records.leftovers import Leftover, clear, leftovers, lost_repetitions, lost_tags
+from wristctl.records.lock import LOCK, RunLock, delete_folder
 from wristctl.records.query import entries
 from wristctl.records.remove import foreign, removable, remove
 from wristctl.records.tags import change_tags, read_tags
@@ -102,3 +104,87 @@ def test_the_scratch_folders_of_killed_replays_are_found_and_no_others(
     held.release()
     clear(next(lost_repetitions()))
     assert not killed.exists() and list(lost_repetitions()) == []
+
+
+def test_a_killed_signing_changes_nothing_and_is_cleared_away(make: Make, results: Path) -> None:
+    run = make()
+    left = run.path / ".SHA256SUMS.sig.part"
+    left.write_bytes(b"half a signature")
+    assert run.problems() == [] and foreign(run) == []
+    (found,) = leftovers(results)
+    clear(found)
+    assert not left.exists() and run.problems() == []
+    (run.path / "data" / left.name).write_bytes(b"elsewhere it is an added file")
+    assert [name for name, _ in run.problems()] == [f"data/{left.name}"] and not list(leftovers(results))
+
+
+def test_of_two_who_delete_a_folder_the_second_leaves_it_to_the_first(tmp_path: Path) -> None:
+    folder = tmp_path / ".run.removed"
+    (folder / "data").mkdir(parents=True)
+    held = RunLock(folder)
+    delete_folder(folder)
+    assert folder.is_dir() and list(leftovers(tmp_path)) == []
+    held.release()
+    clear(next(leftovers(tmp_path)))
+    assert not folder.exists()
+
+
+def test_a_run_begins_although_its_empty_folder_was_taken_away(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Path] = []
+    original = start._new_directory
+
+    def taken_away(*given: str) -> Path:
+        made.append(original(*given))  # type: ignore[arg-type]
+        if len(made) == 1:
+            clear(next(leftovers(results)))
+        return made[-1]
+
+    monkeypatch.setattr(start, "_new_directory", taken_away)
+    with start_run("tune", Study(), "", results) as run:
+        run.metric("rmse", 1.0)
+    assert len(made) == 2 and [each.state for each in entries(results)] == ["ok"]
+
+
+def test_many_who_delete_the_same_folders_are_in_nobodys_way(tmp_path: Path) -> None:
+    folders = [tmp_path / f".{number}.removed" for number in range(60)]
+    for folder in folders:
+        (folder / "data").mkdir(parents=True)
+        for name in ("run.json", "data/a.csv", "data/b.csv"):
+            (folder / name).write_text("x")
+
+    def clear_all(_: int) -> None:
+        for folder in folders:
+            delete_folder(folder)
+
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(clear_all, range(6)))
+    assert list(leftovers(tmp_path)) == []
+    for folder in folders:
+        delete_folder(folder)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_gc_takes_nothing_from_who_is_writing_tags_and_passes_over_what_is_gone_meanwhile(
+    make: Make, results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = make()
+    found: list[Leftover] = []
+
+    def written(path: Path, text: str) -> None:
+        part = path.with_name(f".{path.name}.part")
+        part.write_text(text)
+        found.extend(leftovers(results))
+        clearing.append(Thread(target=clear, args=(found[0],)))
+        clearing[0].start()
+        clearing[0].join(0.05)
+        part.rename(path)
+
+    clearing: list[Thread] = []
+    with monkeypatch.context() as patch:
+        patch.setattr("wristctl.records.tags.write_text", written)
+        assert change_tags(results, run.id, add=["x"]) == ["x"]
+    clearing[0].join()
+    assert [each.path.name for each in found] == [".tags.json.part"] and read_tags(results) == {run.id: ["x"]}
+    monkeypatch.setattr("wristctl.records.leftovers._size", lambda path: path.with_name("gone").stat().st_size)
+    (results / ".old.removed").mkdir()
+    assert list(leftovers(results)) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
 import zipfile
 from collections.abc import Callable
@@ -125,3 +126,18 @@ def test_a_table_is_the_same_however_many_lines_are_made_at_a_time(
     assert written == 4 * ["x,name\n0.1,a\n,b\n-1e+300,c\n3.0,d\n5e-324,e\n"]
     with pytest.raises(ValueError, match="zip"):
         write_table(tmp_path / "t.csv", {"x": np.ones(3), "y": np.ones(60)})
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "there"),
+    [("x.npy", (10**12,), 0), ("x.npy", (2**62, 2**62), 0), ("x.npy", (1000,), 80), ("x.txt", (10,), 80)],
+)
+def test_a_header_that_promises_more_than_there_is_costs_no_memory(
+    tmp_path: Path, name: str, shape: tuple[int, ...], there: int
+) -> None:
+    header, file = io.BytesIO(), tmp_path / "x.npz"
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr(name, header.getvalue() + bytes(there))
+    with pytest.raises(UserError, match="no file of arrays"):
+        read_arrays(file)

@@ -42,11 +42,11 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Run:
     clean = [text.replace("\x00", "").replace("\ud83d", "") for text in STRINGS]
     manifest = json.loads((live.path / "run.json").read_text())
     manifest.update(label=clean[0], argv=clean, error={"type": clean[3], "what": clean[4], "where": clean[5]})
-    manifest["inputs"][0].update(role=clean[7], kind=clean[8])
     manifest["numerics"] = {text: text for text in clean}
     manifest["environment"]["cpu"] = manifest["code"]["commit"] = clean[9]
     manifest["timing"]["started"] = clean[10]
-    manifest["outputs"] += [{"path": text, "sha256": text, "bytes": 1} for text in clean]
+    names = [text.replace("..", "").lstrip("/") for text in clean]
+    manifest["outputs"] += [{"path": name, "sha256": "0" * 64, "bytes": 1} for name in names]
     metrics = {text: {"value": 1.0, "unit": text, "better": text, "n": 1, "meaning": text} for text in clean}
     tables = [{"title": text, "columns": [text], "rows": [[text]]} for text in clean]
     for name, content in (("run.json", manifest), ("metrics.json", metrics), ("tables.json", tables)):
@@ -92,9 +92,17 @@ def test_a_script_that_is_not_the_pages_own_would_not_run(browser: Browser, fore
     assert browser.run("return window.PWNED || 0") == 0
 
 
+@pytest.mark.parametrize("many", [False, True], ids=["one run", "several runs"])
+def test_a_page_that_is_looked_at_in_a_terminal_moves_nothing(foreign: Run, many: bool) -> None:
+    text = several_page([foreign, foreign]) if many else page(foreign, foreign.manifest)
+    assert {each for each in text if not each.isprintable()} == {"\n"}
+
+
 VERBS = [
-    ["ls"], ["show", "RUN"], ["lineage", "RUN"], ["diff", "RUN", "DATA"], ["diff", "DATA", "RUN"], ["verify"],
-    ["replay", "RUN"], ["tag", "RUN", "a\x1bb"], ["rm", "\x1b[2J"], ["gc"], ["report", "\x1b[2J\n"],
+    ["ls"], ["ls", "--columns", "id,about,label,started"], ["show", "RUN"], ["table", "RUN"],
+    ["table", "RUN", "--latex"],
+    ["lineage", "RUN"], ["diff", "RUN", "DATA"], ["diff", "DATA", "RUN"], ["verify"], ["replay", "RUN"],
+    ["tag", "RUN", "a\x1bb"], ["rm", "\x1b[2J"], ["gc"], ["report", "\x1b[2J\n"],
 ]  # fmt: skip
 
 

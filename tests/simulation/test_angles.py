@@ -66,7 +66,7 @@ def test_a_course_of_its_own_may_be_left_for_later() -> None:
     """It is worked out where a batch asks for it, and its last move is from straight to where it ends."""
     asked: dict[str, object] = {"kind": "chirp", "angle_deg": 30.0}
     ahead = motion(Reference.model_validate(asked), WRIST, 1.0, 1e-3)
-    assert "rows" in vars(ahead.angles) and ahead.move == ahead.final == ahead.angles.rows[0, -1]
+    assert "rows" in vars(ahead.angles) and ahead.goals.move == ahead.final == ahead.angles.rows[0, -1]
     too_far = Reference.model_validate(asked | {"offset_deg": -25.0})
     with pytest.raises(UserError, match="bends by 5"):
         motion(too_far, WRIST, 1.0, 1e-3)

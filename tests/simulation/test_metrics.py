@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.values import LAST_MOVES, multi_step, one_move
+from wristctl.config.load import load_study
+from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import METRICS, metrics_of, of_trajectory, summed
+from wristctl.simulation.reference import motion
 from wristctl.simulation.trajectory import Trajectory
 
 PERIOD, HORIZON = 1e-4, 5.0
@@ -19,7 +23,7 @@ STILL = np.full((len(TIME), 2), 3.0)
 def test_first_order_response_has_its_closed_form_metrics() -> None:
     tau, final = 0.2, 0.5
     theta = final * (1 - np.exp(-TIME / tau))
-    found = metrics_of(PERIOD, theta, np.full_like(TIME, final), STILL, final, 0.0)
+    found = metrics_of(PERIOD, theta, np.full_like(TIME, final), STILL, one_move(final, 0.0, HORIZON))
     assert found["rmse"] == pytest.approx(final * math.sqrt(tau / 2 / HORIZON), rel=1e-3)
     assert found["settling"] == pytest.approx(tau * math.log(50), abs=2 * PERIOD)
     assert found["settling_5"] == pytest.approx(tau * math.log(20), abs=2 * PERIOD)
@@ -34,9 +38,9 @@ def test_settling_after_the_motion_is_what_the_motion_leaves() -> None:
     tau, final = 0.2, 0.5
     late = final * (1 - np.exp(-TIME / tau))
     for rest, left in ((0.0, tau * math.log(50)), (0.5, tau * math.log(50) - 0.5), (1.0, 0.0)):
-        found = metrics_of(PERIOD, late, np.full_like(TIME, final), STILL, final, rest)
+        found = metrics_of(PERIOD, late, np.full_like(TIME, final), STILL, one_move(final, rest, HORIZON))
         assert found["settling_after"] == pytest.approx(left, abs=2 * PERIOD), "a perfect follower has none left"
-    never = metrics_of(PERIOD, 0.9 * late, np.full_like(TIME, final), STILL, final, 1.0)
+    never = metrics_of(PERIOD, 0.9 * late, np.full_like(TIME, final), STILL, one_move(final, 1.0, HORIZON))
     assert math.isnan(never["settling_after"])
 
 
@@ -45,19 +49,49 @@ def test_underdamped_response_has_its_closed_form_overshoot() -> None:
     wd = w * math.sqrt(1 - zeta**2)
     for final in (0.4, -0.4):
         shape = 1 - np.exp(-zeta * w * TIME) * (np.cos(wd * TIME) + zeta * w / wd * np.sin(wd * TIME))
-        found = metrics_of(PERIOD, final * shape, np.full_like(TIME, final), STILL, final, 0.0)
+        found = metrics_of(PERIOD, final * shape, np.full_like(TIME, final), STILL, one_move(final, 0.0, HORIZON))
         assert found["overshoot"] == pytest.approx(100 * math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), rel=1e-4)
 
 
+@LAST_MOVES
+@pytest.mark.parametrize("passing", [0.1, 0.0, -0.1])
+def test_a_last_move_is_judged_by_its_own_size_and_side(before: float, final: float, passing: float) -> None:
+    """From 2 s on; for 0.5 s the angle is beyond the target by a tenth of the move, or short of it."""
+    reference, goals = multi_step(before, final, 2.0, 5.0)
+    time = np.arange(5000) * 1e-3
+    theta = reference + passing * goals.move * ((time > 2.0) & (time < 2.5))
+    found = metrics_of(1e-3, theta, reference, STILL[:5000], goals)
+    assert found["overshoot"] == pytest.approx(max(0.0, 100.0 * passing), abs=1e-9)
+    assert found["settling"] == pytest.approx(2.5 if passing else 2.0, abs=2e-3)
+    assert found["settling_after"] == pytest.approx(0.5 if passing else 0.0, abs=2e-3)
+    near = reference + 0.019 * goals.move * (time > 2.0)
+    assert metrics_of(1e-3, near, reference, STILL[:5000], goals)["settling"] == pytest.approx(2.0, abs=2e-3)
+    off = reference + 0.021 * goals.move * (time > 2.0)
+    assert math.isnan(metrics_of(1e-3, off, reference, STILL[:5000], goals)["settling"])
+
+
+@pytest.mark.parametrize("angles", ["[20, 12]", "[-20, -12]", "[10, -10]", "[10, 25]"])
+def test_a_rollout_is_judged_as_its_recorded_course(angles: str) -> None:
+    lines = [f"simulate.reference={{kind: multi-step, angles_deg: {angles}}}", "simulate.horizon=3.0"]
+    study = load_study([], [*lines, "simulate.controller=pid-dob", "simulate.loop.plant_segments=1"])
+    done = simulate(study).first
+    course = done.trajectory
+    followed = motion(study.simulate.reference, study.wrist, 3.0, 1e-3)
+    found = metrics_of(1e-3, course.theta, course.theta_ref, course.tension, followed.goals)
+    names = set(found) - {"saturation"}
+    assert {name: found[name] for name in names} == {name: pytest.approx(done.metrics[name]) for name in names}
+    assert 0.0 <= found["overshoot"] < 30.0 and 1.0 < found["settling"] < 3.0
+
+
 def test_constant_error_is_its_own_rmse_and_steady_state() -> None:
-    found = metrics_of(PERIOD, np.full_like(TIME, 0.492), np.full_like(TIME, 0.5), STILL, 0.5, 0.0)
+    found = metrics_of(PERIOD, np.full_like(TIME, 0.492), np.full_like(TIME, 0.5), STILL, one_move(0.5, 0.0, HORIZON))
     assert found["rmse"] == pytest.approx(0.008)
     assert found["steady_state"] == pytest.approx(0.008)
     assert found["settling"] == 0.0 and found["rmse_settled"] == pytest.approx(0.008, rel=1e-4)
 
 
 def test_what_never_enters_the_band_never_settles() -> None:
-    found = metrics_of(PERIOD, np.full_like(TIME, 0.48), np.full_like(TIME, 0.5), STILL, 0.5, 0.0)
+    found = metrics_of(PERIOD, np.full_like(TIME, 0.48), np.full_like(TIME, 0.5), STILL, one_move(0.5, 0.0, HORIZON))
     assert math.isnan(found["settling"]) and math.isnan(found["rmse_settled"])
     assert found["settling_5"] == 0.0
 
@@ -65,13 +99,15 @@ def test_what_never_enters_the_band_never_settles() -> None:
 def test_leaving_the_band_at_the_end_means_never_settled() -> None:
     theta = np.full_like(TIME, 0.5)
     theta[-1] = 0.6
-    assert math.isnan(metrics_of(PERIOD, theta, np.full_like(TIME, 0.5), STILL, 0.5, 0.0)["settling"])
+    assert math.isnan(
+        metrics_of(PERIOD, theta, np.full_like(TIME, 0.5), STILL, one_move(0.5, 0.0, HORIZON))["settling"]
+    )
 
 
 def test_move_window_ends_where_the_reference_rests() -> None:
     reference = np.minimum(TIME, 1.0)
     theta = np.where(TIME <= 1.0, reference - 0.02, reference)
-    found = metrics_of(PERIOD, theta, reference, STILL, 1.0, 1.0)
+    found = metrics_of(PERIOD, theta, reference, STILL, one_move(1.0, 1.0, HORIZON))
     assert found["rmse_move"] == pytest.approx(0.02)
     assert found["rmse"] == pytest.approx(0.02 * math.sqrt(1 / 5), rel=1e-3)
 
@@ -80,17 +116,17 @@ def test_tension_metrics_count_both_sides() -> None:
     plus = 10.0 + 5.0 * np.sign(np.sin(2 * np.pi * 10 * (TIME + PERIOD / 2)))
     tension = np.stack([plus, np.full_like(TIME, 2.0)], axis=1)
     saturated = (TIME < 0.5).astype(float)
-    found = metrics_of(PERIOD, TIME, TIME, tension, 5.0, 0.0, saturated)
+    found = metrics_of(PERIOD, TIME, TIME, tension, one_move(5.0, 0.0, HORIZON), saturated)
     assert found["peak_tension"] == 15.0
     assert found["rms_tension"] == pytest.approx(math.sqrt((125.0 + 4.0) / 2), rel=1e-6)
     assert found["chattering"] == pytest.approx(10.0 * 20, rel=0.02)
     assert found["saturation"] == pytest.approx(0.1)
     assert found["slack"] == 0.0
-    assert metrics_of(PERIOD, TIME, TIME, 0 * tension, 5.0, 0.0)["slack"] == 1.0
+    assert metrics_of(PERIOD, TIME, TIME, 0 * tension, one_move(5.0, 0.0, HORIZON))["slack"] == 1.0
 
 
 def test_every_metric_states_unit_and_formula() -> None:
-    found = metrics_of(PERIOD, TIME, TIME, STILL, 5.0, 0.0)
+    found = metrics_of(PERIOD, TIME, TIME, STILL, one_move(5.0, 0.0, HORIZON))
     assert set(found) == set(summed())
     assert all(metric.formula for metric in METRICS.values())
 
@@ -98,14 +134,14 @@ def test_every_metric_states_unit_and_formula() -> None:
 def test_nothing_settles_or_overshoots_where_the_last_angle_is_where_it_began() -> None:
     time = np.arange(5000.0) * 1e-3
     swing = 0.1 * np.sin(time)
-    found = metrics_of(1e-3, swing, swing, np.full((5000, 2), 2.0), final=1e-17, rest=1.0)
+    found = metrics_of(1e-3, swing, swing, np.full((5000, 2), 2.0), one_move(1e-17, 1.0, 5.0))
     assert all(math.isnan(found[name]) for name in ("settling", "settling_5", "overshoot", "rmse_settled"))
     assert found["rmse"] == 0.0
 
 
 def test_the_steady_state_is_that_of_the_last_tenth_of_the_horizon() -> None:
     """|e| = t: its mean over the last tenth is 0.95 T."""
-    found = metrics_of(PERIOD, TIME, 0.0 * TIME, STILL, 5.0, 0.0)
+    found = metrics_of(PERIOD, TIME, 0.0 * TIME, STILL, one_move(5.0, 0.0, HORIZON))
     assert found["steady_state"] == pytest.approx(0.95 * HORIZON, rel=1e-4)
 
 
@@ -125,6 +161,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "rmse_desired": pytest.approx(0.02),
         "tip_rmse_mm": pytest.approx(math.sqrt(0.9 * 9.0 + 0.1 * 25.0)),
         "tip_steady_mm": pytest.approx(5.0),
+        "missing": 0.0,
         "oscillation": pytest.approx(0.0, abs=1e-15),
         "hunting": pytest.approx(math.nan, nan_ok=True),
         "observer_consistency": pytest.approx(math.nan, nan_ok=True),

@@ -91,7 +91,7 @@ def test_sine_swings_between_straight_and_the_angle_and_never_rests() -> None:
 def test_multi_step_holds_each_angle_for_its_duration() -> None:
     m = evaluated(kind="multi-step", angles_deg=(10.0, -20.0, 5.0), duration=0.5)
     np.testing.assert_allclose(np.rad2deg(m.theta_ref[[0, 499, 500, 999, 1000, 2999]]), [10, 10, -20, -20, 5, 5])
-    assert (m.begin, m.rest) == (1.0, 1.0) and m.move == pytest.approx(np.deg2rad(25.0))
+    assert (m.begin, m.rest) == (1.0, 1.0) and m.goals.move == pytest.approx(np.deg2rad(25.0))
     assert not m.rate_ref.any()
 
 
@@ -102,7 +102,7 @@ def test_tip_path_visits_its_tips_and_rests_at_each() -> None:
     np.testing.assert_allclose(m.theta_ref[[800, 1600]], [0.4, -0.2], atol=1e-14)
     np.testing.assert_allclose(m.rate_ref[[0, 800, 1600]], 0.0, atol=1e-12)
     np.testing.assert_allclose(np.gradient(m.theta_ref, m.time)[1:-1], m.rate_ref[1:-1], atol=1e-4)
-    assert m.rest == pytest.approx(1.6) and m.move == pytest.approx(-0.6)
+    assert m.rest == pytest.approx(1.6) and m.goals.move == pytest.approx(-0.6)
 
 
 def test_every_target_of_a_path_must_be_within_reach() -> None:
@@ -130,7 +130,7 @@ def test_a_mirrored_reference_is_the_same_motion_to_the_other_side(reference: Re
     for name in ("theta_ref", "rate_ref", "acceleration_ref", "theta_desired"):
         np.testing.assert_allclose(getattr(other, name), -getattr(one, name), atol=1e-12)
     np.testing.assert_allclose(other.tip_desired, one.tip_desired * [1.0, -1.0], atol=1e-15)
-    assert other.move == pytest.approx(-one.move) and (other.begin, other.rest) == (one.begin, one.rest)
+    assert other.goals.move == pytest.approx(-one.goals.move) and (other.begin, other.rest) == (one.begin, one.rest)
     assert reference.mirrored().mirrored() in (reference, reference.model_copy(update={"angle_deg": reference.end_deg}))
 
 

@@ -101,10 +101,11 @@ COURSES: dict[str, tuple[str, str | dict[str, float], Loop]] = {
 
 @pytest.mark.parametrize("name", COURSES)
 def test_a_small_step_of_the_simulated_loop_is_the_linear_one(name: str) -> None:
-    """Of the loop without steps and limits; 100 ms and more, over many cycles of frames."""
+    """Of the loop without steps and limits, simulated finely; 100 ms and more, over many cycles of frames."""
     law, gains, loop = COURSES[name]
     step, count = 1e-5, 60 if loop.sensor.level == "camera" else 250
-    angles = _course(law, gains, smooth(loop, "slipping"), step, count * loop.control_period) / step
+    fine = smooth(loop, "slipping").model_copy(update={"substeps": 40})
+    angles = _course(law, gains, fine, step, count * loop.control_period) / step
     found = _linear_course(linear(law, gains, loop).closed, count)
     np.testing.assert_allclose(angles, found, atol=2e-3 * np.abs(found).max())
     assert np.abs(found).max() > 0.3

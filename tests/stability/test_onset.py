@@ -30,6 +30,15 @@ def test_a_loop_rests_within_its_margins_and_swings_beyond(measured: ModuleType,
     assert rests <= still < swings
 
 
+def test_an_ideal_loop_begins_to_oscillate_within_a_few_percent_of_its_limit(measured: ModuleType) -> None:
+    """Simulated finely: by the step of 1 ms that its period has, the limit would be 11 % lower."""
+    judged = measured.ROWS[0]
+    found, still = judged.row.analysed(0.0), measured.STILL
+    assert found is not None
+    rests, swings = measured.swings(judged, 1.0, found.margins.most.value * np.array([0.97, 1.03]), np.zeros(2))
+    assert rests <= still < swings
+
+
 def test_the_page_is_of_the_rows_that_the_script_has(measured: ModuleType) -> None:
     page = (DOCS / "loop_analysis.md").read_text(encoding="utf-8")
     for each in measured.ROWS:

@@ -45,3 +45,16 @@ def test_courses_come_into_the_layer_and_end_at_rest(name: str) -> None:
         assert found.slope == pytest.approx(own.gains[a] / (own.gains[b] if b else 1.0))
         late = each.time >= each.reached
         assert np.abs(each.sigma[late]).max() <= own.law.surface.layer(own.gains)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "errors"),
+    [(-45.0, (-5.0, -2.5, 10.0, 20.0)), (45.0, (-20.0, -10.0, 2.5, 5.0)), (-20.0, (-20.0, -10.0, 10.0, 20.0)),
+     (50.0, (-20.0, -10.0))],
+)  # fmt: skip
+def test_courses_begin_within_the_range(degrees: float, errors: tuple[float, ...]) -> None:
+    own = row("smc-tracking", "default", Loop())
+    assert own.wrist.range_deg == 50.0
+    found = phase_portrait(own.law, own.gains, own.loop, own.wrist, math.radians(degrees), 0.01, Draws(0))
+    assert found is not None
+    assert [np.degrees(each.error[0]) for each in found.courses] == pytest.approx(errors, abs=0.1)

@@ -63,6 +63,44 @@ def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> N
     assert [table.title.split(",")[0] for table in done.tables][2] == "Root locus"
 
 
+def test_every_table_holds_what_was_found_in_the_units_of_its_heads(tmp_path: Path) -> None:
+    """A loop that is stable above a gain too, so that no column is empty; frequencies in Hz, angles in deg."""
+    lagged = "simulate.loop={plant_segments: 1, actuator: {level: lagged}, sensor: {level: camera}}"
+    law = "simulate={controller: smc-tracking, gains: camera, horizon: 0.2}"
+    done = analyse(lagged, law, "analyse.angles_deg=[0.0, 20.0]", out=tmp_path)
+    run, turn, last = done.run, 2.0 * math.pi, done.found[-1]
+    own = last.margins
+    assert len(done.found) == 2 and not any(math.isnan(each.omega) for each in (own.most, own.least))
+    expected = {
+        "angle_deg": 20.0, "torque": last.linear.torque, "stable": True, "growth": own.growth,
+        "gain_most": own.most.value, "gain_most_frequency": own.most.omega / turn,
+        "gain_least": own.least.value, "gain_least_frequency": own.least.omega / turn,
+        "phase_margin": own.phase.value, "delay_margin": own.delay, "delay_frequency": own.delay_omega / turn,
+        "sensitivity": own.sensitivity.value, "complementary": own.complementary.value, "rise": last.step.rise,
+        "overshoot": last.step.overshoot, "settling": last.step.settling, "final": last.step.final,
+    }  # fmt: skip
+    cells = run.data("margins").iloc[-1]
+    assert {name: cells[name] for name in cells.index} == pytest.approx(expected, rel=1e-9)
+    heads = {name: unit for name, (unit, _) in columns_of(run, "data/margins.csv").items()}
+    assert {heads[name] for name in expected if name.endswith("_frequency")} == {"Hz"} and heads["angle_deg"] == "deg"
+    assert (heads["phase_margin"], heads["growth"]) == ("rad", "1/s")
+    response, at = run.data("response"), 40
+    rows = response[response["angle_deg"] == 20.0].reset_index(drop=True)
+    assert len(rows) == len(last.omega) and rows["frequency"].max() == pytest.approx(500.0 * 0.06, rel=1e-6)
+    for name, values in (("gain", last.response), ("plant_gain", last.plant)):
+        assert rows[name][at] == pytest.approx(abs(values[at]))
+    for name, values in (("phase", last.response), ("plant_phase", last.plant)):
+        assert np.exp(1j * rows[name][at]) == pytest.approx(values[at] / abs(values[at]))
+    step, locus, portrait = (run.data(name) for name in ("step", "locus", "portrait"))
+    course = step[step["angle_deg"] == 20.0].reset_index(drop=True)
+    assert (course["time"][at], course["response"][at]) == pytest.approx((last.step.time[at], last.step.angle[at]))
+    here = locus[locus["factor"] == done.locus.factors[7]].reset_index(drop=True)
+    np.testing.assert_allclose(here[["growth", "frequency"]].to_numpy(), done.locus.poles[7])
+    third, own_course = portrait[portrait["course"] == 2].reset_index(drop=True), done.portrait.courses[2]
+    for name in ("time", "error", "rate", "sigma"):
+        assert third[name][at] == pytest.approx(getattr(own_course, name)[at]), name
+
+
 def test_over_a_gain_the_table_tells_its_values() -> None:
     done = analyse(PID, "analyse={over: Kd, span: 20.0, angles_deg: [10.0]}")
     (row,) = done.tables[2].rows

@@ -19,6 +19,7 @@ from wristctl.studies import audit as module
 from wristctl.studies.audit import AUDIT, Audited
 from wristctl.studies.inputs import Inputs
 
+LAW = "evidence: comparison, controller: smc, gains: printed, metric: rmse, value: 0.5"
 CLAIMS = (
     "audit={horizon: 1.5, claims: ["
     "{id: T, says: a sign is wrong, evidence: text, verdict: contradicted, reason: by hand}, "
@@ -26,7 +27,12 @@ CLAIMS = (
     "{id: H, says: a push, evidence: hardware, value: 2.5, metric: rmse, reason: needs a rig}, "
     "{id: C, says: an error, evidence: comparison, controller: smc, gains: printed, metric: rmse, value: 0.5}, "
     "{id: U, says: another, evidence: comparison, controller: lqg, gains: printed, metric: rmse, value: 0.5}, "
-    "{id: R, says: a fit, evidence: table1, metric: r2, value: 0.5, unit: '1'}]}"
+    "{id: R, says: a fit, evidence: table1, metric: r2, value: 0.5, unit: '1'}, "
+    "{id: P, says: both, evidence: parts}, "
+    f"{{id: P1, says: one, part_of: P, {LAW}}}, "
+    "{id: P2, says: two, part_of: P, evidence: table1, metric: r2, value: 5.0}, "
+    f"{{id: O, says: ours, whose: ours, {LAW}}}, "
+    "{id: G, says: another law, whose: group, source: a journal, evidence: text, verdict: open, reason: none here}]}"
 )  # fmt: skip
 PLAIN = "audit.claims=[{id: T, says: a sign, evidence: text, verdict: contradicted, reason: by hand}]"
 
@@ -79,40 +85,49 @@ def audit(*settings: str, run: Any = None, **inputs: Any) -> Audited:
 def test_claims_are_listed_with_what_was_found_and_counted_by_verdict(tmp_path: Path, asked: list[Any]) -> None:
     table1 = training(tmp_path, r2=0.5)
     done = audit(CLAIMS, table1=table1)
-    rolled, others, why, still, verdicts, evidence = done.tables
+    tables = {each.title: each for each in done.tables}
+    rolled, others = tables["Claims of the paper that rollouts decide"], tables["Other claims of the paper"]
     parts = [part for loop in LOOPS for part in (f"ours, {loop}", f"verdict, {loop}")]
-    assert rolled.columns == ("claim", "the paper says", "paper", "unit", *parts)
-    assert rolled.rows == [("C", "an error", "0.5", "", *(["0.4 to 0.6", "reproduced"] * len(LOOPS)))]
-    assert others.columns == ("claim", "the paper says", "paper", "unit", "ours", "verdict", "shown by")
+    assert rolled.columns == ("claim", "says", "paper", "unit", "verdict", *parts)
+    within = ["0.4 to 0.6", "reproduced"] * len(LOOPS)
+    assert rolled.rows[0] == ("C", "an error", "0.5", "", "reproduced", *within)
+    assert [row[0] for row in rolled.rows] == ["C", "P"]
+    assert others.columns == ("claim", "says", "paper", "unit", "ours", "verdict", "shown by")
     assert others.rows == [
         ("T", "a sign is wrong", "", "", "", "contradicted", ""),
-        ("S", "a period", "0.005", "s", "", "(a setting)", ""),
         ("H", "a push", "2.5", "", "", "open", ""),
         ("U", "another", "0.5", "", "", "open", ""),
         ("R", "a fit", "0.5", "1", "0.38 to 0.62", "reproduced", "table1"),
     ]
-    assert (why.title, why.columns) == ("Why", ("claim", "verdict", "reason"))
-    assert [row[:2] for row in why.rows] == [("T", "contradicted"), ("R", "reproduced")]
-    assert why.rows[0][2] == "by hand"
-    assert (still.title, still.columns) == ("Still open", ("claim", "what would decide it"))
+    assert [row[0] for row in tables["Details that rollouts decide"].rows] == ["P1"]
+    assert [(row[0], row[5]) for row in tables["Other details"].rows] == [("P2", "better than the paper")]
+    checks = tables["Our own checks that rollouts decide"]
+    assert checks.rows == [("O", "ours", "0.5", "", "holds", *(["0.4 to 0.6", "holds"] * len(LOOPS)))], (
+        "what we wrote is not reproduced"
+    )
+    assert tables["What the paper's authors say elsewhere"].rows == [
+        ("G", "another law", "", "", "", "open", "", "a journal")
+    ]
+    assert tables["Settings taken over as printed"].rows == [("S", "a period", "0.005", "s")]
+    why, still = tables["Why"], tables["Still open"]
+    assert why.columns == ("claim", "verdict", "reason")
+    assert {("T", "contradicted", "by hand")} <= set(why.rows)
+    assert still.columns == ("claim", "what would decide it")
     assert still.rows == [
         ("H", "needs a rig; needs --hardware with a run of `wristctl hw-run`"), ("U", "no controller 'lqg' to run"),
+        ("G", "none here"),
     ]  # fmt: skip
-    assert (verdicts.title, verdicts.columns) == ("Verdicts", ("verdict", "claims"))
-    assert verdicts.rows == [("(a setting)", 1), ("contradicted", 1), ("open", 2), ("reproduced", 2)]
-    assert (evidence.title, evidence.columns) == ("Runs that show it", ("shown by", "run"))
+    counts = {"contradicted": 1, "not specified enough": 1, "open": 2, "reproduced": 2}
+    assert tables["Verdicts on the claims of the paper"].rows == list(counts.items()), "P is one, and O none of them"
+    evidence = tables["Runs that show it"]
+    assert evidence.columns == ("shown by", "run")
     assert evidence.rows == [*((loop, "in memory") for loop in LOOPS), ("table1", table1.id)]
-    assert list(done.metrics.items()) == [("contradicted", 1), ("open", 2), ("reproduced", 2)]
-    assert known_of(done.findings, "reproduced") == [("", "", 5)], "a setting is no claim"
-    assert done.findings.metrics["reproduced"]["meaning"] == "claims whose verdict is: reproduced"
+    assert done.metrics == {name.replace(" ", "_"): count for name, count in counts.items()}
+    assert known_of(done.findings, "reproduced") == [("", "", 6)], "a setting is no claim"
     assert list(done.comparisons) == list(LOOPS)
     frame = done.frame().set_index("claim")
     assert (frame.loc["C", "exact_low"], frame.loc["C", "exact_high"]) == (0.4, 0.6)
-    assert " ".join(line.strip() for line in done.answer[:2]) == (
-        "5 claims of the paper, by what all loops agree on: 2 reproduced, 1 contradicted, 2 open. "
-        "1 setting is taken over."
-    )
-    assert done.answer[2] == "On exact 1 of 1 reproduced: C."
+    assert (frame.loc["O", "whose"], frame.loc["P1", "part_of"], frame.loc["G", "whose"]) == ("ours", "P", "group")
 
 
 def test_trials_judge_the_experiment_and_say_that_the_rig_was_emulated(tmp_path: Path, asked: list[Any]) -> None:
@@ -156,7 +171,7 @@ def test_comparisons_of_a_recorded_audit_are_runs_beside_it(tmp_path: Path, aske
 
 def test_a_plan_says_which_trainings_are_there(tmp_path: Path) -> None:
     study = wristctl.load_study(None, CLAIMS)
-    begin = "6 claims; 3 comparisons on the built-in loops\nhardware: open, for want of a run"
+    begin = "11 claims; 3 comparisons on the built-in loops\nhardware: open, for want of a run"
     assert AUDIT.plan(study, Inputs()) == f"{begin}\ntable1: open, for want of a run"
     run = training(tmp_path, r2=0.5)
     assert AUDIT.plan(study, Inputs({"table1": run})) == f"{begin}\ntable1: {run.id}"

@@ -108,12 +108,15 @@ def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
     child.send_signal(signal.SIGKILL)
     child.wait()
     (stopped,) = list_runs(tmp_path)
-    kept = {each.name: each.stat().st_ino for each in (stopped.path / "units").glob("*.npz")}
+    kept = {each.name: each.read_bytes() for each in (stopped.path / "units").glob("*.npz")}
     assert stopped.state == "crashed" and kept
     again = wristctl.study(study, resume=stopped.path, executor="processes:2", out=tmp_path)
     assert run_of(again).result_hash == run_of(done).result_hash
-    units = {each.name: each.stat().st_ino for each in (run_of(again).path / "units").glob("*.npz")}
-    assert kept.items() <= units.items(), "what was done is linked"
+    units = {each.name: each.read_bytes() for each in (run_of(again).path / "units").glob("*.npz")}
+    assert kept.items() <= units.items()
+    noted = run_of(again).manifest.units
+    assert noted is not None and noted.run == stopped.id and noted.computed_again >= 1
+    assert noted.taken_over + noted.computed_again == len(kept)
     assert [each.role for each in run_of(again).manifest.inputs] == ["resume"]
 
 

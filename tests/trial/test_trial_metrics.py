@@ -10,11 +10,17 @@ import pandas as pd
 import pytest
 
 from tests.trial.conftest import WRIST, settings_of
+from tests.values import LAST_MOVES, multi_step
 from wristctl.arrays import Array
+from wristctl.config.load import load_study
+from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Push
+from wristctl.simulation.motion import Angles, Motion
 from wristctl.trial.trial_metrics import JUDGED, evaluated
 from wristctl.trial.trial_motions import motion_of
 from wristctl.trial.trials import Trial
+from wristctl.trial.twin import twin
+from wristctl.wrist.directions import DIRECTIONS
 
 PERIOD, HORIZON = 5e-3, 3.0
 SETTINGS = settings_of(horizon=HORIZON)
@@ -139,3 +145,52 @@ def test_without_any_truth_nothing_true_is_known() -> None:
     for truth in (None, true_course(0.0).iloc[:0]):
         values = found(course(), truth, pushed=True)
         assert math.isnan(values["true_rmse"]) and values["rmse"] == pytest.approx(0.0, abs=1e-12)
+
+
+@LAST_MOVES
+def test_a_trial_of_several_moves_is_judged_by_its_last_one(before: float, final: float) -> None:
+    """A perfect follower, and one that leaves the target by a tenth of the move until half a second after a push."""
+    reference, goals = multi_step(before, final, 0.6, HORIZON)
+    rows: Array = np.stack([reference, 0.0 * reference, 0.0 * reference])
+    time: Array = 1e-3 * np.arange(float(len(reference)))
+    tips = np.zeros((len(time), 2))
+    followed = Motion(time, Angles.of(rows), tips, goals.move, goals.begin, goals.rest, HORIZON)
+    trial = Trial(0, "ulnar", 0, 2.0, 0)
+
+    def judged(error: Array) -> dict[str, float]:
+        load = 0.3 + 0.1 * ((time >= 2.0) & (time < 2.4))
+        log = pd.DataFrame({"time": time, "theta": reference + error, "error": error, "load": load} | NAMES)
+        truth = pd.DataFrame({"time": time, "theta": reference + error})
+        return evaluated(trial, log.assign(torque=0.5, torque_wanted=0.5), followed, PUSH, 1e-3, truth)
+
+    perfect = judged(0.0 * time)
+    assert perfect["overshoot"] == 0.0 and perfect["settling"] == perfect["true_settling"]
+    assert perfect["settling"] == pytest.approx(0.6, abs=2e-3) and perfect["recovery"] == 0.0
+    passing = judged(np.where((time > 2.0) & (time < 2.9), 0.1 * goals.move, 0.0))
+    assert passing["overshoot"] == pytest.approx(10.0)
+    assert passing["recovery"] == pytest.approx(0.5, abs=5e-3) == passing["true_recovery"]
+    near = judged(np.where((time > 2.0) & (time < 2.9), 0.019 * goals.move, 0.0))
+    far = judged(np.where((time > 2.0) & (time < 2.9), -0.021 * goals.move, 0.0))
+    assert near["recovery"] == near["true_recovery"] == 0.0 and far["recovery"] > 0.4 < far["true_recovery"]
+
+
+def test_a_perfect_follower_of_five_degrees_back_passes_nothing() -> None:
+    settings = settings_of(reference={"kind": "multi-step", "angles_deg": (30.0, 25.0)}, horizon=HORIZON)
+    followed = motion_of(settings, WRIST, "radial")
+    log = course(theta=followed.theta_ref)
+    values = evaluated(Trial(0, "radial", 0, 0.0, 0), log, followed, PUSH, PERIOD, None)
+    assert values["overshoot"] == 0.0 and values["settling"] == pytest.approx(1.0, abs=2 * PERIOD)
+
+
+@pytest.mark.parametrize("direction", ["ulnar", "radial", "flexion", "extension"])
+def test_a_trials_push_in_simulation_is_the_benchs_and_against_the_bend(direction: DirectionName) -> None:
+    """Feedforward does not resist: the angle gives way to the straight side while it is pushed."""
+    rows = ({"controller": "feedforward", "gains": "default"},)
+    changes = {"rows": rows, "push": {"force": 2.0, "start": 0.6, "duration": 0.4}, "horizon": 1.0}
+    settings = settings_of(directions=(direction,), **changes)
+    trial = Trial(0, direction, 0, 2.0, 0)
+    study = load_study([]).model_copy(update={"hw_run": settings})
+    pushed, free = (twin(study, each, None, None).trajectory for each in (trial, trial._replace(push=0.0)))
+    sign = DIRECTIONS[direction].sign
+    given = sign * (pushed.theta - free.theta)[pushed.time > 0.75]
+    assert sign * free.theta[-1] > 0.05 and (given < 0.0).all() and given.min() < -0.003

@@ -22,7 +22,7 @@ def test_the_way_back_begins_where_the_wrist_is_and_ends_straight_and_at_rest() 
     assert way.theta_ref[0] == 0.4 and (way.theta_ref[way.time >= 1.0] == 0.0).all()
     assert way.theta_ref[100] == pytest.approx(0.2), "half way in half of its time"
     assert (way.rate_ref[[0, -1]] == 0.0).all() and way.rate_ref[100] == pytest.approx(-0.4 * 15.0 / 8.0)
-    assert (way.move, way.begin, way.rest, way.horizon, way.final) == (-0.4, 0.0, 1.0, 1.5, 0.0)
+    assert (way.goals.move, way.begin, way.rest, way.horizon, way.final) == (-0.4, 0.0, 1.0, 1.5, 0.0)
     assert np.array_equal(way.theta_desired, way.theta_ref)
     assert way.tip_desired.shape == (300, 2)
 

@@ -112,7 +112,7 @@ def test_what_one_executor_began_another_ends(two: Cluster, tmp_path: Path) -> N
     perform_units(walks(4), Workers.of("serial"), folder=begun)
     done = perform_units(walks(8), Workers.of(two.named), golden(), begun)
     perform_units(walks(8), Workers.of("processes:2"), golden(), whole)
-    assert done.taken_over == 4 and contents(begun) == contents(whole)
+    assert done.found == 4 and contents(begun) == contents(whole)
 
 
 def test_a_cluster_that_vanishes_is_named_and_what_was_done_is_kept(tmp_path: Path) -> None:

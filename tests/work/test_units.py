@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from wristctl.config.errors import UserError
 from wristctl.work import unit as units_of_work
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
-from wristctl.work.unit import Unit, file_of, read_unit, take_over, write_unit
+from wristctl.work.unit import Unit, file_of, read_unit, same_arrays, write_unit
 from wristctl.work.worker import Computed, Furnish, Golden
 
 
@@ -40,23 +41,69 @@ def test_serial_processes_and_an_executor_of_ones_own_give_the_same_bytes(tmp_pa
     assert len(first) == 6 and all(each == first for each in others)
 
 
-def test_what_is_there_is_not_computed_again_and_what_is_missing_is(tmp_path: Path) -> None:
+def test_what_is_there_is_copied_and_not_computed_again_but_for_one_to_check(tmp_path: Path) -> None:
     old, new = tmp_path / "old", tmp_path / "new"
     old.mkdir()
     new.mkdir()
     whole = perform_units(walks(), Workers.of("serial"), folder=old)
-    lost = walks()[2]
-    file_of(old, lost.key).unlink()
+    file_of(old, walks()[2].key).unlink()
     computed = []
 
     def told(unit: Unit, done: Computed | None) -> None:
         computed.append(unit.name if done else "")
 
     again = perform_units(walks(), Workers.of("serial"), folder=new, earlier=old, told=told)
-    assert again.taken_over == 5 and [each for each in computed if each] == ["walk 2"]
+    assert again.tried_again is not None and len(again.taken_over) == 4 and again.found == 0
+    assert {each for each in computed if each} == {"walk 2", again.tried_again.name}
+    assert computed.index(again.tried_again.name) < computed.index("walk 2"), "before anything is spent"
     assert same(whole, again) and len(contents(new)) == 6
-    linked = file_of(new, walks()[0].key)
-    assert linked.stat().st_ino == file_of(old, walks()[0].key).stat().st_ino, "linked, and not copied"
+    assert all(each.stat().st_nlink == 1 for each in new.iterdir()), "no file is two runs'"
+    assert {name: contents(new)[name] for name in contents(old)} == contents(old)
+
+
+@pytest.mark.parametrize("named", ["serial", "processes:2"])
+def test_a_forged_unit_is_found_where_it_is_drawn_and_nothing_of_its_run_is_kept(
+    tmp_path: Path, named: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.mkdir()
+    new.mkdir()
+    units = walks()
+    for unit, arrays in zip(units, perform_units(units, Workers.of("serial")).arrays, strict=True):
+        assert arrays is not None
+        write_unit(old, unit.key, {**arrays, "walk": arrays["walk"] * (0.5 if unit is units[4] else 1.0)})
+    monkeypatch.setattr("secrets.choice", lambda numbers: numbers[4])
+    with pytest.raises(UserError, match="walk 4 gives other numbers") as caught:
+        perform_units(units, Workers.of(named), golden(), new, old)
+    assert caught.value.exit_code == 3 and not contents(new)
+    monkeypatch.setattr("secrets.choice", lambda numbers: numbers[3])
+    done = perform_units(units, Workers.of(named), golden(), new, old)
+    assert done.tried_again == units[3] and len(contents(new)) == 6, "what is not drawn is believed"
+
+
+def test_arrays_that_differ_in_anything_are_not_the_same() -> None:
+    one = {"x": np.array([0.0, np.nan])}
+    assert same_arrays(one, {"x": np.array([0.0, np.nan])})
+    others = [{"x": np.array([-0.0, np.nan])}, {"x": np.array([0.0, np.nan], ">f8")}, {"x": one["x"][:, None]}, {}]
+    assert not any(same_arrays(one, other) or same_arrays(other, one) for other in others)
+
+
+@pytest.mark.parametrize("odd", ["link", "dangling link", "fifo", "folder"])
+def test_what_is_no_file_among_the_units_of_a_stopped_run_is_refused_at_once(tmp_path: Path, odd: str) -> None:
+    old = tmp_path / "old"
+    old.mkdir()
+    perform_units(walks(3), Workers.of("serial"), folder=old)
+    file = file_of(old, walks()[1].key)
+    file.rename(tmp_path / "elsewhere")
+    if odd == "fifo":
+        os.mkfifo(file)
+    elif odd == "folder":
+        file.mkdir()
+    else:
+        file.symlink_to(tmp_path / ("elsewhere" if odd == "link" else "gone"))
+    with pytest.raises(UserError) as caught:
+        perform_units(walks(3), Workers.of("serial"), earlier=old)
+    assert caught.value.exit_code == 3 and caught.value.where == str(file)
 
 
 @pytest.mark.parametrize("fault", ["cut", "flipped", "renamed"])
@@ -74,7 +121,7 @@ def test_a_unit_that_is_not_as_it_was_written_is_computed_again(tmp_path: Path, 
         shutil.copyfile(file_of(tmp_path, other.key), file)
     assert read_unit(tmp_path, one.key) is None
     again = perform_units([one, other], Workers.of("serial"), folder=tmp_path)
-    assert again.taken_over == 1 and again.arrays[0] is not None and int(again.arrays[0]["at"]) == 0
+    assert again.found == 1 and again.arrays[0] is not None and int(again.arrays[0]["at"]) == 0
 
 
 def test_the_key_goes_by_what_is_computed_from_what_and_by_which_code(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,17 +189,3 @@ def test_an_executor_that_cannot_be_is_named(named: str, told: str) -> None:
     with pytest.raises(UserError, match=told) as raised:
         perform_units(walks(1), Workers.of(named))
     assert raised.value.exit_code == 2
-
-
-def test_a_unit_from_elsewhere_is_copied_where_links_cannot_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    old, new = tmp_path / "old", tmp_path / "new"
-    old.mkdir()
-    new.mkdir()
-    write_unit(old, "k", {"x": np.arange(3.0)})
-
-    def refused(*_: object) -> None:
-        raise OSError(18, "Invalid cross-device link")
-
-    monkeypatch.setattr("os.link", refused)
-    found = take_over(old, new, "k")
-    assert found is not None and np.array_equal(found["x"], np.arange(3.0)) and read_unit(new, "k") is not None

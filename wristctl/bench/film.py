@@ -18,6 +18,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.loop_priority import as_any_program
+from wristctl.work.serving import safe_path
 
 _DECODED = 3e-3
 """Seconds that a viewer of the stream takes to read and decode a picture, a part of the camera's delay: 2.0 alone on
@@ -38,7 +39,8 @@ def start_film(
     ours, theirs = context.Pipe()
     given = theirs, settings, wrist, markers, pictures, broadcast
     process = context.Process(target=_develop, args=given, daemon=True)
-    process.start()
+    with safe_path():
+        process.start()
     theirs.close()
     return process, ours
 

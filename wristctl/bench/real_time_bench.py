@@ -25,6 +25,7 @@ from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
+from wristctl.work.serving import safe_path
 
 _END = 5.0
 
@@ -38,7 +39,7 @@ class RealTimeBench:
 
     def __init__(self, processes: Sequence[BaseProcess], control: Connection, address: str, pictures: Path) -> None:
         self._processes, self._control = processes, control
-        self.transport = SerialTransport(address, BAUD)
+        self.transport = SerialTransport(address, BAUD, emulated=True)
         self.camera = SharedCamera(pictures)
 
     def __enter__(self) -> Self:
@@ -103,7 +104,8 @@ def connect(
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     bench = context.Process(target=_serve, args=(theirs, film, folder, settings, wrist, seed, record), daemon=True)
-    bench.start()
+    with safe_path():
+        bench.start()
     theirs.close()
     film.close()
     try:

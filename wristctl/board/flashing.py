@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wristctl.board.board_errors import BoardError
+from wristctl.config.no_hardware import check_hardware_allowed
 
 IMAGE = Path(__file__).with_name("firmware") / "wrist.hex"
 _BOOT_LOADER_BAUD = 115_200
@@ -16,6 +17,7 @@ _BOOT_LOADER_BAUD = 115_200
 
 def flash(port: str, image: Path = IMAGE, say: Callable[[str], None] = lambda line: None) -> None:
     """Write `image` and read it back. `say` gets avrdude's lines. Raises BoardError."""
+    check_hardware_allowed("board", port)
     _see_whole(image)
     avrdude = shutil.which("avrdude")
     if avrdude is None:

@@ -11,6 +11,7 @@ import serial
 from serial.tools import list_ports
 
 from wristctl.board.board_errors import BoardError, PortLost, PortUnusable
+from wristctl.config.no_hardware import check_hardware_allowed
 
 BOOT_TIME = 2.0
 """Seconds that a Mega's boot loader waits for a program after a reset, and some more."""
@@ -46,11 +47,14 @@ class Transport(Protocol):
 class SerialTransport:
     """A board on a serial port, on Windows, Linux or macOS, or behind `socket://host:port`.
 
-    Opening a port resets an Arduino. `exclusive` refuses a port that another program of this kind uses.
-    Raises PortUnusable.
+    Opening a port resets an Arduino. `exclusive` refuses a port that another program of this kind uses; `emulated`
+    promises that a process of ours is at its other end.
+    Raises PortUnusable, and UserError where no board may be opened.
     """
 
-    def __init__(self, port: str, baud: int, exclusive: bool = True) -> None:
+    def __init__(self, port: str, baud: int, exclusive: bool = True, emulated: bool = False) -> None:
+        if not emulated:
+            check_hardware_allowed("board", port)
         self.name = port
         only: dict[str, Any] = {"exclusive": True} if exclusive and "://" not in port else {}
         try:

@@ -94,7 +94,9 @@ def main() -> NoReturn:
             code = _failed(f"{error.format_message()} - fix: {command} --help", error, error.exit_code)
         except (KeyboardInterrupt, typer.Abort):
             code = 130
-        except Exception as error:
+        except SystemExit:  # completion ends so
+            raise
+        except BaseException as error:
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
             if seen.asked:
                 code = 130

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from wristctl.cli.options import Debug
-from wristctl.config.errors import UserError
+from wristctl.config.wording import Argument
+from wristctl.records.files import replacing
 
 app = typer.Typer(add_completion=False)
 
@@ -33,9 +34,7 @@ def board_pdf(
     from wristctl.report.print_sheet import write_sheets
 
     study = load_study(config or (), override or (), "calibrate-camera")
-    try:
-        write_sheets(file, paper, study.calibrate_camera.board, study.track.markers)
-    except OSError as error:
-        raise UserError(f"cannot write: {error.strerror}", str(file), "name another file") from error
+    with replacing(file, Argument("file", metavar="FILE", positional=True)) as temporary:
+        write_sheets(temporary, paper, study.calibrate_camera.board, study.track.markers)
     typer.echo("print at 100 % (no 'fit to page'), then measure the rulers: 100 mm", err=True)
     print(file)

@@ -16,7 +16,7 @@ import typer
 from wristctl.cli.completion import controllers, run_ids
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.options import Options, Own, signature
-from wristctl.cli.output import print_job, print_plan, print_result
+from wristctl.cli.output import print_plan, print_result
 from wristctl.cli.progress import PLAIN, listening, progress
 from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
@@ -30,7 +30,6 @@ from wristctl.studies.perform import perform, prepare, recording
 from wristctl.studies.procedure import Procedure
 
 _SWEEP = "A leaf at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
-_SLURM = "Profile (YAML) of Slurm jobs that do the work; with --dry-run the job script is printed."
 _EXECUTOR = "Who does the work: serial, processes[:N], dask://host:port or module:factory."
 
 
@@ -55,7 +54,7 @@ def study_command(
         own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if given.pop(name))
         sweeps = given.pop("sweep") if procedure.sweeps else None
-        executor = _workers(given) if procedure.in_units else "serial"
+        executor = (procedure.in_units and given.pop("executor")) or "serial"
         typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
         set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
         set_ += [f"sweep={json.dumps(sweeps)}"] if sweeps else []
@@ -75,21 +74,13 @@ def study_command(
     ]
     own += [Own(name, text, bool) for name, text in flags.items()]
     own += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
-    own += [Own("executor", _EXECUTOR, str), Own("slurm", _SLURM, str)] * procedure.in_units
+    own += [Own("executor", _EXECUTOR, str)] * procedure.in_units
     call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     shown = [each.replace("[", r"\[") for each in examples]  # a bracket begins rich's markup
     epilog = "\n\n".join(["Examples:", *shown]) if shown else None
     app.command(procedure.kind, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
-
-
-def _workers(given: dict[str, Any]) -> str:
-    """Who does the work, by the options that say so."""
-    named, slurm = given.pop("executor"), given.pop("slurm")
-    if named and slurm:
-        raise UserError("workers of two kinds", "--executor and --slurm", "one of them")
-    return f"slurm:{slurm}" if slurm else named or "serial"
 
 
 def _execute(
@@ -113,8 +104,6 @@ def _perform(
             plan = prepared.plan()
         except UserError as error:
             raise located(error, origins) from error
-        if options.dry_run and executor.startswith("slurm:"):
-            return print_job(executor.removeprefix("slurm:"), plan)
         if options.dry_run:
             return print_plan(procedure.kind, prepared.study, plan, options.out, options.as_json)
         if procedure.in_units:

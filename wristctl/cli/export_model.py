@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from wristctl.cli.options import Debug, Out
+from wristctl.cli.options import Debug, Out, TrustCode
 from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.cli.say import say
+from wristctl.cli.trust_code import asked_to_trust
+from wristctl.config.trust import asking
 
 app = typer.Typer(add_completion=False)
 
@@ -28,6 +31,7 @@ def export_model(
     file: Annotated[
         Path | None, typer.Option("--file", help="Where to write it; by default wrist.xml or wrist_chain.m here.")
     ] = None,
+    trust_code: TrustCode = False,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
@@ -39,4 +43,5 @@ def export_model(
     from wristctl.records import require
     from wristctl.studies.exported_model import export_wrist
 
-    say(export_wrist(require(ref, None, out), to, file, segments, direction))
+    with asking(partial(asked_to_trust, trust_code)):
+        say(export_wrist(require(ref, None, out), to, file, segments, direction))

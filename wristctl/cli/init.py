@@ -14,6 +14,8 @@ from wristctl.cli.options import Debug
 from wristctl.cli.say import say
 from wristctl.config.errors import UserError
 from wristctl.config.shipped import EXPERIMENTS, shipped
+from wristctl.config.system_errors import writing
+from wristctl.config.wording import Argument
 
 app = typer.Typer(add_completion=False)
 
@@ -35,7 +37,7 @@ def init(
     to = folder / EXPERIMENTS
     if os.path.lexists(to):
         raise UserError("there are experiments already, and they may be changed", str(to), "another folder")
-    try:
+    with writing(to, Argument("folder", metavar="DIR", positional=True)):
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder, prefix=f".{EXPERIMENTS}-") as scratch:
             whole = Path(scratch) / EXPERIMENTS
@@ -43,8 +45,6 @@ def init(
                 (whole / file).parent.mkdir(parents=True, exist_ok=True)
                 (whole / file).write_bytes((shipped() / file).read_bytes())
             whole.rename(to)
-    except OSError as error:
-        raise UserError(f"cannot write: {error.strerror}", str(to), "another folder") from error
     say(f"{to} is written, for you to change. The paper's study in small, a few minutes:")
     for line in (f"cd {shlex.quote(str(folder))}", *_NEXT.split("\n")[1:-1]):
         say(f"  {line}")

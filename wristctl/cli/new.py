@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from importlib.resources import files
+from os.path import lexists
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,6 +15,8 @@ from wristctl.cli.options import Debug
 from wristctl.cli.say import say
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
 from wristctl.config.errors import UserError
+from wristctl.config.wording import TO
+from wristctl.records.files import write_text
 
 app = typer.Typer(add_completion=False)
 
@@ -36,6 +40,8 @@ def new(
     """Write a controller, reference or optimiser that runs as it stands, for you to change."""
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise UserError(f"{name!r} is no name for a {kind}", "NAME", "small letters, digits and dashes: my-law")
+    if keyword.iskeyword(name):
+        raise UserError(f"{name!r} is a word of Python's own", "NAME", f"another name: my-{name}")
     if name in _TABLES[kind]:
         raise UserError(f"there is a {kind} '{name}' already", "NAME", f"another name: my-{name}")
     word = name.replace("-", "_")
@@ -45,15 +51,9 @@ def new(
     text = (files("wristctl.cli") / "templates" / f"{kind}.py.txt").read_text(encoding="utf-8")
     for mark, value in (("@name@", name), ("@OBJECT@", own), ("@Title@", title)):
         text = text.replace(mark, value)
-    try:
-        with file.open("x", encoding="utf-8") as made:
-            made.write(text)
-    except FileExistsError:
-        raise UserError(
-            "there is such a file already", str(file), "another name, or another folder with --to"
-        ) from None
-    except OSError as error:
-        raise UserError(f"cannot write: {error.strerror}", str(file), "another folder with --to") from error
+    if lexists(file):
+        raise UserError("there is such a file already", str(file), "another name, or another folder with --to")
+    write_text(file, text, TO)
     say(f"{file} is written, and runs as it stands:")
     for line in _NEXT[kind].format(f"{file}:{own}").splitlines():
         say(f"  {line}")

@@ -27,17 +27,7 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> 
         return
     print(resolved, end="")
     for line in [*plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
-        print(f"# {line}")
-
-
-def print_job(profile: str, plan: str) -> None:
-    """The script of the Slurm jobs that would do the work, and what that is."""
-    from wristctl.work.slurm import SlurmProfile
-
-    known = SlurmProfile.read(Path(profile))
-    print(known.job_script(), end="")
-    for line in [*plan.splitlines(), f"{known.jobs} such jobs would be submitted; nothing is submitted now"]:
-        print(f"# {line}")
+        print(f"# {printable(line)}")
 
 
 def print_result(

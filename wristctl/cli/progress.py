@@ -23,6 +23,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from wristctl.config.printable import printable_lines
 from wristctl.studies.counting import Count, counting
 from wristctl.studies.session import Done, Event
 
@@ -79,7 +80,7 @@ class Messages(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Print one message; from warnings on with its level."""
         level = f"{record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
-        self._console.print(level + record.getMessage(), **PLAIN)
+        self._console.print(level + printable_lines(record.getMessage()), **PLAIN)
 
 
 @contextmanager

@@ -1,14 +1,19 @@
-"""What the paper's own equations and tables come to, worked out: evidence that asks for no rollout."""
+"""What the paper's own equations and tables come to, worked out: evidence that asks for no rollout.
+
+What they take from print is rounded to its last digit, so that each comes to a range.
+"""
 
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
-from functools import partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
-from wristctl.comparison.paper import T2
+from wristctl.comparison.paper import T2, Ends, rounded
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
@@ -34,54 +39,57 @@ def chain_difference() -> float:
     return found
 
 
-def settling_by_words() -> float:
-    """Settling time [s] of the springs and dampers alone by C1's words, damping 0.615 over stiffness 0.105."""
-    return _TWO_PERCENT * 0.615 / 0.105
+def time_to_settle(slow: float, fast: float) -> float:
+    """Settling time [s] to 2 % of what decays with the time constant slow / fast [s]."""
+    return _TWO_PERCENT * slow / fast
 
 
-def settling_by_units() -> float:
-    """The same by the units."""
-    return _TWO_PERCENT * 0.105 / 0.615
-
-
-def settling_on_surface() -> float:
-    """Settling time [s] on sigma = 0 with the printed gains (E17), where P1 e + P2 de/dt = 0."""
-    gains = SMC.presets["printed"]
-    return _TWO_PERCENT * gains["P2"] / gains["P1"]
-
-
-def growth_as_printed() -> float:
+def growth_as_printed(kp: float, ki: float, kd: float) -> float:
     """Largest real part [1/s] of the poles of the wrist under E22 as it is printed: u = +(Kp e + Ki int e + Kd de/dt).
 
     About straight, weightless, with the assumed masses: a positive one grows whatever the masses.
     """
-    wrist, gains = WristParameters(), PID.presets["printed"]
+    wrist = WristParameters()
     inertia = wrist.hand_mass * (0.5 * wrist.length + wrist.hand_offset) ** 2
-    poles = np.roots([inertia, wrist.damping - gains["Kd"], wrist.stiffness - gains["Kp"], -gains["Ki"]])
+    poles = np.roots([inertia, wrist.damping - kd, wrist.stiffness - kp, -ki])
     return float(poles.real.max())
 
 
-def least_rmse(controller: str) -> float:
-    """Least RMSE [rad] of an error that begins at a step of 30 deg, decays and leaves the band at T2's settling time.
+def least_rmse(settling: float) -> float:
+    """Least RMSE [rad] of an error that begins at a step of 30 deg, decays and leaves the band at a settling time [s].
 
     Until then it is at least the band, so that RMSE^2 H >= (band 30 deg)^2 t_s; band and horizon are those that ask
     for least. Where the printed RMSE is below, both cannot be read from one answer to a step.
     """
-    return _BAND * _STEP * math.sqrt(T2[controller].settling / _HORIZON)
+    return _BAND * _STEP * math.sqrt(settling / _HORIZON)
 
 
-def rmse_over_steady(controller: str) -> float:
-    """T2's RMSE over its steady-state error: below 1, the error grows with time or the two are of other signals."""
-    return T2[controller].rmse / T2[controller].steady_state
+class Equation(NamedTuple):
+    """A function of printed numbers, monotone in each of them, and these numbers."""
+
+    of: Callable[..., float]
+    printed: tuple[float, ...] = ()
+
+    def ends(self) -> Ends:
+        """Between which it comes out, over all that the printed digits may stand for."""
+        found = [self.of(*corner) for corner in product(*(rounded(each) for each in self.printed))]
+        return Ends(min(found), max(found))
 
 
-EQUATIONS: dict[str, Callable[[], float]] = {
-    "chain_difference": chain_difference,
-    "settling_by_words": settling_by_words,
-    "settling_by_units": settling_by_units,
-    "settling_on_surface": settling_on_surface,
-    "growth_as_printed": growth_as_printed,
-    **{f"least_rmse_{name}": partial(least_rmse, name) for name in T2},
-    **{f"rmse_over_steady_{name}": partial(rmse_over_steady, name) for name in T2},
+_SMC, _PID = SMC.presets["printed"], PID.presets["printed"]
+
+EQUATIONS: dict[str, Equation] = {
+    "chain_difference": Equation(chain_difference),
+    # C1: the springs and dampers alone, by words and by units
+    "settling_by_words": Equation(time_to_settle, (0.615, 0.105)),
+    "settling_by_units": Equation(time_to_settle, (0.105, 0.615)),
+    # E17: on sigma = 0, where P1 e + P2 de/dt = 0
+    "settling_on_surface": Equation(time_to_settle, (_SMC["P2"], _SMC["P1"])),
+    "growth_as_printed": Equation(growth_as_printed, (_PID["Kp"], _PID["Ki"], _PID["Kd"])),
+    **{f"least_rmse_{name}": Equation(least_rmse, (row.settling,)) for name, row in T2.items()},
+    # below 1 the error grows with time, or the two are of other signals
+    **{
+        f"rmse_over_steady_{name}": Equation(operator.truediv, (row.rmse, row.steady_state)) for name, row in T2.items()
+    },
 }
 """By the name that a claim's `metric` gives."""

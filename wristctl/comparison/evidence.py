@@ -27,7 +27,7 @@ LoopCondition = tuple[str, float]
 
 NOMINAL = 1.0
 """Springs as stiff as the controller knows them; beside it stands what is asked of others."""
-_BY_LOOPS = ("comparison", "ordering")
+_BY_LOOPS = ("comparison", "ordering", "arrival")
 
 
 class TrialsDone(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,14 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.comparison.evidence import NOMINAL, TRAININGS, Grounds, Metrics, TrialsDone
-from wristctl.comparison.verdicts import Finding, of_numbers, of_ordering, of_sample, of_settling
+from wristctl.comparison.paper import Ends, rounded
+from wristctl.comparison.verdicts import Finding, joint, of_numbers, of_ordering, of_sample, of_settling
 from wristctl.config.audit import Claim, VerdictName
+from wristctl.simulation.arrival import SHORT
 
 if TYPE_CHECKING:
     import pandas as pd
 
 DERIVED_ON = "exact"
 """The loop on which the paper's equations are solved as they stand: exact model, continuous time, no limits."""
+_FEW = 4
+"""So many parts are told one by one, more are counted."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +35,11 @@ class Judgement:
 
     @property
     def verdict(self) -> VerdictName | None:
-        """The one of all loops; where these differ, the loop decides, which the paper does not give."""
-        verdicts = {each.verdict for each in self.found.values()}
-        if not verdicts:
-            return None
-        return verdicts.pop() if len(verdicts) == 1 else "not specified enough"
+        """The one of all loops; where these differ, the loop decides, which the paper does not give.
+
+        What fails on all of them is one verdict, whatever the word on each.
+        """
+        return joint(each.verdict for each in self.found.values())
 
     @property
     def reason(self) -> str:
@@ -42,9 +47,41 @@ class Judgement:
         by_loop = [
             f"{name}: {each.reason}" if name else each.reason for name, each in self.found.items() if each.reason
         ]
-        differ = len({each.verdict for each in self.found.values()}) > 1
+        differ = len({each.verdict for each in self.found.values()}) > 1 and self.verdict == "not specified enough"
         parts = ("the loop decides" if differ else "", self.claim.unspecified, self.claim.reason, *by_loop)
         return "; ".join(part for part in parts if part)
+
+
+def judge_all(claims: Sequence[Claim], shown: Grounds) -> list[Judgement]:
+    """Judge every claim by what is shown, and each statement that has parts by these; in the order of the claims."""
+    whole = {claim.id for claim in claims if claim.evidence == "parts"}
+    single = {claim.id: judge(claim, shown) for claim in claims if claim.id not in whole}
+    of = {name: [single[each.id] for each in claims if each.part_of == name] for name in whole}
+    return [_by_parts(claim, of[claim.id]) if claim.id in whole else single[claim.id] for claim in claims]
+
+
+def _by_parts(claim: Claim, parts: Sequence[Judgement]) -> Judgement:
+    """Where all parts agree that is the verdict; else what tells them apart decides, which the paper does not give."""
+    found = {}
+    for place in dict.fromkeys(name for part in parts for name in part.found):
+        own = [(part.claim, part.found[place]) for part in parts if place in part.found]
+        verdict = joint(each.verdict for _, each in own)
+        assert verdict is not None
+        if len(own) <= _FEW:
+            said = "; ".join(f"{part.says}: {worded(part, each.beside or each.verdict)}" for part, each in own)
+        else:
+            counted = Counter(each.beside or each.verdict for _, each in own)
+            beside = "with ours " * any(each.beside for _, each in own)
+            said = beside + ", ".join(f"{count} of {len(own)} {name}" for name, count in counted.most_common())
+        if verdict == "open":
+            said = next(each.reason for _, each in own if each.verdict == "open")
+        found[place] = Finding(verdict, reason=said)
+    return Judgement(claim, found, tuple(dict.fromkeys(name for part in parts for name in part.shown_by)))
+
+
+def worded(claim: Claim, verdict: str) -> str:
+    """A verdict in words: a check of ours holds, and is nothing of the paper's to be reproduced."""
+    return "holds" if claim.whose == "ours" and verdict == "reproduced" else verdict
 
 
 def judge(claim: Claim, shown: Grounds) -> Judgement:
@@ -53,11 +90,11 @@ def judge(claim: Claim, shown: Grounds) -> Judgement:
         return Judgement(claim, {})
     if claim.evidence == "text":
         assert claim.verdict is not None
-        return Judgement(claim, {"": Finding(claim.verdict)})
-    if claim.evidence == "symmetry":
+        return _judgement(claim, {"": Finding(claim.verdict)})
+    if claim.evidence in ("symmetry", "together"):
         return Judgement(claim, {"": Finding("not specified enough")})
     if claim.evidence == "equation":
-        return Judgement(claim, {"": _by_equation(claim)}, ("equation",))
+        return _judgement(claim, {"": _by_equation(claim)}, "equation")
     if claim.evidence == "hardware":
         return _judgement(claim, {"": _by_trials(claim, shown.hardware)}, "hardware")
     if claim.evidence in TRAININGS:
@@ -71,14 +108,16 @@ def judge(claim: Claim, shown: Grounds) -> Judgement:
 
 
 def _judgement(claim: Claim, found: Mapping[str, Finding], *shown_by: str) -> Judgement:
-    """What the paper leaves open stays so, with ours beside it."""
+    """What the paper leaves open stays so, with the verdict by our choice of it beside."""
     if all(each.verdict == "open" and np.isnan(each.low) for each in found.values()):
         return Judgement(claim, found)
-    if claim.unspecified:
+    if claim.unspecified or claim.assuming:
+        choice = f"assuming {claim.assuming}:" if claim.assuming else "with ours"
         found = {
             name: each._replace(
                 verdict="not specified enough",
-                reason="; ".join(part for part in (f"with ours {each.verdict}", each.reason) if part),
+                beside=each.verdict,
+                reason="; ".join(part for part in (f"{choice} {worded(claim, each.verdict)}", each.reason) if part),
             )
             for name, each in found.items()
         }
@@ -88,21 +127,24 @@ def _judgement(claim: Claim, found: Mapping[str, Finding], *shown_by: str) -> Ju
 def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
     """None where the loop's table has no row of it."""
     table = shown.loops[loop, claim.stiffness_scale]
-    moves, metric = _moves(table, claim.label), str(claim.metric)
+    moves = _moves(table, claim.label)
+    metric = "missing" if claim.evidence == "arrival" else str(claim.metric)
     others = _moves(table, claim.than) if claim.than else moves
     if moves.empty or others.empty:
         return None
     ours = moves[metric].to_numpy(float)
-    if claim.than is not None:
+    if claim.evidence == "arrival":
+        found = of_numbers(SHORT, ours, "at most")
+    elif claim.than is not None:
         found = of_ordering(ours, others[metric].to_numpy(float))
     elif claim.stiffness_scale != NOMINAL:
         before = _moves(shown.loops[loop, NOMINAL], claim.label)[metric].to_numpy(float)
-        found = of_numbers(_value(claim), np.maximum(ours - before, 0.0), claim.sense)
+        found = _explained(of_numbers(printed(claim), np.maximum(ours - before, 0.0)))
     elif metric == "settling_after":
-        found = of_settling(_value(claim), ours, _durations(moves))
+        found = of_settling(printed(claim), ours, _durations(moves))
     else:
-        found = of_numbers(_value(claim), ours, claim.sense)
-    if claim.derived and loop == DERIVED_ON and found.verdict == "worse than the paper":
+        found = of_numbers(printed(claim), ours, claim.sense)
+    if claim.derived and loop == DERIVED_ON and found.verdict in ("worse than the paper", "does not hold"):
         found = found._replace(verdict="contradicted")
     strongest = _unphysical(table, (claim.label, claim.than), shown.tension_limit)
     if not strongest:
@@ -142,18 +184,29 @@ def _durations(moves: pd.DataFrame) -> list[float]:
     return [float(each.split()[2]) for each in moves["reference"]]
 
 
-def _value(claim: Claim) -> float:
+def printed(claim: Claim) -> Ends:
+    """Between which the claim's value lies, by the digits that are printed; of a threshold of ours just that."""
     assert claim.value is not None
-    return claim.value
+    if claim.ends is not None:
+        return Ends(*claim.ends)
+    return rounded(claim.value) if claim.printed and claim.sense != "exactly" else Ends(claim.value, claim.value)
+
+
+def _explained(growth: Finding) -> Finding:
+    """An explanation of an error fails where what it adds is less, or more, than what it is to explain."""
+    said = {"better than the paper": "explains too little", "worse than the paper": "explains too much"}
+    if growth.verdict not in said:
+        return growth
+    return growth._replace(verdict="does not hold", reason=growth.reason or said[growth.verdict])
 
 
 def _by_equation(claim: Claim) -> Finding:
     from wristctl.comparison.equations import EQUATIONS
 
-    ours = EQUATIONS[str(claim.metric)]()
-    found = of_numbers(_value(claim), [ours], claim.sense)
-    verdict: VerdictName = "reproduced" if found.verdict == "reproduced" else "contradicted"
-    return found._replace(verdict=verdict)
+    found = of_numbers(printed(claim), EQUATIONS[str(claim.metric)].ends(), claim.sense)
+    if found.verdict == "not specified enough":
+        return found._replace(reason="within the rounding of what is printed")
+    return found._replace(verdict="reproduced" if found.verdict == "reproduced" else "contradicted")
 
 
 def _by_training(claim: Claim, metrics: Metrics | None) -> Finding:
@@ -163,7 +216,7 @@ def _by_training(claim: Claim, metrics: Metrics | None) -> Finding:
     own = metrics[str(claim.metric)]
     middle = np.nan if own["value"] is None else float(own["value"])
     ends = own.get("interval")
-    found = of_sample(_value(claim), middle, tuple(ends) if ends else None, claim.sense)
+    found = of_sample(printed(claim), middle, tuple(ends) if ends else None, claim.sense)
     said = f"{claim.metric} is {middle:.3g}" + (f" (n = {own['n']})" if own.get("n") else "")
     return found._replace(reason="; ".join(part for part in (found.reason, said) if part))
 
@@ -184,9 +237,9 @@ def _by_trials(claim: Claim, done: TrialsDone | None) -> Finding:
         return Finding("open", reason=f"no trial of the paper's law{where} in this run")
     values = own[str(claim.metric)].to_numpy(float)
     if claim.metric == "settling_after":
-        found = of_settling(_value(claim), [float(np.mean(values))], [done.motion])
+        found = of_settling(printed(claim), [float(np.mean(values))], [done.motion])
     else:
-        found = of_numbers(_value(claim), [float(np.mean(values))])
+        found = of_numbers(printed(claim), [float(np.mean(values))])
     rig = "an emulated rig" if done.emulated else "a rig"
     gains = ", ".join(f"smc/{each}" for each in dict.fromkeys(own["gains"]))
     said = f"mean of {len(own)} trials of {gains} on {rig}"
@@ -213,6 +266,8 @@ def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
         row: dict[str, object] = {
             "claim": j.claim.id,
             "says": j.claim.says,
+            "whose": j.claim.whose,
+            "part_of": j.claim.part_of,
             "paper": np.nan if j.claim.value is None else j.claim.value,
             "unit": j.claim.unit,
             "verdict": j.verdict or "",

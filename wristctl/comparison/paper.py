@@ -3,7 +3,23 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 from typing import NamedTuple
+
+
+class Ends(NamedTuple):
+    """The least and the greatest that a number may be."""
+
+    low: float
+    high: float
+
+
+def rounded(printed: float) -> Ends:
+    """Ends of what is printed so: half a unit of the last digit either way, as the shortest decimal shows it."""
+    value = Decimal(repr(printed))
+    digits = value.to_integral_value() if value == value.to_integral_value() else value
+    half = Decimal(5).scaleb(int(digits.as_tuple().exponent) - 1)
+    return Ends(float(value - half), float(value + half))
 
 
 class Printed(NamedTuple):
@@ -50,7 +66,8 @@ T1: dict[str, TrainingColumn] = {
 FACTOR = 1.5
 """RMSE and settling time within this factor of the paper's, steady-state error not above that, count as reproduced.
 
-The paper states neither reference, nor sampling, nor limits (C10), so a tighter band would claim more than it says.
+The factor counts from the ends of what the printed digits may stand for (`rounded`). The paper states neither
+reference, nor sampling, nor limits (C10), so a tighter band would claim more than it says.
 """
 
 
@@ -58,9 +75,9 @@ def verdict(controller: str, rmse: float, settling: float, steady_state: float) 
     """`reproduced`, `not reproduced`, or "" for a controller that the paper does not have."""
     if controller not in T2:
         return ""
-    printed = T2[controller]
+    printed = [rounded(each) for each in T2[controller]]
     within = all(
-        math.isfinite(ours) and paper / FACTOR <= ours <= paper * FACTOR
-        for ours, paper in ((rmse, printed.rmse), (settling, printed.settling))
+        math.isfinite(ours) and paper.low / FACTOR <= ours <= paper.high * FACTOR
+        for ours, paper in zip((rmse, settling), printed, strict=False)
     )
-    return "reproduced" if within and steady_state <= FACTOR * printed.steady_state else "not reproduced"
+    return "reproduced" if within and steady_state <= FACTOR * printed[2].high else "not reproduced"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 
-READINGS = ("rmse", "rmse_move", "settling", "settling_after", "steady_state")
+READINGS = ("rmse", "rmse_move", "settling", "settling_after", "steady_state", "missing")
 BAND = 0.02
 """About the final reference, over the move."""
 
@@ -57,6 +57,7 @@ def readings(of: Courses) -> dict[str, Array]:
         "settling_after": np.maximum(settling - rests, 0.0),
         "steady_state": (np.abs(kept) * late).sum(axis=1) / late.sum(axis=1),
     }
+    found["missing"] = found["steady_state"] / np.abs(np.where(inside, wanted, 0.0)).max(axis=1)
     return {name: np.where(alive, values, np.nan) for name, values in found.items()}
 
 
@@ -70,7 +71,8 @@ def usual(of: Courses) -> tuple[list[str], Array]:
     """RMSE, settling time and steady-state error in every usual reading: their names, and (N, readings, 3).
 
     The RMSE is over the horizon; settling is the last exit from 1, 2 or 5 % of the angle about its final reference, or
-    of the error about none; the steady-state error the mean |e| of the last 10 %, of the last second, or the last |e|.
+    of the error about none; the steady-state error the mean |e| of the last 10 % or of the last second. No reading is
+    of one sample: of a loop that swings it would be what the swing happens to pass.
     """
     time: Array = np.arange(of.theta.shape[1], dtype=np.float64) * of.period
     inside = time < of.horizons[:, None] - 0.5 * of.period
@@ -81,7 +83,6 @@ def usual(of: Courses) -> tuple[list[str], Array]:
     ends = {
         "last 10 %": 0.1 * of.horizons,
         "last second": np.minimum(1.0, of.horizons),
-        "last sample": 1.5 * of.period + 0.0 * of.horizons,  # the last one before half a period ahead of the horizon
     }
     steady = {}
     for name, lasting in ends.items():

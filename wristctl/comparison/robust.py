@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from wristctl.comparison.box import Reactions
 from wristctl.comparison.deciding_leaf import Leaf, Threshold, deciding, split
+from wristctl.comparison.ledger import printed
+from wristctl.comparison.paper import T2, rounded
 from wristctl.comparison.shares import Share, share
-from wristctl.comparison.verdicts import of_numbers, of_ordering
+from wristctl.comparison.verdicts import FAILING, of_numbers, of_ordering
 from wristctl.config.audit import Claim, VerdictName
 from wristctl.config.control import Row
+from wristctl.simulation.arrival import SHORT
 
 if TYPE_CHECKING:
     import pandas as pd
 
-IN_BOX = ("comparison", "ordering", "symmetry")
+IN_BOX = ("comparison", "ordering", "arrival", "together", "symmetry")
 """Evidence that draws give."""
 _LEAST = 0.01
 """Share of the variance below which no unknown decides."""
@@ -39,9 +42,9 @@ class Strip:
     told: str
     """Where the claim holds by the first of them, in words."""
 
-    def share(self, verdict: VerdictName) -> Share:
-        """Of the draws."""
-        return share(np.array([each == verdict for each in self.verdicts]))
+    def share(self, *verdicts: VerdictName) -> Share:
+        """Of the draws, those with one of these verdicts."""
+        return share(np.array([each in verdicts for each in self.verdicts]))
 
 
 def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
@@ -86,6 +89,11 @@ def _judged(
     claim: Claim, drawn: Reactions, mirrored: Reactions | None
 ) -> tuple[NDArray[np.float64], list[VerdictName]]:
     """In the box the reference is drawn too: settling counts from its beginning, as the paper's does."""
+    if claim.evidence == "together":
+        return _together(claim, drawn.found[claim.label])
+    if claim.evidence == "arrival":
+        missing = drawn.found[claim.label]["missing"]
+        return missing / SHORT, [of_numbers(SHORT, [each], "at most").verdict for each in missing]
     metric = "settling" if claim.metric == "settling_after" else str(claim.metric)
     ours = drawn.found[claim.label][metric]
     if claim.evidence == "symmetry":
@@ -93,14 +101,24 @@ def _judged(
         other = mirrored.found[claim.label][metric]
         orders = [of_ordering([a], [b]) for a, b in zip(ours, other, strict=True)]
         alike = [each.reason.startswith("alike") for each in orders]
-        return other / ours, ["reproduced" if each else "worse than the paper" for each in alike]
+        return other / ours, ["reproduced" if each else "does not hold" for each in alike]
     if claim.than is not None:
         other = drawn.found[claim.than][metric]
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = other / ours
         return ratios, [of_ordering([a], [b]).verdict for a, b in zip(ours, other, strict=True)]
     assert claim.value is not None
-    return ours / claim.value, [of_numbers(claim.value, [each], claim.sense).verdict for each in ours]
+    return ours / claim.value, [of_numbers(printed(claim), [each], claim.sense).verdict for each in ours]
+
+
+def _together(claim: Claim, ours: Mapping[str, NDArray[np.float64]]) -> tuple[NDArray[np.float64], list[VerdictName]]:
+    """All numbers of a row of T2 at once: the largest ratio to one of them, either way, and whether all come out."""
+    row = T2[str(claim.controller)]._asdict()
+    with np.errstate(divide="ignore"):
+        ratios = np.exp(np.max([np.abs(np.log(ours[name] / value)) for name, value in row.items()], axis=0))
+    single = [[of_numbers(rounded(value), [each]).verdict for each in ours[name]] for name, value in row.items()]
+    held = [set(each) == {"reproduced"} for each in zip(*single, strict=True)]
+    return ratios, ["reproduced" if each else "does not hold" for each in held]
 
 
 def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
@@ -110,9 +128,11 @@ def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
     rows = []
     for each in found:
         row: dict[str, Any] = {"claim": each.claim.id, "draws": len(each.verdicts)}
-        for name in ("reproduced", "better than the paper", "worse than the paper"):
-            own = each.share(name)
-            key = name.split()[0]
+        for key, own in (
+            ("reproduced", each.share("reproduced")),
+            ("better", each.share("better than the paper")),
+            ("fails", each.share(*FAILING)),
+        ):
             row |= {key: own.value, f"{key}_low": own.low, f"{key}_high": own.high}
         for at, leaf in enumerate(each.leaves[:2], start=1):
             row |= {f"leaf_{at}": leaf.name, f"explained_{at}": leaf.share}

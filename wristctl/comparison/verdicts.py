@@ -1,18 +1,19 @@
 """What a number of ours says about one of the paper's: the rules, which know neither loops nor laws.
 
 All are two-sided and on a log scale. What fails or never settles is nan, worse than any number, and no part of a range.
+A printed number stands for all that its digits may have been rounded from: no verdict turns on them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.paper import FACTOR
+from wristctl.comparison.paper import FACTOR, Ends
 from wristctl.config.audit import SenseName, VerdictName
 
 SPREAD = 4.0
@@ -20,6 +21,7 @@ SPREAD = 4.0
 TIE = 1.05
 """Ratio below which two numbers stand in no order."""
 _OPEN: Final = "not specified enough"
+_NEVER = "fails or never settles"
 
 
 class Finding(NamedTuple):
@@ -31,40 +33,75 @@ class Finding(NamedTuple):
     reason: str = ""
     mark: str = ""
     """What stands beside the verdict, as `not physical`."""
+    beside: VerdictName | None = None
+    """Where the paper leaves open what decides: the verdict with our choice of it."""
 
 
-def of_numbers(paper: float, ours: ArrayLike, sense: SenseName = "about") -> Finding:
+FAILING: tuple[VerdictName, ...] = ("contradicted", "does not hold", "worse than the paper")
+"""Verdicts of what fails, the gravest first."""
+
+
+def joint(verdicts: Iterable[VerdictName]) -> VerdictName | None:
+    """The one verdict of all: what fails everywhere is one, by its gravest word; else what is not given decides.
+
+    What is open leaves that open, unless the others differ already. None of nothing.
+    """
+    different = set(verdicts)
+    if len(different) <= 1:
+        return next(iter(different), None)
+    if "open" in different:
+        others = joint(different - {"open"})
+        return others if others == _OPEN else "open"
+    if different <= set(FAILING):
+        return next(each for each in FAILING if each in different)
+    return _OPEN
+
+
+def of_numbers(paper: float | Ends, ours: ArrayLike, sense: SenseName = "about") -> Finding:
     """Our values, one for each stated motion, beside the paper's; of all of them less is better."""
-    values = np.asarray(ours, float)
+    values, printed = np.asarray(ours, float), _ends(paper)
     known = values[np.isfinite(values)]
     if not len(known):
-        return Finding("worse than the paper", reason="fails or never settles")
+        return Finding("worse than the paper" if sense == "about" else "does not hold", reason=_NEVER)
     low, high = float(known.min()), float(known.max())
     if sense != "about":
-        return _bounded(paper, values, sense)._replace(low=low, high=high)
-    if low > FACTOR * paper:
+        return _bounded(printed, values, sense)._replace(low=low, high=high)
+    if low > FACTOR * printed.high:
         return Finding("worse than the paper", low, high)
     if len(known) < len(values):
         return Finding(_OPEN, low, high, "on one motion it fails or never settles, on another not")
-    if high < paper / FACTOR:
+    if high < printed.low / FACTOR:
         return Finding("better than the paper", low, high)
     if high >= SPREAD * low:
         return Finding(_OPEN, low, high, "the motion decides, and the paper does not give it")
     return Finding("reproduced", low, high)
 
 
-def _bounded(paper: float, values: Array, sense: SenseName) -> Finding:
-    kept = {
-        "at most": values <= paper,
-        "at least": values >= paper,
-        "exactly": values == paper,
-    }[sense]
+def _bounded(paper: Ends, values: Array, sense: SenseName) -> Finding:
+    """A bound holds within all that its printed digits may stand for, or it fails beyond all of that."""
+    kept, broken = _kept(paper, values, sense)
     if kept.all():
         return Finding("reproduced")
-    return Finding(_OPEN, reason="holds on some motions only") if kept.any() else Finding("worse than the paper")
+    if broken.all():
+        return Finding("does not hold")
+    mixed = kept.any() and broken.any()
+    return Finding(_OPEN, reason="holds on some motions only" if mixed else "within the rounding of what is printed")
 
 
-def of_settling(paper: float, after: ArrayLike, motions: ArrayLike) -> Finding:
+def _kept(paper: Ends, values: Array, sense: SenseName) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which values keep a bound wherever it lies between its ends, and which break it wherever; nan breaks it."""
+    if sense == "at most":
+        return values <= paper.low, ~(values <= paper.high)
+    if sense == "at least":
+        return values >= paper.high, ~(values >= paper.low)
+    return values == paper.low, ~((values >= paper.low) & (values <= paper.high))
+
+
+def _ends(paper: float | Ends) -> Ends:
+    return paper if isinstance(paper, Ends) else Ends(paper, paper)
+
+
+def of_settling(paper: float | Ends, after: ArrayLike, motions: ArrayLike) -> Finding:
     """Settling times counted from the end of motions of these durations [s]; 0 is a step.
 
     The paper's time counts from the beginning of a motion that it does not give. After a step both are the same time.
@@ -76,9 +113,9 @@ def of_settling(paper: float, after: ArrayLike, motions: ArrayLike) -> Finding:
     values = np.asarray(after, float)
     known = values[np.isfinite(values)]
     if not len(known):
-        return Finding("worse than the paper", reason="fails or never settles")
+        return Finding("worse than the paper", reason=_NEVER)
     low, high = float(known.min()), float(known.max())
-    if low > FACTOR * paper:
+    if low > FACTOR * _ends(paper).high:
         return Finding("worse than the paper", low, high, "from the end of the motion alone")
     return Finding(_OPEN, low, high, "counted from the end of the motion; how long the paper's lasts is not given")
 
@@ -91,7 +128,7 @@ def of_ordering(less: ArrayLike, more: ArrayLike) -> Finding:
     if all(each > TIE for each in ratios):
         return Finding("reproduced", *ends)
     if all(each < 1.0 / TIE for each in ratios):
-        return Finding("worse than the paper", *ends, "the other way round")
+        return Finding("does not hold", *ends, "the other way round")
     tied = all(1.0 / TIE <= each <= TIE for each in ratios)
     return Finding(_OPEN, *ends, "alike within 5 %" if tied else "the motion decides, and the paper does not give it")
 
@@ -104,27 +141,30 @@ def _ratio(less: float, more: float) -> float:
     return 1.0 if a == b else np.inf if a else 0.0
 
 
-def of_sample(paper: float, middle: float, ends: tuple[float, float] | None, sense: SenseName = "about") -> Finding:
+def of_sample(
+    paper: float | Ends, middle: float, ends: tuple[float, float] | None, sense: SenseName = "about"
+) -> Finding:
     """A median over seeds with its interval beside the paper's value; where the interval is too wide it stays open."""
     if not np.isfinite(middle):
-        return Finding("worse than the paper", reason="there is no such number")
+        verdict: VerdictName = "worse than the paper" if sense == "about" else "does not hold"
+        return Finding(verdict, reason="there is no such number")
     low, high = ends or (middle, middle)
+    printed = _ends(paper)
     if sense == "about":
-        return _about(paper, low, high)
-    kept: Callable[[float], bool] = {
-        "at most": lambda each: each <= paper,
-        "at least": lambda each: each >= paper,
-        "exactly": lambda each: low <= paper <= high,
-    }[sense]
-    if kept(low) == kept(high):
-        return Finding("reproduced" if kept(low) else "worse than the paper", low, high)
+        return _about(printed, low, high)
+    if sense == "exactly":
+        inside = low <= printed.high and high >= printed.low
+        return Finding("reproduced" if inside else "does not hold", low, high)
+    kept, broken = _kept(printed, np.array([low, high]), sense)
+    if kept.all() or broken.all():
+        return Finding("reproduced" if kept.all() else "does not hold", low, high)
     return Finding("open", low, high, "more seeds would decide")
 
 
-def _about(paper: float, low: float, high: float) -> Finding:
-    if low > FACTOR * paper:
+def _about(paper: Ends, low: float, high: float) -> Finding:
+    if low > FACTOR * paper.high:
         return Finding("worse than the paper", low, high)
-    if high < paper / FACTOR:
+    if high < paper.low / FACTOR:
         return Finding("better than the paper", low, high)
     if low <= 0.0 or high >= SPREAD * low:
         return Finding("open", low, high, "the interval is too wide: more seeds would decide")

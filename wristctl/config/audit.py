@@ -12,8 +12,15 @@ from wristctl.config.section import Section, choice, quantity
 from wristctl.config.unstated import Box
 
 VerdictName = Literal[
-    "reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open"
+    "reproduced",
+    "better than the paper",
+    "worse than the paper",
+    "does not hold",
+    "contradicted",
+    "not specified enough",
+    "open",
 ]
+WhoseName = Literal["paper", "ours", "group"]
 _Written = Annotated[VerdictName, BeforeValidator(lambda given: "contradicted" if given == "contradictory" else given)]
 """Older ledgers say contradictory."""
 SenseName = Literal["about", "exactly", "at least", "at most"]
@@ -21,6 +28,8 @@ SenseName = Literal["about", "exactly", "at least", "at most"]
 _NEEDED = {
     "comparison": ("value", "controller", "gains", "metric"),
     "ordering": ("controller", "gains", "than", "metric"),
+    "arrival": ("controller", "gains"),
+    "together": ("controller", "gains"),
     "symmetry": ("controller", "gains", "metric"),
     "table1": ("value", "metric"),
     "selection": ("value", "metric"),
@@ -35,12 +44,27 @@ class Claim(Section):
 
     id: str
     says: str
+    whose: WhoseName = "paper"
+    """Who says it: the paper, we as its auditors, or the paper's authors elsewhere. The paper's are counted."""
+    part_of: str = ""
+    """Id of the statement that this is a detail of. Only the statement is counted."""
+    topic: str = ""
+    """What it is about, in a few words, for the first screen of an audit; without one it is not there."""
+    weight: int = 0
+    """How much a reader of the paper builds on it: the first screen has both numbers of the heaviest."""
+    source: str = ""
+    """Where the paper's authors say it, if elsewhere."""
     evidence: Literal[
-        "comparison", "ordering", "symmetry", "table1", "selection", "hardware", "equation", "text", "settings"
-    ]
+        "comparison", "ordering", "arrival", "together", "symmetry", "table1", "selection", "hardware", "equation",
+        "text", "parts", "settings",
+    ]  # fmt: skip
     value: float | None = None
     sense: SenseName = "about"
     """How `value` is meant: within a factor, as it is, or as a bound."""
+    printed: bool = True
+    """Whether `value` is printed in the paper, and so rounded to its last digit; false: a threshold of ours."""
+    ends: tuple[float, float] | None = None
+    """Between which the printed value lies, where its digits as written here do not tell."""
     unit: str = ""
     controller: str | None = None
     gains: str | None = None
@@ -58,6 +82,8 @@ class Claim(Section):
     """The paper derives it from its equations, which contradict it where, solved as they stand, they do not give it."""
     unspecified: str = ""
     """What the paper leaves open, so that no number of ours can decide: ours then stands beside."""
+    assuming: str = ""
+    """What the verdict assumes and the paper does not give, for example a step as reference. It then stands beside."""
     verdict: _Written | None = None
     reason: str = ""
 
@@ -96,4 +122,12 @@ class AuditSettings(Section):
         twice = [name for name, count in Counter(claim.id for claim in self.claims).items() if count > 1]
         if twice:
             raise ValueError(f"claim {twice[0]} stands there twice: give each an id of its own")
+        whole = {claim.id for claim in self.claims if not claim.part_of}
+        for claim in self.claims:
+            if claim.part_of and claim.part_of not in whole:
+                raise ValueError(f"claim {claim.id}: part_of: names no statement '{claim.part_of}' of this ledger")
+        parts = {claim.part_of for claim in self.claims}
+        empty = [claim.id for claim in self.claims if claim.evidence == "parts" and claim.id not in parts]
+        if empty:
+            raise ValueError(f"claim {empty[0]} by parts has none: give some claim part_of: {empty[0]}")
         return self

@@ -165,6 +165,7 @@ METRICS: Choices[Any] = Choices(
         "settling_5": "wristctl.simulation.metrics:SETTLING_5",
         "settling_after": "wristctl.simulation.settling_after:SETTLING_AFTER",
         "steady_state": "wristctl.simulation.metrics:STEADY_STATE",
+        "missing": "wristctl.simulation.metrics:MISSING",
         "overshoot": "wristctl.simulation.metrics:OVERSHOOT",
         "iae": "wristctl.simulation.metrics:IAE",
         "peak_tension": "wristctl.simulation.metrics:PEAK_TENSION",

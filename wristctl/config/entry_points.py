@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from wristctl.config.errors import UserError
-from wristctl.config.foreign import Foreign, installed
+from wristctl.config.foreign import Foreign, contained, installed
 
 
 @cache
@@ -38,9 +38,6 @@ def entry_point(group: str, name: str) -> tuple[Any, Foreign]:
         where = ", ".join(f"{each.dist.name if each.dist else '?'} ({each.value})" for each in found)
         raise UserError(f"{len(found)} installed packages have a '{name}' in {group}", where, "uninstall all but one")
     (only,) = found
-    try:
+    with contained(f"loading the entry point '{name}'", f"{group}: {only.value}"):
         made = only.load()
-    except Exception as error:
-        what = f"entry point '{name}' cannot be loaded: {type(error).__name__}: {error}"
-        raise UserError(what, f"{group}: {only.value}", "mend or uninstall that package") from error
     return made, installed(sys.modules[only.module], only.attr)

@@ -56,10 +56,12 @@ class Unfitting(ValueError):
 
 @contextmanager
 def under(path: str) -> Iterator[None]:
-    """Let an error of the block, which names a key, say that the key stands below this key path."""
+    """Let an error of the block, which names a key or a file, say that the key stands below this key path."""
     try:
         yield
     except UserError as error:
+        if error.where.startswith("/"):
+            raise
         raise error.at(f"{path}.{error.where}" if error.where else path) from error
 
 

@@ -6,7 +6,8 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -15,10 +16,12 @@ from typing import Any
 from wristctl.config.errors import UserError, meant
 from wristctl.config.sources import digest_now, imported, root_of
 from wristctl.config.trust import run_around, trusted
+from wristctl.interrupt import from_outside
 
 PLAIN = "(py)"
 """How the names of laws end that are plain Python."""
 
+_PACKAGE = os.path.join(Path(__file__).parents[1], "")
 _REFERENCE = re.compile(r"[^\n]*\.py:[A-Za-z_]\w*")
 
 
@@ -63,11 +66,17 @@ def placed(value: Any, document: Path | None) -> Any:
         return value
     file, attribute = split(value)
     whole = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
-    home = run_around(document) if document else None
-    if home and not whole.resolve().is_relative_to(home.resolve()):
-        fix = "name a law of your own in a study file of your own"
-        raise UserError("the configuration of a run names code outside the run", str(whole), fix)
+    if document:
+        check_within(whole, document)
     return f"{whole}:{attribute}"
+
+
+def check_within(named: Path, document: Path) -> None:
+    """Raises UserError where a document that is part of a run names code, or another document, outside the run."""
+    home = run_around(document)
+    if home and not named.resolve().is_relative_to(home.resolve()):
+        fix = "name it in a study file of your own"
+        raise UserError("the configuration of a run names code outside the run", str(named), fix)
 
 
 def check_trust(leaves: Iterable[Any], document: Path | None = None) -> None:
@@ -103,10 +112,25 @@ def load(reference: str) -> tuple[Any, Foreign]:
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
 
 
-def raised_at(error: Exception, reached_from: str, otherwise: str) -> str:
-    """FILE:LINE where code from elsewhere has raised an error, the innermost place behind our own file."""
+@contextmanager
+def contained(what: str, where: str) -> Iterator[None]:
+    """Within the block, which runs code from elsewhere, all that it raises is the user's error: SystemExit too.
+
+    Only Ctrl-C passes. `what` failed, at `where` unless the error knows its place.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, UserError) or from_outside(error):
+            raise
+        told = f"{what} failed: {type(error).__name__}: {error}".rstrip(": ")
+        raise UserError(told, raised_at(error) or where, "mend it there; --debug shows more") from error
+
+
+def raised_at(error: BaseException) -> str:
+    """FILE:LINE where code from elsewhere has raised an error: the innermost place that is not the package's."""
     places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
-    return next((each for each in places[::-1] if not each.startswith(reached_from)), otherwise)
+    return next((each for each in places[::-1] if not each.startswith((_PACKAGE, "<"))), "")
 
 
 def installed(module: ModuleType, attribute: str) -> Foreign:

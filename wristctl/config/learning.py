@@ -72,8 +72,9 @@ PRESETS: dict[str, dict[str, Any]] = {
         "patience": 30,
     },
 }
-"""T1's columns as printed (decay coupled to the gradient, raw inputs, momentum read as beta1), and a network that is
-accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its layers."""
+"""T1's columns (momentum read as beta1; coupled decay and raw inputs, of which T1 says nothing, C11), and a network
+that is accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its
+layers."""
 
 MOST_WEIGHTS = 4000
 """Of a network trained by second order, which solves for all of them at once (2 inputs counted)."""
@@ -92,10 +93,11 @@ class NetworkSettings(Section):
     activation: Activation = choice("sigmoid", "activation", "paper")
     optimiser: Literal["adam", "adamw", "sgd", "levenberg-marquardt"] = choice(
         "adamw",
-        "adam couples weight decay to the gradient (as printed, C11: collapses), adamw does not; levenberg-marquardt "
-        "takes all samples in one step of second order: for small networks, without rate, schedule, beta1 and batch",
+        "adam couples weight decay to the gradient (C11: on raw inputs sigmoid collapses), adamw does not; "
+        "levenberg-marquardt takes all samples in one step of second order: for small networks, without rate, "
+        "schedule, beta1 and batch",
     )
-    standardise: bool = choice(True, "scale inputs and outputs to zero mean and unit deviation; false: raw, as printed")
+    standardise: bool = choice(True, "scale inputs and outputs to zero mean and unit deviation; false: raw")
     learning_rate: float = quantity(0.003, "", "learning rate at the start", "paper T1", gt=0)
     schedule: Literal["constant", "cosine"] = choice("constant", "learning rate over the epochs; cosine falls to zero")
     beta1: float = quantity(0.90, "", "Adam's beta1, sgd's momentum", "paper T1", ge=0, lt=1)

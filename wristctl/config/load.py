@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.explain import explained
-from wristctl.config.foreign import check_trust, placed
+from wristctl.config.foreign import check_trust, check_within, placed
 from wristctl.config.former import leave_out_former
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.keys import field_at, home_of, keys_of, section_keys
@@ -79,6 +79,7 @@ def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase]
             raise UserError(what, where, "paths are from the file that includes")
         if inner.resolve() in [each.resolve() for each in (*outer, file)]:
             raise UserError(f"{inner} includes itself", where, "leave one of them out")
+        check_within(inner, file)
         _merge_file(data, inner, origins, (*outer, file))
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
     _merge(data, _whole(Document(content, lines), file), str(file), origins)

@@ -5,4 +5,12 @@ from __future__ import annotations
 
 def printable(text: object) -> str:
     """The text with what a terminal obeys, or cannot show, written as escapes: one line."""
-    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in str(text))
+    given = str(text)
+    if given.isprintable():
+        return given
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in given)
+
+
+def printable_lines(text: object) -> str:
+    """The same of a text of several lines, which keeps them."""
+    return "\n".join(map(printable, str(text).split("\n")))

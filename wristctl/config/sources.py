@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 from wristctl.config.errors import UserError
 from wristctl.config.trust import run_around, trusted
+from wristctl.interrupt import from_outside
 
 _PREFIX = "wristctl_foreign_"
 
@@ -130,9 +131,9 @@ def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
     _under_way.append(importing)
     try:
         module = import_module(name)
-    except UserError:
-        raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
+        if isinstance(error, UserError) or from_outside(error):
+            raise
         what = f"{file.name} cannot be loaded: {type(error).__name__}: {error}"
         raise UserError(what, _place(error, importing.seen), "mend it there; --debug shows the traceback") from error
     finally:

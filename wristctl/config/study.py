@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+import re
+
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from wristctl.config.analyse import AnalyseSettings
 from wristctl.config.audit import AuditSettings
@@ -50,3 +53,13 @@ class Study(Section):
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
     track: TrackSettings = TrackSettings()
     hw_run: HwRunSettings = Field(HwRunSettings(), alias="hw-run")
+
+    @field_validator("families")
+    @classmethod
+    def _names_of_files(cls, families: dict[str, Family]) -> dict[str, Family]:
+        """A family's name is part of the names of files of a run."""
+        for name in families:
+            if not re.fullmatch(r"[\w+-][\w .+-]{0,59}", name):
+                what = "{name} is no name for a family: letters, digits, spaces and . _ + - only, at most 60"
+                raise PydanticCustomError("family_name", what, {"name": repr(name)})
+        return families

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from wristctl.config.errors import UserError
@@ -28,16 +30,29 @@ _FIXES: dict[int, Phrase] = {
     errno.ENFILE: "close other programs: the system has no more open files to give",
     errno.ENOMEM: "close other programs, or ask for less at once",
     errno.EAGAIN: "close other programs: the system has no more processes to give",
-    errno.ENAMETOOLONG: "shorten the name",
+    errno.ENAMETOOLONG: ("shorten the name, or choose a shorter path with ", OUT),
     errno.ELOOP: "mend the links on the way to it",
-    errno.ENOENT: "leave the files of a run where they are while it is used",
-    errno.ENOTDIR: "name a folder",
-    errno.EISDIR: "name a file",
+    errno.ENOENT: "make its folder; one that is in use must stay where it is",
+    errno.ENOTDIR: ("a file stands where the path has a folder: move it, or choose another ", OUT),
+    errno.EEXIST: ("a file is in the way: move it, or choose another ", OUT),
+    errno.EISDIR: "a folder is in the way: move it, or name another file",
     errno.ENOTEMPTY: "leave the folder alone meanwhile, and try again",
     errno.EBUSY: "leave the folder alone meanwhile, and try again",
     errno.EXDEV: _ELSEWHERE,
 }
 """What helps where the system refuses, by errno."""
+
+_TO_READ: dict[int, Phrase] = {
+    errno.ENOENT: "check the path",
+    errno.ENOTDIR: "check the path: a file stands where it has a folder",
+    errno.EISDIR: "name a file in that folder",
+    errno.ENAMETOOLONG: "shorten the path",
+    errno.EACCES: "ask its owner to let you read it",
+    errno.EPERM: "ask its owner to let you read it",
+    errno.EIO: "check the disk that it is on, or bring a copy",
+    errno.ESTALE: "check the disk that it is on, or bring a copy",
+}
+"""What helps where a file cannot be read, where it is another thing than where one cannot be written."""
 
 _WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
@@ -53,6 +68,24 @@ def error_of_the_system(error: BaseException, place: Path | str = "") -> UserErr
     return None
 
 
-def fix_of(error: OSError) -> Phrase:
-    """What helps where something could not be written."""
-    return _FIXES.get(error.errno or 0, _SPACE)
+def fix_of(error: OSError, by: Phrase = OUT) -> Phrase:
+    """What helps where something could not be written; `by` is the argument that names another place."""
+    fix = _FIXES.get(error.errno or 0, _ELSEWHERE)
+    return tuple(by if part is OUT else part for part in fix) if isinstance(fix, tuple) else fix
+
+
+def fix_to_read(error: OSError) -> Phrase:
+    """What helps where something could not be read."""
+    return _TO_READ.get(error.errno or 0) or _FIXES.get(error.errno or 0, "bring a copy that can be read")
+
+
+@contextmanager
+def writing(place: Path, by: Phrase = OUT) -> Iterator[None]:
+    """Within the block what the system refuses is the user's error of a place that cannot be written.
+
+    `by` is the argument that names another place.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"cannot write: {error.strerror or error}", str(place), fix_of(error, by)) from error

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.machinery import all_suffixes
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.printable import printable
+from wristctl.config.sha256sums import SUMS, read_seal
 from wristctl.config.wording import Argument
 
-_MANIFEST, _SUMS = "run.json", "SHA256SUMS"
+_MANIFEST = "run.json"
+_MARKS = (_MANIFEST, SUMS, "code.txt")
+"""Files that nothing but a run has, each of which is left where another was lost or taken away."""
 _AGREED = "WRISTCTL_TRUSTED_CODE"
 """Environment variable with the hashes that were agreed to, for the processes that a command starts."""
-_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 Ask = Callable[[str], bool]
 """Shows a text that names files and hashes, and answers whether a person has said yes."""
@@ -35,10 +37,16 @@ def asking(ask: Ask) -> Iterator[None]:
 
 
 def run_around(file: Path) -> Path | None:
-    """The run directory that a file lies in, by its name or by where that leads; None where it is in none."""
+    """The run directory that a file lies in, by its name or by where that leads; None where it is in none.
+
+    What is left of a run is one still: any of the files that mark it, were they links that lead nowhere, or a
+    configuration beside copies of code.
+    """
     for whole in (file.absolute(), file.resolve()):
         for folder in whole.parents:
-            if (folder / _MANIFEST).exists():
+            if any(os.path.lexists(folder / name) for name in _MARKS):
+                return folder
+            if os.path.lexists(folder / "config.yaml") and os.path.lexists(folder / "code"):
                 return folder
     return None
 
@@ -53,11 +61,12 @@ def trusted(file: Path, root: Path) -> Mapping[Path, str] | None:
         return None
     files = _sources(root)
     _check_seal(home, files)
-    lines, whole = _listing(root, files), digest_of(root)
+    whole = digest_of(root, files)
     if whole in os.environ.get(_AGREED, "").split(","):
         return files
-    shown = f"{home} carries code, which would run with all that you may do. In {root}:\n" + "\n".join(lines)
-    if not _ask or not _ask[-1](shown):
+    lines = [printable(line) for line in _listing(root, files)]  # a name may hold what a terminal obeys
+    shown = f"{printable(home)} carries code, which would run with all that you may do. In {printable(root)}:\n"
+    if not _ask or not _ask[-1](shown + "\n".join(lines)):
         fix = ("read it, then ", Argument("trust_code", metavar=""))
         where = f"{root}: " + ", ".join(f"{each.name} sha256 {digest}" for each, digest in files.items())
         raise UserError("the run carries code of its own, and nobody has said that it may run", where, fix)
@@ -71,30 +80,29 @@ def agree(digest: str) -> None:
     os.environ[_AGREED] = f"{known},{digest}" if known else digest
 
 
-def digest_of(root: Path) -> str:
-    """One hash over every source and data file below a folder, by content and name."""
-    return hashlib.sha256("\n".join(_listing(root, _sources(root))).encode()).hexdigest()
+def digest_of(root: Path, files: Mapping[Path, str]) -> str:
+    """One hash over all source and data files below a folder, by their hashes and names."""
+    return hashlib.sha256("\n".join(_listing(root, files)).encode(errors="surrogateescape")).hexdigest()
 
 
 def _sources(root: Path) -> dict[Path, str]:
     """All below a folder but what Python would load in place of sources, and nothing here ever does."""
     others = tuple(set(all_suffixes()) - {".py"})
-    found = sorted(each for each in root.rglob("*") if each.is_file() and not each.name.endswith(others))
+    found = (each for each in root.rglob("*") if each.is_file() and not each.name.endswith(others))
     return {each: hashlib.sha256(each.read_bytes()).hexdigest() for each in found}
 
 
 def _listing(root: Path, files: Mapping[Path, str]) -> list[str]:
-    return [f"{digest}  {each.relative_to(root).as_posix()}" for each, digest in files.items()]
+    return [f"{digest}  {each.relative_to(root).as_posix()}" for each, digest in sorted(files.items())]
 
 
 def _check_seal(home: Path, files: Mapping[Path, str]) -> None:
-    sums = home / _SUMS
-    if not sums.is_file():
+    sealed = read_seal(home)
+    if sealed is None:
         return
-    found = (_LINE.fullmatch(line) for line in sums.read_text(encoding="utf-8", errors="replace").splitlines())
-    sealed = {line[2]: line[1] for line in found if line}
+    whole = _MANIFEST in sealed  # else it was cut short, or is a list of other files
     for file, digest in files.items():
         name = file.relative_to(home).as_posix() if file.is_relative_to(home) else str(file)
-        if sealed.get(name) != digest:
+        if sealed.get(name, "" if whole else digest) != digest:
             what = "the run's code is not as it was sealed"
             raise UserError(what, str(file), "restore the run, or take the law from where you trust it")

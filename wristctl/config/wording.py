@@ -89,6 +89,8 @@ class Call:
 
 OUT = Argument("out", metavar="")
 """The folder of run directories, whichever it may be."""
+FILE, TO = Argument("file", metavar=""), Argument("to", metavar="")
+"""Where a command writes to that makes no run."""
 
 Phrase = str | Argument | Setting | Call | tuple["Phrase", ...]
 """Text with such parts in it: `("give ", Argument("table1"))`."""

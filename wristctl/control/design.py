@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from wristctl.config.errors import UserError, meant
-from wristctl.config.foreign import PLAIN
+from wristctl.config.foreign import PLAIN, contained
 from wristctl.config.section import Parameter
 from wristctl.control.law import Controller
 
@@ -36,11 +36,8 @@ class LawDesign:
                 raise UserError(
                     f"unknown setting '{key}' of {self.name}", f"laws.{self.name}", meant(key, self.section)
                 )
-        try:
+        with contained(f"making {self.name} of these settings", f"laws.{self.name}"):
             controller = self.make(self.values(given))
-        except (ArithmeticError, ValueError, TypeError, KeyError) as error:
-            what = f"{self.name} cannot be made of these settings: {type(error).__name__}: {error}"
-            raise UserError(what, f"laws.{self.name}", "other settings, or mend what makes it") from error
         if not isinstance(controller, Controller) or controller.name.removesuffix(PLAIN) != self.name:
             raise UserError(f"{self.name} makes no controller of that name", f"laws.{self.name}", "mend what makes it")
         return replace(controller, settings=self.section)

@@ -14,7 +14,7 @@ from numba.core import types
 from numba.experimental import function_type
 
 from wristctl.config.errors import UserError
-from wristctl.config.foreign import raised_at
+from wristctl.config.foreign import contained
 
 __all__ = ["PlainLaw"]
 _TEACHES_NUMBA = function_type
@@ -56,12 +56,9 @@ class PlainLaw(types.WrapperAddressProtocol):
     def check(self) -> None:
         """Raise what the law has raised, or a UserError for what it has returned."""
         error, self._error = self._error, None
-        if isinstance(error, Exception) and not isinstance(error, UserError):
-            where = raised_at(error, __file__, self._where)
-            what = f"{self._name} failed: {type(error).__name__}: {error}"
-            raise UserError(what, where, "mend the law; --debug shows more") from error
         if error is not None:
-            raise error
+            with contained(self._name, self._where):
+                raise error
 
     def _call(self, now: int, wrist: int, gains: int, memory: int) -> float:
         if self._error is not None:

@@ -14,12 +14,13 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
+from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import nonideal_of, unmoved
+from wristctl.simulation.nonideal import nonideal_of, unmoved, wears, worn_tendon
 from wristctl.wrist.elastic import Nonideal, Tendons, read_nonideal
 from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import PlantModel, kernel_of, parameters_of, tip_angle
+from wristctl.wrist.plant import PlantModel, kernel_of, parameters_of, tip_angle, travel
 
 _STIFFNESS = len(Nonideal._fields)
 """Row of a tendon's stiffness, before what each has reeled in more."""
@@ -43,11 +44,27 @@ class SupposedWrist(NamedTuple):
 
 class Reeled(NamedTuple):
     """What the spools have reeled in (T, 4) [m], held over each step of h [s], and how many steps a wrist has to settle
-    on the first of them."""
+    on the first of them; `clock` is the time at first [s], None where nothing slips, breaks or has backlash."""
 
     lengths: Any
     h: float
     settle: int
+    clock: Any
+
+
+@compiled
+def _worn(clock: Any, tendons: Any, plant: Any, q: Any, given: Any, time: Any) -> Any:
+    """What four tendons have reeled in of what their spools have; the very same where nothing wears them."""
+    if clock is None:
+        return given
+    path = travel(plant, q)
+    zero = 0.0 * time
+    return (
+        worn_tendon(tendons, 0, given[0], zero, time, path[0], 0.0),
+        worn_tendon(tendons, 1, given[1], zero, time, path[1], 1.0),
+        worn_tendon(tendons, 2, given[2], zero, time, path[0], 1.0),
+        worn_tendon(tendons, 3, given[3], zero, time, path[1], 1.0),
+    )
 
 
 def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
@@ -69,7 +86,8 @@ def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, sta
             reeled[now, 1] + own[taut + 1],
             reeled[now, 3] + own[taut + 3],
         )
-        alive, _ = advance_or_stop(plant, q, rate, given, tendons, spools.h + zero, alive)
+        reached = _worn(spools.clock, tendons, plant, q, given, k * spools.h + zero)
+        alive, _ = advance_or_stop(plant, q, rate, reached, tendons, spools.h + zero, alive)
 
 
 def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int, model: PlantModel = PCC) -> Array:
@@ -81,10 +99,11 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     """
     values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
     nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h) for each in candidates]
+    clock = 0.0 if any(map(wears, nonideal)) else None
     own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
     tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
-    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h))
+    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), clock)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
     for value, tendon, angle in zip(values, tendons, found, strict=True):
         wide = angle.shape[1:]

@@ -13,6 +13,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
+from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
@@ -20,9 +21,10 @@ from wristctl.control.table import controller
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import actuate, at_rest, drive_of
+from wristctl.simulation.actuator import TENDON, Drive, Motor, actuate, at_rest, counted_motor
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.worlds import facing, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import load_segments, segments
@@ -35,6 +37,7 @@ _PERIOD, _LOGGED = 1e-3, 5
 """Tick of the simulation [s], and how many of them lie between two rows of the log."""
 
 
+_SPREADS = tuple(name for name in TrueWrist.model_fields if name.endswith("_spread"))
 _NOTHING_ELSE, _NOR_OF_TENDONS = TrueWrist(), TendonFacts()
 
 
@@ -56,10 +59,17 @@ class RehearsedTruth:
     exposure: float = 4e-3
     dropped: float = 0.05
     plant: TrueWrist = _NOTHING_ELSE
-    """What else its springs do, and the plant's model."""
+    """What else is true of its wrist, and the plant's model."""
     facts: TendonFacts = _NOR_OF_TENDONS
     """What else its tendons do."""
     segments: int = Loop().plant_segments
+
+    def __post_init__(self) -> None:
+        """UserError for what no rehearsal could have."""
+        if spreads := [name for name in _SPREADS if getattr(self.plant, name) != 0.0]:
+            raise UserError("a rehearsed bench has one wrist", f"plant.{spreads[0]}", "give its own value, no spread")
+        if self.actuator.level != "tendon":
+            raise UserError("spools reel in elastic tendons", "actuator.level", "level: tendon")
 
 
 @kernel
@@ -70,14 +80,17 @@ def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: fl
         reeled[0], reeled[1] = actuate(drive, motor, known, command[2], command[0], command[1], h)
 
 
-def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float) -> Array:
-    """What both sides' spools have reeled in (T, 2) [m] each millisecond where feedforward follows a reference."""
+def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float, motor: Motor) -> Array:
+    """What both sides' spools have reeled in (T, 2) [m] each millisecond, as their host counts.
+
+    Feedforward follows a reference; it believes in `actuator`, and the motors turn as `motor` does.
+    """
     followed, law = motion(reference, wrist, horizon, _PERIOD), controller("feedforward")
     loop = Loop(actuator=actuator)
     done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
     sides = [2.0 * done.column(name, 0) for name in ("tension_plus", "tension_minus")]
     commands = np.stack([*sides, followed.theta_ref], axis=1)
-    drive = drive_of(actuator)
+    drive = Drive(TENDON, motor)
     out = np.empty((len(commands), 2))
     _reel_in(drive, at_rest(drive, wrist, PCC, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
     return out
@@ -93,9 +106,11 @@ def rehearse(
     logs, seen, kinds = [], [], []
     for number, (direction, reference) in enumerate(moves):
         side = DIRECTIONS[direction]
-        reeled = spools(in_plane(wrist, direction), toward(reference, direction), actuator, horizon)
+        motor = counted_motor(actuator, truth.actuator)
+        reeled = spools(in_plane(wrist, direction), toward(reference, direction), actuator, horizon, motor)
         own, model = _own(truth, direction), PLANTS[truth.plant.model]
-        angle = angles([own], np.repeat(reeled, 2, axis=1), _PERIOD, truth.segments, model)[0]
+        wound = reeled * (truth.actuator.step_length / actuator.step_length)
+        angle = angles([own], np.repeat(wound, 2, axis=1), _PERIOD, truth.segments, model)[0]
         time = _PERIOD * np.arange(len(angle))
         ticks = slice(None, None, _LOGGED)
         steps = np.rint(reeled[ticks] / actuator.step_length).astype(int)
@@ -119,5 +134,5 @@ def rehearse(
 def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
-    wrist = in_plane(truth.wrist, direction)
+    wrist = plant_of(*facing(truth.wrist, truth.plant, direction))
     return SupposedWrist(wrist, truth.actuator, (one, two, three, four), truth.plant, truth.facts)

@@ -127,7 +127,7 @@ def _read(path: Path) -> tuple[_Header, dict[str, Array]]:
             text = (file.metadata() or {}).get(ENTRY)
             names = file.keys()
             tensors = {name: file.get_tensor(name) for name in names}
-    except (SafetensorError, OSError) as error:
+    except (SafetensorError, OSError, TypeError, AttributeError) as error:  # the last two of types that numpy has not
         raise _broken(path, f"not a readable safetensors file: {error}") from error
     if text is None:
         raise _broken(path, "a safetensors file, but not one of wristctl's networks")

@@ -18,7 +18,7 @@ from wristctl.interrupt import deferred
 from wristctl.learning.dataset import Samples
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
-from wristctl.work.serving import serve_parent
+from wristctl.work.serving import safe_path, serve_parent
 
 Report = Callable[[int, Epoch], None]
 """Told the job's number and its last epoch."""
@@ -38,7 +38,8 @@ def train_all(
 ) -> list[TrainingResult]:
     """Do all jobs, `workers` at once, and give their trials in order; after Ctrl-C those that had begun."""
     if min(workers, len(jobs)) > 1:
-        return _over_processes(samples, jobs, min(workers, len(jobs)), device, checkpoints, report)
+        with safe_path():
+            return _over_processes(samples, jobs, min(workers, len(jobs)), device, checkpoints, report)
     trials: list[TrainingResult] = []
     for number, job in enumerate(jobs):
         try:

@@ -41,6 +41,10 @@ class Ranking:
         beaten = [pair for pair in self.pairs if pair.better == name and pair.p < LEVEL]
         return len(beaten) == len(self.order) - 1
 
+    def supports_better(self, name: str) -> bool:
+        """Whether some other row is better than this one at LEVEL."""
+        return any(pair.worse == name and pair.p < LEVEL for pair in self.pairs)
+
 
 def mean_interval(values: Sequence[float] | Array) -> tuple[float, float, float]:
     """Mean and ends of its 95 % interval (Student's t); the ends are nan for fewer than two values."""

@@ -12,23 +12,32 @@ import shutil
 import stat
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from os.path import lexists
 from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.config.errors import UserError
-from wristctl.records.files import PART, replacing, sync
+from wristctl.config.sha256sums import read_seal, unreadable
+from wristctl.config.system_errors import writing
+from wristctl.config.wording import FILE
+from wristctl.records.files import PART, replacing, sync, sync_all
+from wristctl.records.index import dated
 from wristctl.records.lineage import input_run
-from wristctl.records.lock import LOCK
+from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
-from wristctl.records.seal import read_seal, unreadable
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
-_ID = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}")
+MOST_FILES = 50_000
+"""Of an archive: ten times what a full study of all laws keeps."""
+_ID = re.compile(r"[A-Za-z0-9_.-]{1,200}")
 _LARGEST_SHARE = 200
 """How many times its size an archive may hold: what was squeezed more is no data of ours."""
 _LARGEST_LIST = 1 << 20
+_LONGEST_NAME = 1000
 _PIECE = 1 << 20
 _FIX = "ask for it again: this is not what `wristctl runs pack` wrote"
 
@@ -62,14 +71,22 @@ def pack(run: Run, file: Path) -> list[Run]:
         raise UserError("two runs of one id", run.id, "they are copies: keep one")
     if file.exists():
         raise UserError("a file is in the way", str(file), "remove it, or name another with --file")
-    with replacing(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    files = [each.path / name for each in runs for name in _packed(each)]
+    if len(files) >= MOST_FILES:
+        raise UserError(f"{len(files)} files, and an archive holds {MOST_FILES}", run.id, "copy the folders themselves")
+    with replacing(file, FILE) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         told = {"schema": SCHEMA, "run": run.id, "runs": [each.id for each in runs]}
         _write(archive, PACK, json.dumps(told, indent=2).encode() + b"\n")
         for each in runs:
-            beside = [name for name in (SUMS, SIGNATURE) if (each.path / name).is_file()]
-            for name in [*sorted(read_seal(each.path) or ()), *beside]:
+            for name in _packed(each):
                 _write(archive, f"{each.id}/{name}", (each.path / name).read_bytes())
     return runs
+
+
+def _packed(run: Run) -> list[str]:
+    """Names of the files of a run that travel."""
+    beside = [name for name in (SUMS, SIGNATURE) if (run.path / name).is_file()]
+    return [*sorted(read_seal(run.path) or ()), *beside]
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -79,33 +96,63 @@ def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 class Unpacked(NamedTuple):
-    """What came out of an archive: the run that it is about, those that are new here, and those that were here."""
+    """The run that an archive is about; those that are new here, that were here, and of these that are signed now."""
 
     run: Run
     new: list[Run]
     known: list[Run]
+    signed: list[Run]
 
 
 def unpack(file: Path, results: Path) -> Unpacked:
     """Put an archive's runs into a results folder: all of them, or none.
 
-    Raises UserError for what is no such archive, for names that lead elsewhere, links, and runs that are not as they
-    were sealed or stand here already with other contents (exit code 3).
+    A run that is here already stays as it is; where it has no signature, it is given that of the archive.
+
+    Raises UserError for a file that is no such archive, for names that lead elsewhere, links, and runs that are not as
+    they were sealed, here or in the archive, or stand here already with other contents (exit code 3).
     """
-    results.mkdir(parents=True, exist_ok=True)
-    try:
-        with zipfile.ZipFile(file) as archive:
+    if file.exists() and not file.is_file():
+        raise UserError("no plain file", str(file), "name the archive that `wristctl runs pack` wrote")
+    with _archive(file) as archive:
+        with _reading(file):
             about, entries = _contents(archive, file)
-            scratch = Path(tempfile.mkdtemp(prefix=".unpack-", suffix=PART, dir=results))
-            try:
-                _extract(archive, entries, scratch)
-                return _moved(about, scratch, results, file)
-            finally:
-                shutil.rmtree(scratch, ignore_errors=True)
+        with writing(results):
+            results.mkdir(parents=True, exist_ok=True)
+            scratch, lock = _scratch(results)
+        try:
+            _extract(archive, entries, scratch, file)
+            return _moved(about, scratch, results, file)
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+            lock.release()
+
+
+@contextmanager
+def _archive(file: Path) -> Iterator[zipfile.ZipFile]:
+    with _reading(file):
+        archive = zipfile.ZipFile(file)
+    with archive:
+        yield archive
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Within the block, which only reads, whatever is wrong with an archive is the user's error."""
+    try:
+        yield
     except OSError as error:
         raise unreadable(error, file) from error
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         raise UserError(f"no archive of runs: {error}", str(file), _FIX) from error
+
+
+def _scratch(results: Path) -> tuple[Path, RunLock]:
+    """A hidden folder to unpack into, and its lock: a sign of life for `runs gc`."""
+    while True:
+        scratch = Path(tempfile.mkdtemp(prefix=".unpack-", suffix=PART, dir=results))
+        with suppress(FileNotFoundError):  # `runs gc` saw an empty folder, and took it away
+            return scratch, RunLock(scratch)
 
 
 class _About(NamedTuple):
@@ -116,14 +163,21 @@ class _About(NamedTuple):
 def _contents(archive: zipfile.ZipFile, file: Path) -> tuple[_About, list[zipfile.ZipInfo]]:
     """Which runs, and their entries; UserError where a name is none of theirs."""
     entries = archive.infolist()
+    if len(entries) > MOST_FILES:
+        raise UserError(f"it holds {len(entries)} files, and at most {MOST_FILES} are taken", str(file), _FIX)
     if sum(each.file_size for each in entries) > _LARGEST_SHARE * max(file.stat().st_size, 1):
         raise UserError("it holds far more than its size", str(file), _FIX)
     names = [each.filename for each in entries]
     if len(set(names)) < len(names) or len({name.casefold() for name in names}) < len(names):
         raise UserError("a name stands there twice", str(file), _FIX)
+    if long := next((name for name in names if len(name.encode(errors="replace")) > _LONGEST_NAME), None):
+        raise UserError(f"a name of more than {_LONGEST_NAME} bytes: {long[:40]!r}...", str(file), _FIX)
     about = _about(archive, file)
+    folders = {name[:at] for name in names for at, each in enumerate(name) if each == "/"}
     for each in entries:
         _check_name(each, about.runs, file)
+        if each.filename in folders:
+            raise UserError(f"a file and a folder of one name: {each.filename!r}", str(file), _FIX)
     return about, [each for each in entries if each.filename != PACK]
 
 
@@ -139,9 +193,14 @@ def _about(archive: zipfile.ZipFile, file: Path) -> _About:
         raise UserError(f"{PACK} names no runs", str(file), _FIX)
     if told.get("schema") != SCHEMA:
         raise UserError("packed by another wristctl than this one", str(file), "upgrade wristctl")
-    if not all(isinstance(each, str) and _ID.fullmatch(each) for each in runs) or len(set(runs)) < len(runs):
+    if not all(isinstance(each, str) and _is_id(each) for each in runs) or len(set(runs)) < len(runs):
         raise UserError("a name that is no run's id", str(file), _FIX)
     return _About(told["run"], runs)
+
+
+def _is_id(name: str) -> bool:
+    """Whether a run may be called so: its id begins with the time that it was begun at."""
+    return _ID.fullmatch(name) is not None and dated(name) != "" and name[16:17] == "-"
 
 
 def _check_name(entry: zipfile.ZipInfo, runs: list[str], file: Path) -> None:
@@ -152,17 +211,31 @@ def _check_name(entry: zipfile.ZipInfo, runs: list[str], file: Path) -> None:
     inside = parts[0] in runs and len(parts) > 1 and all(part not in ("", ".", "..", LOCK) for part in parts)
     if not inside or "\\" in entry.filename or "\0" in entry.orig_filename or ":" in parts[0]:
         raise UserError(f"a name that leads elsewhere: {entry.filename!r}", str(file), _FIX)
-    if not plain:
+    if not plain or entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise UserError(f"no plain file: {entry.filename!r}", str(file), _FIX)
 
 
-def _extract(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], scratch: Path) -> None:
-    for entry in entries:
-        path = scratch.joinpath(*entry.filename.split("/"))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with archive.open(entry) as source, path.open("xb") as target:
-            shutil.copyfileobj(source, target, _PIECE)
-        sync(path)
+def _extract(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], scratch: Path, file: Path) -> None:
+    paths = [scratch.joinpath(*entry.filename.split("/")) for entry in entries]
+    with writing(scratch.parent):
+        for entry, path in zip(entries, paths, strict=True):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("xb") as target:
+                for piece in _pieces(archive, entry, file):
+                    target.write(piece)
+        sync_all([*paths, *{path.parent for path in paths}])
+
+
+def _pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: Path) -> Iterator[bytes]:
+    with _reading(file):
+        source = archive.open(entry)
+    with source:
+        while True:
+            with _reading(file):
+                piece = source.read(_PIECE)
+            if not piece:
+                return
+            yield piece
 
 
 def _moved(about: _About, scratch: Path, results: Path, file: Path) -> Unpacked:
@@ -171,15 +244,16 @@ def _moved(about: _About, scratch: Path, results: Path, file: Path) -> Unpacked:
     for name in about.runs:
         for path, what in _problems(scratch / name):
             raise UserError(f"{path}: {what}", f"{name} in {file}", "ask for it again: nothing was kept", exit_code=3)
-        if here[name].exists() and not _same(here[name], scratch / name):
-            what = "a run of this id is here already, and is another"
-            raise UserError(what, str(here[name]), "another results folder, with --out", exit_code=3)
-    new = [name for name in about.runs if not here[name].exists()]
-    for name in new:
-        (scratch / name).rename(here[name])
-    sync(results)
+        if lexists(here[name]):
+            _check_same(here[name], scratch / name)
+    new = [name for name in about.runs if not lexists(here[name])]
     known = [Run(here[name]) for name in about.runs if name not in new]
-    return Unpacked(Run(here[about.run]), [Run(here[name]) for name in new], known)
+    signed = [run for run in known if _signed_too(run.path, scratch / run.id)]
+    with writing(results):
+        for name in new:
+            (scratch / name).rename(here[name])
+        sync(results)
+    return Unpacked(Run(here[about.run]), [Run(here[name]) for name in new], known, signed)
 
 
 def _problems(folder: Path) -> Iterator[tuple[str, str]]:
@@ -189,5 +263,22 @@ def _problems(folder: Path) -> Iterator[tuple[str, str]]:
         yield from Run(folder).problems()
 
 
-def _same(one: Path, other: Path) -> bool:
-    return (one / SUMS).is_file() and (one / SUMS).read_bytes() == (other / SUMS).read_bytes()
+def _check_same(here: Path, arrived: Path) -> None:
+    """UserError where what is here under a run's id is another run, or that run and damaged."""
+    if not (here / SUMS).is_file() or (here / SUMS).read_bytes() != (arrived / SUMS).read_bytes():
+        what = "a run of this id is here already, and is another"
+        raise UserError(what, str(here), "another results folder, with --out", exit_code=3)
+    try:
+        Run(here).check()
+    except UserError as error:
+        what = f"the run is here already, and is damaged: {error.what}"
+        raise UserError(what, error.where, "delete that copy, and unpack again", exit_code=3) from error
+
+
+def _signed_too(here: Path, arrived: Path) -> bool:
+    """Give a run its signature of the archive where it has none here; whether that was so."""
+    if lexists(here / SIGNATURE) or not (arrived / SIGNATURE).is_file():
+        return False
+    with replacing(here / SIGNATURE) as temporary:
+        temporary.write_bytes((arrived / SIGNATURE).read_bytes())
+    return True

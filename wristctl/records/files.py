@@ -5,40 +5,51 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
-from collections.abc import Iterator
+import stat
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wristctl.config.errors import UserError
-from wristctl.config.system_errors import fix_of
+from wristctl.config.system_errors import writing
+from wristctl.config.wording import OUT, Phrase
 
 PART = ".part"
 """End of the hidden name of a file that is being written."""
+LINK, NOT_PLAIN = "is a link, and a run holds files only", "is no plain file"
+_AT_ONCE = 16
+"""Files whose way to the disk is waited for at the same time."""
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, by: Phrase = OUT) -> Iterator[Path]:
     """A temporary path to write to, which takes the place of `path` at once when the block ends well.
 
-    Raises UserError where the file system refuses (no space, no permission). The folder must be there: one that was
-    removed meanwhile does not come back.
+    Raises UserError where the file system refuses (no space, no permission); there is no new file then, and `by` is the
+    argument that names another place. The folder must be there: one that was removed meanwhile does not come back.
     """
     temporary = path.with_name(f".{path.name}{PART}")
+    fresh = not os.path.lexists(path)
     try:
-        yield temporary
-        sync(temporary)
-        temporary.replace(path)
-        sync(path.parent)
-    except OSError as error:
-        raise UserError(f"cannot write: {error.strerror or error}", str(path), fix_of(error)) from error
+        with writing(path, by):
+            yield temporary
+            sync(temporary)
+            temporary.replace(path)
+            try:
+                sync(path.parent)
+            except OSError:
+                if fresh:
+                    path.unlink()
+                raise
     finally:
         with suppress(OSError):  # read-only, or gone: what is told is why it could not be written
             temporary.unlink(missing_ok=True)
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, by: Phrase = OUT) -> None:
     """Write UTF-8 text, whole or not at all."""
-    with replacing(path) as temporary:
+    with replacing(path, by) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
@@ -52,6 +63,20 @@ def sync(path: Path) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def check_plain(path: Path) -> None:
+    """UserError for a link, a pipe or a device where a run has a file; nothing is opened. OSError where it is gone."""
+    mode = path.lstat().st_mode
+    if not stat.S_ISREG(mode):
+        what = LINK if stat.S_ISLNK(mode) else NOT_PLAIN
+        raise UserError(what, str(path), "put a copy of its content in its place", exit_code=3)
+
+
+def sync_all(paths: Iterable[Path]) -> None:
+    """Wait until files are on the disk, many at once: one after the other each takes a turn of the disk."""
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        list(pool.map(sync, paths))
 
 
 def sha256_of(path: Path) -> str:

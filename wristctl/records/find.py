@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from contextlib import suppress
 from pathlib import Path
 
 from wristctl.config.errors import UserError, meant, nearest
@@ -74,9 +73,6 @@ def _readable(path: Path) -> Run:
     run = Run(path)
     if not run.sealed:
         run.manifest  # noqa: B018 - reading it tells a run from a foreign folder
-    with suppress(UserError):
-        if run.manifest.newer:
-            _log.warning("%s was made by a newer wristctl: what this one does not know of it is passed over", run.id)
     return run
 
 

@@ -36,7 +36,8 @@ def copy_code(path: Path, foreign: Sequence[Foreign]) -> Mapping[str, str]:
             if found[name] != digest:
                 raise UserError("a source was changed after it was loaded", str(file), "run again")
     for home in set(homes.values()):
-        agree(digest_of(path / home))  # who named the original need not agree to its copy
+        copies = {path / name: digest for name, digest in found.items() if name.startswith(f"{home}/")}
+        agree(digest_of(path / home, copies))  # who named the original need not agree to its copy
     return dict(sorted(found.items()))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -65,11 +66,25 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         with path.open("rb") as file, zipfile.ZipFile(file) as archive:
             if sum(each.file_size for each in archive.infolist()) > _LARGEST_SHARE * path.stat().st_size:
                 raise ValueError("what it holds is far larger than the file")
+            for entry in archive.infolist():
+                _check_header(archive, entry)
             file.seek(0)
             with np.load(file, allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in arrays.files}
     except (ValueError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError, SyntaxError) as error:
         raise UserError(f"no file of arrays: {error}", str(path), "bring back the file that was sealed") from error
+
+
+def _check_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> None:
+    """ValueError where an entry is no array, or its header promises more than there is: room is made for that first."""
+    import numpy as np
+
+    with archive.open(entry) as file:
+        version = np.lib.format.read_magic(file)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(file)
+    if not entry.filename.endswith(".npy") or math.prod(shape) * dtype.itemsize > entry.file_size:
+        raise ValueError(f"{entry.filename} is no array, or less than its header says")
 
 
 def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300) -> None:

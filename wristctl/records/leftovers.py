@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.records.files import PART
 from wristctl.records.index import TEMPORARY, dated, run_names
 from wristctl.records.live import RESERVE
-from wristctl.records.lock import LOCK, is_locked
+from wristctl.records.lock import LOCK, delete_folder, is_locked, locked
 from wristctl.records.manifest import CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, SUMS
 from wristctl.records.remove import REMOVED
-from wristctl.records.run import Run
+from wristctl.records.seal import SIGNING
 from wristctl.records.sealed_files import INPUTS
-from wristctl.records.tags import change_tags, known_tags
+from wristctl.records.tags import LOCK_OF_TAGS, TAGS, change_tags, known_tags
 
 _BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK, INPUTS}
 """All that a run may have written before its manifest."""
@@ -38,22 +38,30 @@ class Leftover(NamedTuple):
 def leftovers(results: Path) -> Iterator[Leftover]:
     """Half-deleted runs, half-written files, the reserves of crashed runs, and folders in which no run began."""
     for path in sorted(results.glob(".*")):
-        if path.name.endswith(REMOVED) and path.is_dir():
-            yield Leftover(path, "a run that was being deleted", _size(path))
-        elif path.name.startswith(TEMPORARY) or path.name.endswith(PART):
-            yield Leftover(path, "a file that was being written", _size(path))
+        if is_locked(path):
+            continue
+        with suppress(FileNotFoundError):  # another process has deleted it meanwhile
+            if path.name.endswith(REMOVED) and path.is_dir():
+                yield Leftover(path, "a run that was being deleted", _size(path))
+            elif path.name.startswith(TEMPORARY) or path.name.endswith(PART):
+                yield Leftover(path, "a file or folder that was being written", _size(path))
     for name in run_names(results):
-        run = Run(results / name)
-        if run.path.is_symlink() or is_locked(run.path) or not os.access(run.path, os.R_OK | os.X_OK):
-            continue
-        if _began_no_run(run.path):
-            yield Leftover(run.path, "a run that was killed before it began", _size(run.path))
-            continue
-        sealed = (run.path / SUMS).exists()
-        for path in sorted(run.path.rglob(".*")):
-            unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
-            if unfinished or path == run.path / LOCK:
-                yield Leftover(path, "left by a run that was killed", _size(path))
+        with suppress(FileNotFoundError):
+            yield from _left_in(results / name)
+
+
+def _left_in(run: Path) -> list[Leftover]:
+    """The run itself where it never began, or what it left within its folder."""
+    if run.is_symlink() or is_locked(run) or not os.access(run, os.R_OK | os.X_OK):
+        return []
+    if _began_no_run(run):
+        return [Leftover(run, "a run that was killed before it began", _size(run))]
+    sealed, found = (run / SUMS).exists(), []
+    for path in sorted(run.rglob(".*")):
+        unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
+        if unfinished or path in (run / LOCK, run / SIGNING):
+            found.append(Leftover(path, "left by a run that was killed", _size(path)))
+    return found
 
 
 def lost_repetitions() -> Iterator[Leftover]:
@@ -74,7 +82,10 @@ def lost_tags(results: Path) -> dict[str, list[str]]:
 def clear(found: Leftover) -> None:
     """Delete it."""
     if found.path.is_dir() and not found.path.is_symlink():
-        shutil.rmtree(found.path)
+        delete_folder(found.path)
+    elif found.path.name == f".{TAGS}{PART}":
+        with locked(found.path.parent / LOCK_OF_TAGS):  # whoever writes tags has it
+            found.path.unlink(missing_ok=True)
     else:
         found.path.unlink(missing_ok=True)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.config.errors import UserError
 from wristctl.records import formats
-from wristctl.records.files import files_below, replacing, sha256_of, sync, write_text
+from wristctl.records.files import check_plain, files_below, replacing, sha256_of, sync, write_text
 from wristctl.records.journal import Journal, jsonable, now
 from wristctl.records.manifest import (
     CONFIG,
@@ -32,9 +32,10 @@ from wristctl.records.manifest import (
     Error,
     Manifest,
     Output,
+    TakenOver,
 )
 from wristctl.records.readme import readme
-from wristctl.records.seal import result_hash, write_seal
+from wristctl.records.seal import entries, result_hash, write_seal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -144,6 +145,13 @@ class LiveRun:
         """Note how numbers were computed (dtype, integrator, step, threads) in the manifest."""
         self._manifest.numerics.update(jsonable(facts))
 
+    def took_over(self, run: str, taken_over: int, computed_again: int) -> None:
+        """Note, more of them in a later call, the units of work that were taken over from the run that is resumed."""
+        noted = self._manifest.units or TakenOver(run=run)
+        noted.taken_over += taken_over
+        noted.computed_again += computed_again
+        self._manifest.units = noted
+
     def volatile(self, name: str) -> None:
         """Keep an output outside the result hash because it holds wall times or the like."""
         self._volatile.add(name)
@@ -161,10 +169,13 @@ class LiveRun:
         self.event("end", state=state)
         if self._metrics:
             write_text(self.path / METRICS, json.dumps(self._metrics, indent=2, allow_nan=False) + "\n")
+        if state == "ok":
+            self._only_files()
         manifest = self._manifest
         manifest.state, manifest.exit_code, manifest.error = state, exit_code, error
         recorded = _RECORDS | set(manifest.code.foreign)
-        manifest.outputs = [self._output(name) for name in files_below(self.path) if name not in recorded]
+        plain = (name for name in files_below(self.path) if not (self.path / name).is_symlink())
+        manifest.outputs = [self._output(name) for name in plain if name not in recorded]
         if state == "ok":
             self._nothing_lost({each.path for each in manifest.outputs})
         manifest.result_sha256 = result_hash(manifest)
@@ -199,6 +210,12 @@ class LiveRun:
         if there is None or (there.st_dev, there.st_ino) != (self._home.st_dev, self._home.st_ino):
             what = "the run's folder was removed, moved or replaced while it ran"
             raise UserError(what, str(self.path), "leave it where it is, and run again")
+
+    def _only_files(self) -> None:
+        """UserError where something in the run is no plain file: it could not be sealed."""
+        for name, kind in entries(self.path):
+            if kind in ("link", "odd"):
+                check_plain(self.path / name)
 
     def _nothing_lost(self, outputs: set[str]) -> None:
         """UserError where something that the run has written is gone, or its provenance is another."""

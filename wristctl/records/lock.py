@@ -1,7 +1,6 @@
 """A held file lock is the sign of life of a run: the kernel frees it however the process ends.
 
-Where a file system has no locks (some NFS, FUSE), the lock file itself has to do: it names the machine, its boot and
-the process. One of this machine is looked for; a run of another machine is taken to go on while its file is there.
+Where a file system has no locks (some NFS, FUSE), the file itself has to do: its run goes on while it is there.
 """
 
 from __future__ import annotations
@@ -9,24 +8,25 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
-import platform
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 LOCK = ".lock"
 _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
 
 
 class RunLock:
-    """The lock on a run directory, held from creation to `release`."""
+    """The lock on a folder that is being written, held until `release`. FileNotFoundError where the folder is gone."""
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / LOCK
         self._descriptor = os.open(self._path, os.O_CREAT | os.O_RDWR, 0o666)
         try:
-            os.write(self._descriptor, _myself().encode())
             lock(self._descriptor)
+            self._path.stat()  # gone where `runs gc` had the lock before, and took the new folder away
         except OSError:
             os.close(self._descriptor)
             raise
@@ -63,46 +63,63 @@ def lock(descriptor: int) -> None:
 
 
 def is_locked(directory: Path) -> bool:
-    """Whether a living process holds the lock of a run directory."""
+    """Whether a living process holds the lock of a folder, as far as its file system can tell."""
     try:
-        descriptor = os.open(directory / LOCK, os.O_RDONLY)
+        descriptor = os.open(directory / LOCK, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return False
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        with suppress(OSError):
-            return _lives(os.read(descriptor, 1000).decode(errors="replace"))
-        return False
+    except OSError as error:
+        return isinstance(error, BlockingIOError) or error.errno in _NO_LOCKS
     finally:
         os.close(descriptor)
     return False
 
 
-def _myself() -> str:
-    return f"{platform.node()} {_boot()} {os.getpid()} {_begun(os.getpid())}\n"
+def delete_folder(directory: Path) -> None:
+    """Delete a folder with all that is in it, unless somebody has its lock.
+
+    The lock is held meanwhile, so that two who delete it are not in each other's way, and a process that has just made
+    the folder, and waits for its lock, finds that it is gone.
+    """
+    descriptor = None
+    try:
+        descriptor = os.open(directory / LOCK, os.O_CREAT | os.O_RDWR | os.O_NONBLOCK, 0o666)
+    except FileNotFoundError:
+        return
+    except OSError:  # a full disk has no room for a lock, and may have some again after this
+        pass
+    try:
+        if descriptor is None or _taken(descriptor):
+            _empty(directory)
+            shutil.rmtree(directory, onerror=_unless_another_did)
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
 
 
-def _lives(holder: str) -> bool:
-    """Whether the process that a lock file names is there, as far as this machine can tell."""
-    match holder.split():
-        case [_, boot, pid, begun] if boot == _boot() and pid.isdigit():
-            return _begun(int(pid)) == begun
-        case [node, _, _, _]:
-            return node != platform.node()
-    return False
+def _empty(directory: Path) -> None:
+    """Delete all but the lock, which goes last: who takes it then finds nothing, or a folder that is gone."""
+    with suppress(FileNotFoundError):
+        for each in sorted(directory.iterdir()):
+            if each.is_dir() and not each.is_symlink():
+                shutil.rmtree(each, onerror=_unless_another_did)
+            elif each.name != LOCK:
+                each.unlink(missing_ok=True)
 
 
-def _boot() -> str:
-    with suppress(OSError):
-        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
-    return "-"
+def _unless_another_did(function: Any, path: str, raised: Any) -> None:
+    """Raise what a deletion met, unless another process has deleted the same, or is about to."""
+    error = raised[1]
+    if not isinstance(error, FileNotFoundError) and getattr(error, "errno", 0) != errno.ENOTEMPTY:
+        raise error
 
 
-def _begun(pid: int) -> str:
-    """When a process began, in the kernel's ticks: a number is given to another process one day."""
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
-    return "-"
+def _taken(descriptor: int) -> bool:
+    """Take a file's lock where nobody has it; also where the file system has none."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno in _NO_LOCKS
+    return True

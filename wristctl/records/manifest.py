@@ -1,11 +1,14 @@
-"""run.json: what was run, on what, by which code, where, and what came out."""
+"""run.json: what was run, on what, by which code, where, and what came out.
+
+What others act on (ids, kinds, roles, hashes, names of files) has one form, and a manifest with another is none.
+"""
 
 from __future__ import annotations
 
-import re
-from typing import Any, Literal
+from pathlib import PurePosixPath
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
 SIGNATURE = "SHA256SUMS.sig"
@@ -28,6 +31,21 @@ def command_of(kind: str) -> str:
     return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
 
 
+def _inside(name: str) -> str:
+    """A name of a file in the run."""
+    if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts or "\0" in name:
+        raise ValueError("leads out of the run")
+    return name
+
+
+RunId = Annotated[str, Field(pattern=r"^[0-9]{8}T[0-9]{6}Z-[A-Za-z0-9_.-]{1,200}$")]
+"""It begins with the UTC time at which the run began."""
+_Kind = Annotated[str, Field(pattern=r"^[a-z]{1,20}(-[a-z]{1,20}){0,3}$")]
+_Role = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,40}(\[[0-9]{1,4}\])?$")]
+_Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+_Inside = Annotated[str, AfterValidator(_inside)]
+
+
 class ManifestPart(BaseModel):
     """A part of the manifest. What a later version adds is passed over: see docs/runs.md on compatibility."""
 
@@ -45,21 +63,21 @@ class Column(ManifestPart):
 class Output(ManifestPart):
     """A file that the run wrote; volatile ones (wall times, reports) stand outside the result hash."""
 
-    path: str
-    sha256: str
+    path: _Inside
+    sha256: _Digest
     bytes: int
     volatile: bool = False
     columns: list[Column] = []
 
 
 class Input(ManifestPart):
-    """An earlier run that this one read; `result_sha256` says what was in it."""
+    """An earlier run that this one read; `result_sha256` says what was in it, and is empty of one that was stopped."""
 
-    role: str
-    kind: str
-    run: str
+    role: _Role
+    kind: _Kind
+    run: RunId
     path: str
-    result_sha256: str
+    result_sha256: _Digest | Literal[""]
 
 
 class Code(ManifestPart):
@@ -74,7 +92,7 @@ class Code(ManifestPart):
     dirty: bool | None = None
     patch_sha256: str | None = None
     tree_sha256: str
-    foreign: dict[str, str] = {}
+    foreign: dict[_Inside, _Digest] = {}
 
 
 class Environment(ManifestPart):
@@ -94,6 +112,14 @@ class Environment(ManifestPart):
     threads: dict[str, str]
     packages: dict[str, str]
     packages_sha256: str
+
+
+class TakenOver(ManifestPart):
+    """Units of work of a run that was resumed: how many were taken over, and how many were computed again to check."""
+
+    run: str
+    taken_over: int = 0
+    computed_again: int = 0
 
 
 class Timing(ManifestPart):
@@ -122,9 +148,9 @@ SCHEMA = "wristctl.run/1"
 class Manifest(ManifestPart):
     """Everything about one run but its results."""
 
-    schema_: str = Field(default=SCHEMA, alias="schema", pattern=r"^wristctl\.run/[0-9]{1,6}$")
-    id: str
-    kind: str
+    schema_: str = Field(default=SCHEMA, alias="schema", pattern=f"^{SCHEMA}$")
+    id: RunId
+    kind: _Kind
     label: str
     state: EndState = "running"
     exit_code: int | None = None
@@ -139,18 +165,9 @@ class Manifest(ManifestPart):
     environment: Environment
     inputs: list[Input] = []
     outputs: list[Output] = []
+    units: TakenOver | None = None
+    """None: no run was resumed that keeps units of work"""
     numerics: dict[str, Any] = {}
     timing: Timing
     result_sha256: str | None = None
     fingerprint: str
-
-    @property
-    def newer(self) -> bool:
-        """Whether a later wristctl made it, which may mean things that this one does not know."""
-        return int(self.schema_.rpartition("/")[2]) > int(SCHEMA.rpartition("/")[2])
-
-
-def is_newer(content: bytes) -> bool:
-    """Whether what cannot be read as a manifest is one of a later wristctl."""
-    found = re.search(rb'"schema": *"wristctl\.run/([0-9]{1,6})"', content)
-    return found is not None and int(found[1]) > int(SCHEMA.rpartition("/")[2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, PATCH, SUMS, Manifest, command_of
+from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, PATCH, SUMS, Manifest, TakenOver, command_of
 
 
 def readme(manifest: Manifest, summary: str) -> str:
@@ -18,6 +18,7 @@ def readme(manifest: Manifest, summary: str) -> str:
             f"\nInput `{each.role}`: {each.kind} run {each.run} (result {each.result_sha256[:12]})."
             for each in manifest.inputs
         ),
+        *([_taken_over(manifest.units)] if manifest.units else []),
         *([f"\nError: {manifest.error.what} {manifest.error.where}".rstrip()] if manifest.error else []),
         *(["", "## Result", "", summary.strip()] if summary else []),
         *(["", "## Files", ""] if manifest.outputs else []),
@@ -49,3 +50,9 @@ def readme(manifest: Manifest, summary: str) -> str:
     if foreign := manifest.code.foreign:
         lines.append(f"- code from elsewhere, which you should read before you run it: `{'`, `'.join(foreign)}`")
     return "\n".join(lines) + "\n"
+
+
+def _taken_over(units: TakenOver) -> str:
+    """How much of a run was computed in another one."""
+    text = f"\n{units.taken_over} units of work were computed in run {units.run}, which this one goes on from"
+    return f"{text}; {units.computed_again} more of its units were computed again here, and gave the same."

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from wristctl.config.errors import UserError
+from wristctl.config.sha256sums import read_seal
 from wristctl.records.lineage import dependents
+from wristctl.records.lock import delete_folder
 from wristctl.records.run import Run
-from wristctl.records.seal import added, read_seal
+from wristctl.records.seal import added
 from wristctl.records.tags import change_tags, known_tags
 
 REMOVED = ".removed"
@@ -45,24 +46,19 @@ def foreign(run: Run) -> list[str]:
 
 
 def remove(run: Run) -> None:
-    """Delete a run's tags, then the run; of a link that stands for a run, the link.
+    """Delete a run, then its tags; of a link that stands for a run, the link.
 
-    It is first renamed, so that no half-deleted run is ever listed; `leftovers` finds what a kill leaves of that.
+    It is first renamed, so that no half-deleted run is ever listed; `leftovers` finds what a kill leaves of run and
+    tags.
     """
-    tags = known_tags(run.path.parent).get(run.id, [])
-    if tags:
-        change_tags(run.path.parent, run.id, remove=tags)
     hidden = _free(run.path.with_name(f".{run.id}{REMOVED}"))
-    try:
-        if run.path.is_symlink():
-            run.path.unlink()
-            return
+    if run.path.is_symlink():
+        run.path.unlink()
+    else:
         run.path.rename(hidden)
-    except OSError:
-        if tags:
-            change_tags(run.path.parent, run.id, add=tags)
-        raise
-    shutil.rmtree(hidden)
+        delete_folder(hidden)
+    if tags := known_tags(run.path.parent).get(run.id):
+        change_tags(run.path.parent, run.id, remove=tags)
 
 
 def _held_by_others(folder: Path) -> Path | None:

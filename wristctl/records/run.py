@@ -13,22 +13,20 @@ from pydantic import ValidationError
 
 from wristctl.config.errors import UserError, meant
 from wristctl.config.load import load_study
+from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.config.study import Study
 from wristctl.config.wording import Call
-from wristctl.records.files import files_below
+from wristctl.records.files import LINK, files_below
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
-from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of, is_newer
+from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
 from wristctl.records.seal import (
     ADDED,
     ADDED_FOLDER,
     CHANGED,
-    LINK,
     MISSING,
     faults_of_files,
     faults_of_manifest,
-    read_seal,
-    unreadable,
 )
 
 if TYPE_CHECKING:
@@ -73,9 +71,10 @@ class Run:
         try:
             return Manifest.model_validate_json(content)
         except (ValidationError, RecursionError) as error:
-            if is_newer(content):
-                raise UserError("made by a newer wristctl than this one", str(file), "upgrade wristctl") from error
-            raise UserError("not a manifest of a wristctl run", str(file), NAME_A_RUN) from error
+            fix = (*NAME_A_RUN, ", or upgrade wristctl where a newer one made it")
+            place = ".".join(map(str, error.errors()[0]["loc"])) if isinstance(error, ValidationError) else ""
+            where = f"{file}: {place[:100]}" if place else str(file)
+            raise UserError("not a manifest of a run that this wristctl knows", where, fix) from error
 
     @property
     def kind(self) -> str:

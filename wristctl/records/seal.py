@@ -7,13 +7,11 @@ can seal a directory anew, which is what `wristctl runs sign` and `verify --sign
 from __future__ import annotations
 
 import os
-import re
 import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from wristctl.config.errors import UserError
-from wristctl.records.files import files_below, sha256_of, sha256_of_list, sync, write_text
+from wristctl.records.files import LINK, NOT_PLAIN, PART, files_below, sha256_of, sha256_of_list, sync, write_text
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, SIGNATURE, SOURCES, SUMS, Manifest
 
@@ -22,34 +20,13 @@ REQUIRED = (MANIFEST, CONFIG, PACKAGES, SOURCES)
 
 CHANGED, MISSING = "hash does not match what was sealed", "sealed file is missing"
 ADDED, ADDED_FOLDER = "file was added after sealing", "folder was added after sealing"
-LINK, NOT_PLAIN = "is a link, and a run holds files only", "is no plain file"
-UNREADABLE = "cannot be read: "
-_BESIDE = (SUMS, SIGNATURE, LOCK)
+SIGNING = f".{SIGNATURE}{PART}"
+"""What stays where `runs sign` was killed."""
+_BESIDE = (SUMS, SIGNATURE, SIGNING, LOCK)
 """What stands beside the files that are sealed; a lock stays where a process was killed at the very end."""
-_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 Fault = tuple[str, str]
 """A path in the run directory, and what is wrong with it."""
-
-
-def read_seal(folder: Path) -> dict[str, str] | None:
-    """SHA256SUMS: the hash of each sealed file by name, lines that are none left out; None where there is no seal.
-
-    UserError where it is there, perhaps, and cannot be read.
-    """
-    try:
-        text = (folder / SUMS).read_text(encoding="utf-8", errors="replace")
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
-        return None
-    except OSError as error:
-        raise unreadable(error, folder / SUMS) from error
-    lines = (_LINE.fullmatch(line) for line in text.split("\n"))
-    return {line[2]: line[1] for line in lines if line and _inside(line[2])}
-
-
-def unreadable(error: OSError, file: Path) -> UserError:
-    """The user's error of a file that may be as it was, if only it could be read."""
-    return UserError(f"{UNREADABLE}{error.strerror}", str(file), "ask its owner to let you read it")
 
 
 def write_seal(folder: Path, known: dict[str, str]) -> None:
@@ -128,7 +105,3 @@ def faults_of_manifest(folder: Path, sums: dict[str, str], manifest: Manifest) -
 def result_hash(manifest: Manifest) -> str:
     """One hash over the outputs that are results."""
     return sha256_of_list([(each.path, each.sha256) for each in manifest.outputs if not each.volatile])
-
-
-def _inside(name: str) -> bool:
-    return not name.startswith("/") and ".." not in name.split("/")

@@ -79,7 +79,11 @@ def start_run(
                 if seen.asked:  # and swallowed by a library
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
-                lock = RunLock(path)
+                while lock is None:
+                    try:
+                        lock = RunLock(path)
+                    except FileNotFoundError:  # `runs gc` saw an empty folder, and took it away
+                        path = _new_directory(out, kind, label, digest)
             run = _begin(path, kind, files, label, argv, inputs, digest, page, foreign, about)
         except BaseException as error:
             with undisturbed():  # no manifest yet: nothing that could be read
@@ -169,7 +173,7 @@ def _begin(
         Input(
             role=each.role,
             kind=each.run.kind,
-            run=each.run.id,
+            run=each.run.manifest.id,
             path=str(each.run.path),
             result_sha256=each.run.result_hash,
         )
@@ -209,6 +213,8 @@ def fingerprint(config: str, code: Code, environment: Environment, inputs: Mappi
 
 def _refused(error: BaseException, path: Path) -> BaseException:
     """The user's error behind one of the disk or the system, wherever it was met; any other error as it is."""
+    if not isinstance(error, Exception | KeyboardInterrupt):  # SystemExit above all, which would end in silence
+        return RuntimeError(f"{type(error).__name__} was raised: {error}".rstrip(": "))
     known = None if isinstance(error, FileNotFoundError) else error_of_the_system(error, path)
     return known or error
 

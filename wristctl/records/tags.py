@@ -12,7 +12,7 @@ from wristctl.config.errors import UserError
 from wristctl.records.files import write_text
 from wristctl.records.lock import locked
 
-TAGS = "tags.json"
+TAGS, LOCK_OF_TAGS = "tags.json", ".tags.lock"
 
 _log = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ def change_tags(results: Path, run: str, add: Iterable[str] = (), remove: Iterab
     for tag in add:
         if not re.fullmatch(r"[A-Za-z0-9_.:/-]{1,60}", tag):
             raise UserError("a tag holds letters, digits and _ . : / -", repr(tag), "respell it")
-    with locked(results / ".tags.lock"):
+    with locked(results / LOCK_OF_TAGS):
         tags = read_tags(results)
         remaining = sorted((set(tags.pop(run, ())) | set(add)) - set(remove))
         if remaining:

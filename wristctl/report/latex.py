@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from wristctl.config.printable import printable
 from wristctl.report.printed_table import Table, number
 
 
@@ -11,13 +12,13 @@ def latex_table(table: Table) -> str:
     """A table for the packages booktabs and caption, numbers to four digits and aligned to the right."""
     import pandas as pd
 
-    columns = [str(each) for each in table.columns]
+    columns = [printable(each) for each in table.columns]
     cells = [[_cell(value) for value in row] for row in table.rows]
     numeric = [not any(isinstance(row[at], str | bool) for row in table.rows) for at in range(len(columns))]
     styled = pd.DataFrame(cells, columns=columns).style.hide(axis="index").format(escape="latex")
     styled = styled.format_index(escape="latex", axis="columns")
     aligned = "".join("r" if each else "l" for each in numeric)
-    text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(table.title) or None)
+    text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(printable(table.title)) or None)
     return text.rstrip()
 
 
@@ -26,7 +27,7 @@ def _cell(value: Any) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return value if isinstance(value, str) else number(float(value))
+    return printable(value) if isinstance(value, str) else number(float(value))
 
 
 _ESCAPED = {each: f"\\{each}" for each in "&%$#_{}"} | {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from wristctl.config.printable import printable
 from wristctl.records.lineage import Ancestor
 
 _WIDTH, _HEIGHT, _GAP, _ROW = 192, 44, 44, 60
@@ -52,11 +53,12 @@ def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
 
 def _box(node: Ancestor, x: int, y: int, own: bool) -> str:
     kind = escape(_WORDS.get(node.kind, node.kind))
-    short = escape(node.id if len(node.id) <= 26 else f"{node.id[:16]} … {node.id[-6:]}")
+    name = printable(node.id)
+    short = escape(name if len(name) <= 26 else f"{name[:16]} … {name[-6:]}")
     mark = ' class="own"' * own + ' class="odd"' * (not own and node.state != "ok")
     state = "" if node.state == "ok" else f" ({escape(node.state)})"
     return (
-        f"<g{mark}><title>{escape(node.id)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
+        f"<g{mark}><title>{escape(name)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
         f"<text x='{x + 10}' y='{y + 18}'>{kind}{state}</text>"
         f"<text class='id' x='{x + 10}' y='{y + 34}'>{short}</text></g>"
     )

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl import __version__
 from wristctl.config.errors import UserError
+from wristctl.config.printable import printable_lines
 from wristctl.config.wording import Call
 from wristctl.records.lineage import ancestry
 from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of
@@ -70,7 +71,9 @@ def _templates() -> Environment:
     from jinja2 import Environment, FileSystemLoader
 
     folder = Path(__file__).parent / "templates"
-    made = Environment(loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(
+        loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+    )
     made.filters["cell"] = _cell
     scripts = [made.get_template(each.name).render().encode() for each in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
@@ -86,6 +89,11 @@ def figures(run: Run, beside: Path | None = None) -> Figures:
     files = [file for folder in folders for file in folder.glob("*.svg") if not file.is_symlink()]
     files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
     return [(file.stem, captions.get(file.stem) or file.stem.replace("-", " "), inline_figure(file)) for file in files]
+
+
+def _shown(value: Any) -> Any:
+    """What stands in a page, which somebody may look at in a terminal: texts without what that obeys."""
+    return printable_lines(value) if type(value) is str else value
 
 
 def _cell(value: Any) -> str:

@@ -34,7 +34,7 @@ class Table:
         for chosen in _blocks(widths, width):
             rule = "  ".join("-" * widths[at] for at in chosen)
             blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
-        return "\n".join([self.title, ""] * bool(self.title) + ["\n\n".join(blocks)])
+        return "\n".join([printable(self.title), ""] * bool(self.title) + ["\n\n".join(blocks)])
 
 
 def number(value: float) -> str:

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 
 from wristctl.comparison.paper import FACTOR
 from wristctl.comparison.robust import Strip
+from wristctl.comparison.verdicts import FAILING
+from wristctl.config.audit import VerdictName
 from wristctl.report.style import (
     BLUE,
     GREEN,
@@ -26,11 +28,11 @@ from wristctl.report.style import (
     with_unit,
 )
 
-_COLOURS = {
-    "reproduced": (GREEN, "holds"),
-    "better than the paper": (BLUE, "ours is less"),
-    "worse than the paper": (VERMILLION, "ours is more, fails or never settles; the other way round"),
-    "not specified enough": (SILVER, "alike within 5 %"),
+_COLOURS: dict[tuple[VerdictName, ...], tuple[str, str]] = {
+    ("reproduced",): (GREEN, "holds"),
+    ("better than the paper",): (BLUE, "ours is less"),
+    FAILING: (VERMILLION, "ours is more, fails or never settles; the other way round"),
+    ("not specified enough",): (SILVER, "alike within 5 %"),
 }
 _WIDE = 44
 """Letters of a line beside the bars."""
@@ -44,8 +46,8 @@ def shares(found: Sequence[Strip], heading: str = "") -> Figure:
     panel = axes[0, 0]
     places = np.arange(len(found))[::-1]
     left = np.zeros(len(found))
-    for verdict, (colour, label) in _COLOURS.items():
-        width = np.array([each.share(verdict).value for each in found])  # type: ignore[arg-type]
+    for verdicts, (colour, label) in _COLOURS.items():
+        width = np.array([each.share(*verdicts).value for each in found])
         if width.any():
             panel.barh(places, width, left=left, height=0.72, color=colour, label=label)
         left += width
@@ -81,8 +83,8 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
     x, names = _places(values)
     failed = ~np.isfinite(one.ratios)
     y = np.clip(np.where(failed, _FURTHEST, one.ratios), 1.0 / _FURTHEST, _FURTHEST)
-    for verdict, (colour, label) in _COLOURS.items():
-        own = np.array([each == verdict for each in one.verdicts])
+    for verdicts, (colour, label) in _COLOURS.items():
+        own = np.array([each in verdicts for each in one.verdicts])
         if own.any():
             panel.plot(x[own], y[own], "o", ms=2.5, mew=0, alpha=0.6, color=colour, label=label)
     if names:
@@ -90,7 +92,7 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
     elif x.min() > 0.0 and x.max() > 8.0 * x.min():
         logarithmic(panel.xaxis)
     logarithmic(panel.yaxis)
-    if one.claim.sense != "about":
+    if one.claim.sense != "about" or one.claim.evidence == "arrival":
         panel.axhline(1.0, color=GREY, lw=0.8)
     elif one.claim.than is None and one.claim.evidence != "symmetry":
         panel.axhspan(1.0 / FACTOR, FACTOR, color=GREEN, alpha=0.12, lw=0)

@@ -119,7 +119,7 @@ def batch(
         return unmoved(given, path, given - short, rest[each])
 
     ends = zip(motions, references[:, 0, -1], strict=True)
-    goals = np.array([[end, own.move_to(end), own.begin, own.rest, own.horizon] for own, end in ends])[lanes.motion]
+    goals = np.array([own.goals_at(end) for own, end in ends])[lanes.motion]
     watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
     values = LoopValues(
         plant=of_worlds(lambda each: model.values(actual[each], n)),

@@ -16,7 +16,9 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.simulation.arrival import missing
 from wristctl.simulation.energy import course_energy
+from wristctl.simulation.motion import Goals
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
 
@@ -26,7 +28,7 @@ _LEAST_MOVE = 1e-9
 
 
 class Totals(NamedTuple):
-    """What was summed up over rollouts: `sums` and `goals` by their names in `simulation.sums`, each (count,)."""
+    """What was summed up over rollouts: `sums` by the names of SUMS, `goals` by those of Goals, each (count,)."""
 
     sums: Mapping[str, Array]
     goals: Mapping[str, Array]
@@ -83,20 +85,19 @@ def metrics_of(
     theta: Array,
     theta_ref: Array,
     tension: Array,
-    final: float,
-    rest: float,
+    goals: Goals,
     saturated: Array | None = None,
 ) -> dict[str, float]:
     """Metrics of one recorded series, sampled every `period` [s]: angles (T,) [rad], tensions (T, 2) [N].
 
-    `final` is the final reference angle, reached from 0, and `rest` the time at which the reference rests.
+    `goals` are those of the reference (`Motion.goals`), `saturated` (T,) where the torque was out of reach.
     """
-    from wristctl.simulation.sums import GOALS, SUMS, sums_of  # compiled code, which the table does not need
+    from wristctl.simulation.sums import SUMS, sums_of  # compiled code, which the table does not need
 
     flags = np.zeros(len(theta)) if saturated is None else np.asarray(saturated, float)
-    goals = np.array([final, final, 0.0, rest, len(theta) * period])
     sums = sums_of(period, np.column_stack([theta, theta_ref, tension, flags]), goals)
-    totals = Totals(dict(zip(SUMS, sums[:, None], strict=True)), dict(zip(GOALS, goals[:, None], strict=True)), period)
+    each_goal = {name: np.array([value]) for name, value in goals._asdict().items()}
+    totals = Totals(dict(zip(SUMS, sums[:, None], strict=True)), each_goal, period)
     return {name: float(value[0]) for name, value in summary(totals).items()}
 
 
@@ -158,6 +159,12 @@ STEADY_STATE = Metric(
     lambda of: of.sums["late"] / of.sums["late_count"],
     heading="steady [rad]",
     floor=_ANGLE,
+)
+MISSING = Metric(
+    "",
+    "mean |e| at the end as a share of the largest reference: more than a fifth does not arrive",
+    of_trajectory=missing,
+    floor=1e-3,
 )
 OVERSHOOT = Metric(
     "%",

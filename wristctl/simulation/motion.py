@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,21 @@ class Angles:
             out[:] = self.rows
         else:
             self._work(out)
+
+
+class Goals(NamedTuple):
+    """What metrics need of a reference: simulated loops, recorded trials and tests are all judged by it."""
+
+    final: float
+    """Last reference angle [rad]."""
+    move: float
+    """Last move, signed [rad]: bands and overshoot are shares of it."""
+    begin: float
+    """When the last move begins [s]."""
+    rest: float
+    """When the reference rests [s]; the horizon if it never does."""
+    horizon: float
+    """[s]"""
 
 
 @dataclass(frozen=True)
@@ -95,13 +111,13 @@ class Motion:
         return float(self.theta_ref[-1])
 
     @property
-    def move(self) -> float:
-        """Last move of the reference, signed [rad]."""
-        return self.move_to(self.final)
+    def goals(self) -> Goals:
+        """What metrics need of it."""
+        return self.goals_at(self.final)
 
-    def move_to(self, final: float) -> float:
-        """The same by its last angle [rad], where that is known."""
-        return final if self.turn is None else self.turn
+    def goals_at(self, final: float) -> Goals:
+        """What metrics need of it, by its last angle [rad], where that is known already."""
+        return Goals(final, final if self.turn is None else self.turn, self.begin, self.rest, self.horizon)
 
 
 def _fixed(rows: Array) -> Array:

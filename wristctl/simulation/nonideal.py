@@ -68,6 +68,11 @@ def is_ideal(own: Nonideal) -> bool:
     return not any(shares) and not any(map(math.isfinite, times))
 
 
+def wears(own: Nonideal) -> bool:
+    """Whether tendons may have reeled in something else than their spools."""
+    return own.backlash > 0.0 or any(map(math.isfinite, (own.broken_at, own.slips_at, own.torque)))
+
+
 def _time(given: float | None) -> float:
     return math.inf if given is None else given
 

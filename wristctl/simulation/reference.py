@@ -18,6 +18,7 @@ from wristctl.config.foreign import raised_at
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
+from wristctl.interrupt import from_outside
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.targets import Targets, targets_of
 from wristctl.wrist.directions import DIRECTIONS
@@ -161,10 +162,10 @@ def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
         return kind.course(reference, time)
     try:
         found = np.array(kind.course(reference, time), np.float64)  # theirs may be used again
-    except UserError:
-        raise
-    except Exception as error:
-        what = f"the course failed at {raised_at(error, __file__, name)}: {type(error).__name__}: {error}"
+    except BaseException as error:
+        if isinstance(error, UserError) or from_outside(error):
+            raise
+        what = f"the course failed at {raised_at(error) or name}: {type(error).__name__}: {error}"
         raise UserError(what, key, "mend it; --debug shows more") from error
     if found.shape[-2:] != (3, len(time)):
         what = f"the course of {name} is an array of {found.shape}, not of (3, {len(time)})"

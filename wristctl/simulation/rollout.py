@@ -23,9 +23,9 @@ from wristctl.simulation.convergence import has_kinks, more_finely, settled
 from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
-from wristctl.simulation.motion import Motion
+from wristctl.simulation.motion import Goals, Motion
 from wristctl.simulation.outcome import Outcome
-from wristctl.simulation.sums import GOALS, SUMS
+from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
 
@@ -155,7 +155,7 @@ def _run(
     done.setup.law.check()
     sums = to_rows(done.state.sums, count)
     goals = to_rows(done.world.goals, count)
-    named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(GOALS, goals.T, strict=True))
+    named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(Goals._fields, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
     kept = KeptSamples.of(done.state.record, count) if record else None
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]

@@ -15,6 +15,7 @@ from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import rows_named, rows_of
+from wristctl.simulation.motion import Goals
 
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
@@ -23,10 +24,7 @@ SUMS = (
 )  # fmt: skip
 """Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]."""
 
-GOALS = ("final", "move", "begin", "rest", "horizon")
-"""What metrics need of the reference: final angle and last move [rad], when it begins and rests, horizon [s]."""
-
-goals_of = rows_named(GOALS)
+goals_of = rows_named(Goals._fields)
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _PLUS, _MINUS, _ALIVE,
@@ -83,13 +81,12 @@ def _replay(series: Any, goals: Any, sums: Any, period: float) -> None:
         gather(total, goal, tick * period + 0.0 * row[0], row[0], row[1], row[2], row[3], row[4])
 
 
-def sums_of(period: float, series: Array, goals: Array) -> Array:
+def sums_of(period: float, series: Array, goals: Goals) -> Array:
     """The sums (SUMS,) of a recorded series (T, 5) sampled every `period` [s].
 
-    Its columns are angle and reference [rad], tension of both sides [N], and 1 where the torque was out of reach;
-    `goals` (GOALS,).
+    Its columns are angle and reference [rad], tension of both sides [N], and 1 where the torque was out of reach.
     """
     sums = np.zeros(len(SUMS))
     sums[_ALIVE] = 1.0
-    _replay(np.ascontiguousarray(series), goals, sums, period)
+    _replay(np.ascontiguousarray(series), np.array(goals), sums, period)
     return sums

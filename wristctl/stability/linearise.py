@@ -1,4 +1,9 @@
-"""A configured loop as a linear one, about a resting angle: its own compiled ticks, differentiated."""
+"""A configured loop as a linear one, about a resting angle: its own compiled ticks, differentiated.
+
+Between two ticks the wrist moves under what is held, and a tick's slopes are those of its integration step. The step is
+halved until the plant's answer changes no more: its slopes are then those of the exact hold, the matrix exponential of
+the linear plant, whatever steps the loop is simulated with.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +23,12 @@ from wristctl.simulation.kernel import RECORDED
 from wristctl.stability.hold import HOLD
 from wristctl.stability.loop_ticks import LoopTicks, TickSlopes
 from wristctl.stability.resting_point import RestingPoint, resting_point, with_relaxed_bristles
-from wristctl.stability.sampled_loop import LinearTick, SampledLoop
+from wristctl.stability.sampled_loop import Complex, LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading, smooth
 
+_EXACT, _SHORTEST, _FREQUENCIES = 1e-6, 2e-5, 24
+"""Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and at
+how many frequencies the plant is asked."""
 _OUTPUTS = {name: RECORDED.index(name) for name in ("theta", "rate", "torque_wanted", "tension_plus", "tension_minus")}
 
 
@@ -51,8 +59,8 @@ def linearise(
 ) -> LinearLoop | None:
     """The loop about where it rests with its reference at theta [rad]; None where it rests nowhere near.
 
-    Tendons with friction are taken as `slipping` or `stuck`. Raises UserError for frames that are too many control
-    periods apart.
+    Tendons with friction are taken as `slipping` or `stuck`; what is held between ticks is held exactly, however many
+    integration steps the loop has. Raises UserError for frames that are too many control periods apart.
     """
     sliding = LoopTicks(law, gains, smooth(loop, "slipping"), wrist, theta)
     ticks, point = sliding, resting_point(sliding)
@@ -65,9 +73,10 @@ def linearise(
     own = np.isin(ticks.names, ("memory", "estimate", "estimate at the frame", "delivered", "frame"))
     torque = point.recorded("torque_wanted")
     alone = smooth(loop.model_copy(update={"sensor": Sensor()}), friction)
-    held = LoopTicks(HOLD, (torque,), alone, wrist, theta).slopes(point.state[~own])[0]
+    held, steps = _held(torque, alone, wrist, theta, point.state[~own])
     camera = loop.sensor.level == "camera"
-    closed = [_seen(each) if camera else _commanded(each, memory, held) for each in point.ticks]
+    exact = LoopTicks(law, gains, _stepped(smooth(loop, friction), steps), wrist, theta).slopes(point.state)
+    closed = [_seen(each) if camera else _commanded(each, memory, held) for each in exact]
     return LinearLoop(
         closed=SampledLoop(ticks.period, closed),
         plant=SampledLoop(ticks.period, [_alone(held)]),
@@ -78,6 +87,35 @@ def linearise(
         at_frames=camera,
         bend=_bend(ticks, point),
     )
+
+
+def _held(torque: float, alone: Loop, wrist: WristParameters, theta: float, state: Array) -> tuple[TickSlopes, int]:
+    """The plant's tick from a state with its torque held exactly, and how many integration steps a period has for that.
+
+    Steps of third order, as the wrist's are, converge long before the shortest; of first order 1e-4 may be left.
+    """
+    steps, answer = alone.steps, None
+    while True:
+        (tick,) = LoopTicks(HOLD, (torque,), _stepped(alone, steps), wrist, theta).slopes(state)
+        before, answer = answer, _answer(tick)
+        converged = before is not None and np.abs(answer / before - 1.0).max() <= _EXACT
+        if converged or alone.control_period < 2 * steps * _SHORTEST:
+            return tick, steps
+        steps *= 2
+
+
+def _answer(held: TickSlopes) -> Complex:
+    """The plant's angle and rate per torque at frequencies up to half the sampling rate, (n, 2).
+
+    Far below it the answer is the static one, which no step changes, and difference quotients are less exact.
+    """
+    z = np.exp(1j * np.geomspace(0.03, math.pi, _FREQUENCIES))
+    state = np.linalg.solve(z[:, None, None] * np.eye(len(held.by_gain)) - held.transition, held.by_gain[:, None])
+    return np.asarray((held.outputs[[_OUTPUTS["theta"], _OUTPUTS["rate"]]] @ state)[..., 0], complex)
+
+
+def _stepped(loop: Loop, steps: int) -> Loop:
+    return loop.model_copy(update={"substeps": steps})
 
 
 def _outputs(tick: TickSlopes) -> dict[str, Array]:

@@ -86,8 +86,8 @@ def looks_back(loop: Loop) -> tuple[int, Remembered]:
 class LoopTicks:
     """The ticks of one cycle of a smooth loop (`smooth`) about a reference that rests at theta [rad].
 
-    `sizes` (x,) are the typical sizes of the state's variables and `names` what they are; `guesses` are states (x,)
-    from which a resting point may be looked for. Raises UserError where the observer would have to look back too far.
+    `sizes` (x,) are the typical sizes of the state's variables and `names` what they are. Raises UserError where the
+    observer would have to look back too far.
     """
 
     def __init__(
@@ -98,18 +98,23 @@ class LoopTicks:
         self._law, self._gains, self._world, self._theta = law, np.array([gains], float), World(loop, wrist), theta
         self._model = PLANTS[loop.plant.model]
         self._kernel = kernel_of(run_blocks, self._model)
-        early, self._back = looks_back(loop)
-        self._first = early + self.cycle * math.ceil(_WARM_UP / self.cycle)
+        self._early, self._back = looks_back(loop)
+        self._first = self._early + self.cycle * math.ceil(_WARM_UP / self.cycle)
         self._make(2)
         parts = list(self._parts(0))
         self.sizes = np.concatenate([each.sizes for each in parts])
         self.names = [each.name for each in parts for _ in each.rows]
         self._make(2 * (len(self.sizes) + len(_OTHERS)) + 1)
-        self._run(0, early)
-        self.guesses = [self._states(early)[-1]]
-        for begin, end in ((early, early + 1), (early + 1, self._first)):
+
+    def guesses(self) -> list[Array]:
+        """States (x,) from which a resting point may be looked for: the loop let go from rest, and a while later."""
+        self._make(self._count)
+        self._run(0, self._early)
+        states = [self._states(self._early)[-1]]
+        for begin, end in ((self._early, self._early + 1), (self._early + 1, self._first)):
             self._run(begin, end)
-            self.guesses.append(self._states(end)[-1])
+            states.append(self._states(end)[-1])
+        return states
 
     def slopes(self, state: Array, times: float = 1.0) -> list[TickSlopes]:
         """Each tick of a cycle, taken from the same state (x,), differentiated over so many times a small change.

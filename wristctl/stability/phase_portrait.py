@@ -54,25 +54,30 @@ def phase_portrait(
 ) -> PhasePortrait | None:  # fmt: skip
     """Courses of the loop as it is (with limits, steps, noise) toward theta [rad], from rest to both sides of it.
 
-    None for a law that has no sliding surface. The integral of the error counts from the start.
+    They begin within the wrist's range. None for a law that has no sliding surface. The integral of the error counts
+    from the start.
     """
     if law.surface is None:
         return None
-    room = math.radians(wrist.range_deg) - abs(theta)
-    furthest = min(math.radians(_FURTHEST_DEG), max(room, 0.1))
     count = PLANTS[loop.plant.model].coordinates(loop.plant_segments)
     goal = Reference(kind="step", angle_deg=math.degrees(theta))
     followed = motion(goal, wrist, horizon, sample_period(loop.control_period))
     courses = []
-    for share in _SHARES:
+    for begin in _begins(theta, math.radians(wrist.range_deg)):
         (done,) = repeat(
             law, np.array([law.values(gains)]), [followed], np.zeros(1, np.int64), loop, wrist, [SCENARIO], draws,
-            start=_from(np.full(count, (theta + share * furthest) / count)),
+            start=_from(np.full(count, begin / count)),
         )  # fmt: skip
         course = done.first.trajectory
         courses.append(_approach(law.surface, gains, course.time, course.error, course.rate))
     error, rate, _ = law.surface.weights(gains)
     return PhasePortrait(error / rate, law.surface.layer(gains) / abs(rate), courses)
+
+
+def _begins(theta: float, most: float) -> list[float]:
+    """Angles [rad] to both sides of theta within +-most; none on a side where theta leaves no room."""
+    rooms = {sign: min(math.radians(_FURTHEST_DEG), most - sign * theta) for sign in (-1.0, 1.0)}
+    return [theta + share * rooms[sign] for share in _SHARES if rooms[sign := math.copysign(1.0, share)] > 0.0]
 
 
 def _from(begin: Array) -> Start:

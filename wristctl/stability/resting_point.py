@@ -39,7 +39,7 @@ def resting_point(loop: LoopTicks) -> RestingPoint | None:
 
     All of them must leave the same state, so that a loop which grows fast within its cycle is found as well as another.
     """
-    tried = [RestingPoint(each, loop.slopes(each)) for each in loop.guesses]
+    tried = [RestingPoint(each, loop.slopes(each)) for each in loop.guesses()]
     for point in sorted(tried, key=lambda each: change_in(loop, each)):
         found = _newton(loop, point)
         if change_in(loop, found) < _STILL:

@@ -45,7 +45,7 @@ class Audited(StudyResult):
         """What of the paper holds, in a few lines."""
         from wristctl.studies.audit_answer import answer_of
 
-        return answer_of(self.judgements, self.strips)
+        return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit)
 
     def frame(self) -> pd.DataFrame:
         """One row per claim: the paper's value, verdict and reason, and on each loop our range, verdict and mark."""
@@ -74,7 +74,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 def audit(session: Session) -> Audited:
     """Judge every claim of the paper by rollouts, its own words, or what is still open."""
     from wristctl.comparison.evidence import TRAININGS, Grounds, conditions_of, evidence_study
-    from wristctl.comparison.ledger import judge, ledger_frame
+    from wristctl.comparison.ledger import judge_all, ledger_frame
     from wristctl.control.table import CONTROLLERS
     from wristctl.report.ledger_figure import ours_over_the_papers
     from wristctl.studies.audit_box import box_table, judged_in_box
@@ -93,7 +93,7 @@ def audit(session: Session) -> Audited:
         inputs.read("hardware", _trials),
         study.wrist.tension_limit,
     )
-    judged = [judge(claim, grounds) for claim in claims]
+    judged = judge_all(claims, grounds)
     boxed = judged_in_box(session)
     if not boxed and any(name for each in judged for name in each.found):
         findings.figure("ledger", ours_over_the_papers, judged)
@@ -102,13 +102,18 @@ def audit(session: Session) -> Audited:
     units = {"paper": "", "low": "", "high": ""}
     meaning = {
         "paper": "the paper's value",
-        "verdict": "where all loops agree, or not specified enough; none: a setting",
+        "verdict": "of all loops: where it fails on all, the gravest; else where they differ, not specified enough; "
+        "none: a setting",
+        "whose": "paper, ours (a check of its auditors) or group (its authors elsewhere)",
+        "part_of": "the statement that it is a detail of",
     }
     findings.table("data/claims.csv", ledger_frame(judged), units, meaning)
     findings.plain("evidence.json", shown_by, volatile=True)
-    counted = [j.verdict for j in judged if j.verdict is not None]
+    theirs = [j for j in judged if j.claim.whose == "paper" and not j.claim.part_of]
+    counted = [j.verdict for j in theirs if j.verdict is not None]
     for verdict, count in sorted(Counter(counted).items()):
-        findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=f"claims whose verdict is: {verdict}")
+        says = f"claims of the paper whose verdict is: {verdict}"
+        findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=says)
     evidence = Table("Runs that show it", ("shown by", "run"), list(shown_by.items()))
     tables = [*ledger_tables(judged), *([box_table(boxed)] if boxed else []), evidence]
     return Audited(study, findings, tables, judged, compared, boxed)

@@ -1,93 +1,254 @@
-"""The answer of an audit in words: what of the paper holds, where, what speaks against it, and what is open."""
+"""The first screen of an audit: what of the paper holds, what does not, and what cannot be told, in plain sentences.
+
+Every sentence is chosen by the verdicts. A reader of the paper may repeat it, so none says more than they do.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
-from wristctl.studies.answer_lines import in_lines
+from wristctl.config.loop import LOOPS
+from wristctl.studies.answer_lines import COLUMNS, in_lines
 
 if TYPE_CHECKING:
     from wristctl.comparison.ledger import Judgement
     from wristctl.comparison.robust import Strip
+    from wristctl.comparison.verdicts import Finding
+    from wristctl.config.audit import Claim
 
-LINES = 12
-"""What an answer may take of a terminal."""
-_ORDER = ("reproduced", "better than the paper", "worse than the paper", "contradicted", "not specified enough", "open")
-
-
-class _Part(NamedTuple):
-    """A sentence of the answer; a list may lose what is beyond its last line, where others need the room."""
-
-    text: str
-    most: int = 1
-    is_list: bool = False
+LINES = 24
+"""What the first screen may take of a terminal."""
+_HEAVIEST = 5
+"""Claims of which it has both numbers."""
+_MORE = "All claims with reasons: `wristctl audit ... --all`, or README.md of the run. Words: docs/index.md."
 
 
-def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = ()) -> list[str]:
-    """At most LINES lines; `strips` are the claims over the box."""
+def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> list[str]:
+    """At most LINES lines; `strips` are the claims over the box, `limit` is of the wrist's tendons [N]."""
     claims = [j for j in judged if j.verdict is not None]
-    counted = Counter(str(j.verdict) for j in claims)
-    counts = ", ".join(f"{counted[each]} {each}" for each in _ORDER if counted[each])
-    settings = len(judged) - len(claims)
-    beside = f" {_many(settings, 'setting is', 'settings are')} taken over." * bool(settings)
-    parts = [_Part(f"{_many(len(claims), 'claim')} of the paper, by what all loops agree on: {counts}.{beside}", 2)]
-    for loop in dict.fromkeys(name for j in claims for name in j.found if name):
-        own = {j.claim.id: j.found[loop] for j in claims if loop in j.found}
-        kept = {name: each.mark for name, each in own.items() if each.verdict == "reproduced"}
-        marked = "".join(f", {times} of these {mark}" for mark, times in Counter(filter(None, kept.values())).items())
-        parts.append(_Part(f"On {loop} {len(kept)} of {len(own)} reproduced{marked}{_listed(list(kept))}.", 2, True))
-    others = [j.claim.id for j in claims if j.verdict == "reproduced" and "" in j.found]
-    if others:
-        parts.append(_Part(f"Without a rollout reproduced{_listed(others)}.", 1, True))
-    against = [j.claim.id for j in claims if any(each.verdict == "contradicted" for each in j.found.values())]
-    if against:
-        parts.append(_Part(f"Contradicted by the paper's own equations or words{_listed(against)}.", 2, True))
-    parts += _over_the_box(strips)
-    missing = [j for j in claims if j.verdict == "open"]
-    if missing:
-        named = dict.fromkeys(j.claim.evidence for j in missing if j.claim.evidence in _RUNS)
-        wanted = [f"--{name} RUN ({_RUNS[name]})" for name in named]
-        parts.append(_Part(f"{_many(len(missing), 'claim')} open, for want of {', '.join(wanted) or 'seeds'}."))
-    return [*_fitted(parts, LINES - 1), "All claims with reasons: `wristctl audit ... --all`, or the run's README.md."]
+    loops = list(dict.fromkeys(name for j in claims for name in j.found if name))
+    table = _numbers(claims, loops)
+    first = [*_conditions(loops, limit), *_gains(claims), *_ranking(claims, loops), *_over_the_box(strips)]
+    second = [*_networks(claims), *_untested(claims), *_by_topic(claims)]
+    return [*_fitted(first, second, LINES - 1 - len(table)), *table, _MORE]
 
 
-def _over_the_box(strips: Sequence[Strip]) -> list[_Part]:
-    """Where the laws arrive, and what decides the claims on the paper's own laws."""
+def _fitted(first: Sequence[str], second: Sequence[str], room: int) -> list[str]:
+    """Two paragraphs of sentences in so many lines; what there is no room for is left out from the end, whole."""
+    lines = [line for each in (first, second) for line in in_lines(" ".join(each))]
+    if len(lines) <= room or not (first or second):
+        return lines
+    return _fitted(first, second[:-1], room) if second else _fitted(first[:-1], second, room)
+
+
+def _conditions(loops: Sequence[str], limit: float) -> list[str]:
+    told = [f"{name} ({_described(name, limit)})" for name in loops]
+    return [f"The paper's claims, tried in simulation on the loops {_and(told)}."] * bool(loops)
+
+
+def _described(loop: str, limit: float) -> str:
+    """A built-in loop by what sets it apart."""
+    own = LOOPS.get(loop)
+    if own is None:
+        return "a loop of yours"
+    n, rate = own.plant_segments, 1e-3 / own.control_period
+    ticks = "nearly continuous" if rate >= 100.0 else f"{rate:g} kHz"
+    tensions = f"{limit:g} N" if own.limits and math.isfinite(limit) else "no tension limit"
+    return f"{n} segment{'s' * (n > 1)}, {ticks}, {tensions}"
+
+
+_GAINS = {
+    "smc/printed": ("its sliding mode controller (SMC) with the printed gains", "SMC as printed"),
+    "smc/exchanged": ("SMC with P1 and P2 exchanged (a guess of ours)", "SMC with P1 and P2 exchanged"),
+    "pid/printed": ("its PID with the printed gains", "PID as printed"),
+}
+"""Rows that the paper prints, and the one of ours: what they are, and in short."""
+
+
+def _gains(claims: Sequence[Judgement]) -> list[str]:
+    """Where each set of gains brings the wrist to 30 deg, and where T2's RMSE comes out."""
+    arrivals, numbers = [], []
+    for label, (who, short) in _GAINS.items():
+        own = [j for j in claims if j.claim.label == label]
+        if arrival := _one(j for j in own if j.claim.evidence == "arrival"):
+            arrivals.append(f"by {who} {_places(arrival.found)}")
+        if number := _one(j for j in own if _is_number(j.claim, "rmse")):
+            numbers.append(f"for {short} {_places(number.found)}{_mark(number.found)}")
+    said = [f"30 deg are reached {', '.join(arrivals)}."] if arrivals else []
+    return said + [f"The printed RMSE comes out {', '.join(numbers)}."] * bool(numbers)
+
+
+def _is_number(claim: Claim, metric: str) -> bool:
+    """Whether it is a printed number of this metric, judged on loops as the paper's wrist is."""
+    return (
+        (claim.evidence, claim.metric) == ("comparison", metric)
+        and claim.whose == "paper"
+        and claim.sense == "about"
+        and claim.stiffness_scale == 1.0
+    )
+
+
+def _mark(found: Mapping[str, Finding]) -> str:
+    there = _where(found, "reproduced")
+    beyond = [name for name in there if found[name].mark]
+    where = f"on {_and(beyond)} " * (len(there) > len(beyond))
+    return f" ({where}with tensions that no tendon of this wrist bears)" * bool(beyond)
+
+
+def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
+    """SMC against PID, and the whole order of T2 with our designs of what the paper only names."""
+    from wristctl.comparison.paper import T2
+
+    pairs = []
+    for gains, how in (("printed", "as printed"), ("exchanged", "with P1 and P2 exchanged")):
+        one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
+        pairs += [f"{how} {_places(one.found)}"] if one else []
+    said = [f"SMC has less RMSE than PID: {', '.join(pairs)}."] if pairs else []
+    order = sorted(T2, key=lambda name: T2[name].rmse)
+    links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
+    known = [each for each in links if each is not None]
+    if len(known) < len(links):
+        return said
+    named = [name.upper() for name in order if name not in ("smc", "pid")]
+    holds = [
+        loop
+        for loop in loops
+        if all((own := each.found.get(loop)) and (own.beside or own.verdict) == "reproduced" for each in known)
+    ]
+    return [
+        *said,
+        f"The ranking {' < '.join(name.upper() for name in order)} in RMSE cannot be judged: the paper gives no "
+        f"equations of {_and(named)}; with designs of ours and P1 and P2 exchanged it holds {_on(holds, loops)}.",
+    ]
+
+
+def _is_order(claim: Claim, less: str, more: str) -> bool:
+    """Whether it says that the RMSE of the one, which begins so, is less than that of the other."""
+    return (
+        (claim.evidence, claim.metric) == ("ordering", "rmse")
+        and claim.label.startswith(less)
+        and str(claim.than).startswith(more)
+    )
+
+
+def _over_the_box(strips: Sequence[Strip]) -> list[str]:
+    """In which share of the settings that the paper may have had gains arrive, and give a whole row of T2."""
     if not strips:
         return []
-    arrive = [each for each in strips if each.claim.id.startswith("A-")]
-    said = [
-        f"{each.claim.label} in {100 * each.share('reproduced').value:.2g} %" + f" ({each.told})" * bool(each.told)
-        for each in arrive
+    said = {}
+    for evidence, what in (("arrival", "30 deg are reached"), ("together", "all three numbers of T2 come out at once")):
+        own = [each for each in strips if each.claim.evidence == evidence]
+        shares = [f"{each.claim.label} in {_percent(each.share('reproduced').value)}" for each in own]
+        said[what] = f"{what} with {_and(shares)}" if shares else ""
+    parts = "; ".join(filter(None, said.values()))
+    return [f"Of {len(strips[0].verdicts)} settings that the paper may have had: {parts}."] if parts else []
+
+
+def _networks(claims: Sequence[Judgement]) -> list[str]:
+    """T1: whether sigmoid is the best, and whether it learns, in the ways of training that the paper leaves open."""
+    tested = [j for j in claims if j.claim.evidence == "table1" and j.claim.part_of and j.shown_by]
+    best = [j for j in tested if str(j.claim.metric).endswith("_is_best")]
+    beaten = [j for j in tested if str(j.claim.metric).endswith("_is_beaten")]
+    learns = [j for j in tested if str(j.claim.metric).endswith("_median_r2")]
+    said = []
+    if best:
+        there = [j.claim.says for j in best if j.verdict == "reproduced"]
+        count = len([j for j in beaten if j.verdict == "reproduced"])
+        also = f", and another to be more accurate in {count or 'none'}" * bool(beaten)
+        which = f" ({'; '.join(there)})" if 0 < len(there) < len(best) else ""
+        said.append(
+            f"Of {len(best)} ways to train its networks, between which it does not tell, sigmoid is shown to be the "
+            f"most accurate in {len(there) or 'none'}{which}{also}."
+        )
+    for verdict, what in (("does not hold", "does not learn"), ("open", "may or may not learn")):
+        own = [j.claim.says for j in learns if j.verdict == verdict]
+        if own:
+            said.append(f"Sigmoid {what} (R^2 of {learns[0].claim.value:g}) with {'; with '.join(own)}.")
+    if learns and all(j.verdict == "reproduced" for j in learns):
+        said.append(f"Sigmoid learns (R^2 of {learns[0].claim.value:g}) in all of them.")
+    return said
+
+
+def _by_topic(claims: Sequence[Judgement]) -> list[str]:
+    """What the paper's own words or equations contradict, and what they leave open."""
+    own = [j for j in claims if j.claim.topic and j.claim.whose == "paper" and not j.claim.weight]
+    said = []
+    for verdict, begin in (
+        ("not specified enough", "Cannot be told, since the paper does not say enough"),
+        ("contradicted", "Contradicted by its own equations or words"),
+    ):
+        topics = [j.claim.topic for j in own if j.verdict == verdict and not j.claim.part_of]
+        if topics:
+            said.append(f"{begin}: {', '.join(topics)}.")
+    return said
+
+
+_RUNS = {"table1": "the table of networks", "selection": "the number of layers", "hardware": "the experiment"}
+"""What claims are about that want an earlier run."""
+
+
+def _untested(claims: Sequence[Judgement]) -> list[str]:
+    wanted = dict.fromkeys(j.claim.evidence for j in claims if j.verdict == "open" and j.claim.evidence in _RUNS)
+    told = [f"{_RUNS[name]} (--{name} RUN)" for name in wanted]
+    return [f"Not tested here: {', '.join(told)}."] if told else []
+
+
+def _numbers(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
+    """The heaviest claims with the paper's number and ours, on each loop."""
+    heavy = sorted((j for j in claims if j.claim.weight and j.claim.value), key=lambda j: -j.claim.weight)[:_HEAVIEST]
+    if not heavy or not loops:
+        return []
+    rows = [("(*: reproduced)", "the paper", *loops)]
+    for j in heavy:
+        cells = [_ours(j.found[name]) if name in j.found else "not tried" for name in loops]
+        rows.append((j.claim.topic or j.claim.says, f"{j.claim.value:g} {j.claim.unit}".strip(), *cells))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    widths[0] = min(widths[0], COLUMNS - sum(widths[1:]) - 2 * len(loops) - 2)
+    return [
+        "  ".join(cell[:width].ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    begin = f"Over {len(strips[0].verdicts)} settings that the paper may have had, 30 deg are reached by"
-    parts = [_Part(f"{begin} {', '.join(said)}.", 3)]
-    orders = [each for each in strips if each.claim.than and not each.claim.unspecified]
-    most = [f"{each.claim.id} {100 * each.share('reproduced').value:.0f} %" for each in orders]
-    return parts + [_Part(f"Its orderings of its own two laws hold in: {', '.join(most)}.", 2)] * bool(orders)
 
 
-def _fitted(parts: Sequence[_Part], room: int) -> list[str]:
-    """The lines of all parts, of which none goes for another: lists are cut, the longest first."""
-    lines = [in_lines(part.text, most=part.most, indent="  ") for part in parts]
-    while sum(map(len, lines)) > room:
-        long = [at for at, part in enumerate(parts) if part.is_list and len(lines[at]) > 1]
-        if not long:
-            break
-        at = max(long, key=lambda each: (len(lines[each]), each))
-        lines[at] = in_lines(parts[at].text, most=len(lines[at]) - 1, indent="  ")
-    return [line for part in lines for line in part][:room]
+def _ours(found: Finding) -> str:
+    from wristctl.comparison.ledger import interval
+
+    if math.isnan(found.low):
+        return "fails"
+    return interval(found.low, found.high) + "*" * (found.verdict == "reproduced")
 
 
-_RUNS = {"table1": "train", "selection": "train", "hardware": "hw-run"}
-"""The earlier runs that claims may want, and what leaves them."""
+def _places(found: Mapping[str, Finding]) -> str:
+    """On which loops something is so, on which for some motions only, and on which two are alike."""
+    loops, open_ = [name for name in found if name], _where(found, "not specified enough")
+    alike = [name for name in open_ if found[name].reason.startswith("alike")]
+    some = [name for name in open_ if name not in alike]
+    said = [_on(_where(found, "reproduced"), loops)]
+    said += [f"for some motions only on {_and(some)}"] * bool(some)
+    said += [f"as much as it on {_and(alike)}"] * bool(alike)
+    return ", ".join(said)
 
 
-def _many(count: int, what: str, several: str = "") -> str:
-    return f"{count} {what if count == 1 else several or f'{what}s'}"
+def _on(there: Sequence[str], loops: Sequence[str]) -> str:
+    if len(there) == len(loops) > 1:
+        return "on all loops"
+    return f"on {_and(there)}{' alone' * (len(loops) > 1 == len(there))}" if there else "on no loop"
 
 
-def _listed(names: Sequence[str]) -> str:
-    return f": {', '.join(names)}" if names else ""
+def _where(found: Mapping[str, Finding], verdict: str) -> list[str]:
+    return [name for name, each in found.items() if name and each.verdict == verdict]
+
+
+def _one(judged: Iterable[Judgement]) -> Judgement | None:
+    """The first that was judged on loops."""
+    return next((each for each in judged if any(name for name in each.found)), None)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""

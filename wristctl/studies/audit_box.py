@@ -48,12 +48,14 @@ def judged_in_box(session: Session) -> list[Strip]:
 
 def box_table(found: list[Strip]) -> Table:
     """Where each claim holds, and what decides it."""
+    from wristctl.comparison.verdicts import FAILING
+
     rows = []
     for each in found:
         held = each.share("reproduced")
-        beside = (each.share("better than the paper").value, each.share("worse than the paper").value)
+        beside = (each.share("better than the paper").value, each.share(*FAILING).value)
         second = each.leaves[1].name if each.told and len(each.leaves) > 1 else ""
         rows.append((each.claim.id, held.value, held.low, held.high, *beside, each.told, second))
-    heads = ("claim", "holds in", "95 % low", "high", "better in", "worse in", "decided by", "then by")
+    heads = ("claim", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
     draws = len(found[0].verdicts) if found else 0
     return Table(f"Shares of {draws} settings drawn from what the paper leaves open", heads, rows)

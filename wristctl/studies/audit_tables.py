@@ -1,4 +1,4 @@
-"""The ledger as tables: every claim with a column for each loop, why, and what is still open."""
+"""The ledger as tables: the paper's claims, their details, our own checks, what its authors say elsewhere; and why."""
 
 from __future__ import annotations
 
@@ -11,33 +11,69 @@ from wristctl.report.printed_table import Table
 if TYPE_CHECKING:
     from wristctl.comparison.ledger import Judgement
     from wristctl.comparison.verdicts import Finding
-
-SETTING = "(a setting)"
-"""In place of a verdict."""
+    from wristctl.config.audit import Claim
 
 
 def ledger_tables(judged: Sequence[Judgement]) -> list[Table]:
-    """The claims, by loop where loops decide; then why, what is open, and how many there are of each verdict."""
-    loops = list(dict.fromkeys(name for j in judged for name in j.found if name))
-    by_loop = [j for j in judged if any(name for name in j.found)]
-    others = [j for j in judged if j not in by_loop]
-    heads = ("claim", "the paper says", "paper", "unit")
+    """Sections of claims, by loop where loops decide; then why, what is open, and how many of the paper's have which
+    verdict."""
+    from wristctl.comparison.ledger import worded
+
+    claims = [j for j in judged if j.verdict is not None]
+    settings = [j for j in judged if j.verdict is None]
     tables = []
-    if by_loop:
-        rows = [(*_claim(j), *(part for name in loops for part in _cells(j.found.get(name)))) for j in by_loop]
-        pairs = [part for name in loops for part in (f"ours, {name}", f"verdict, {name}")]
-        tables.append(Table("Claims that rollouts decide", (*heads, *pairs), rows))
-    if others:
-        rows = [(*_claim(j), *_cells(j.found.get("")), ", ".join(j.shown_by)) for j in others]
-        tables.append(Table("Other claims", (*heads, "ours", "verdict", "shown by"), rows))
-    why = [(j.claim.id, j.verdict, j.reason) for j in judged if j.verdict not in (None, "open") and j.reason]
-    still = [(j.claim.id, j.reason) for j in judged if j.verdict == "open"]
+    for title, others, kind in (
+        ("Claims of the paper that rollouts decide", "Other claims of the paper", "paper"),
+        ("Details that rollouts decide", "Other details", "part"),
+        ("Our own checks that rollouts decide", "Our own other checks", "ours"),
+        ("Rollouts on what the paper's authors say elsewhere", "What the paper's authors say elsewhere", "group"),
+    ):
+        tables += _section(title, others, [j for j in claims if _kind(j.claim) == kind])
+    if settings:
+        tables.append(Table("Settings taken over as printed", ("setting", "the paper says", "paper", "unit"),
+                            [tuple(_claim(j)) for j in settings]))  # fmt: skip
+    why = [(j.claim.id, worded(j.claim, str(j.verdict)), j.reason) for j in claims if j.verdict != "open" and j.reason]
+    still = [(j.claim.id, j.reason) for j in claims if j.verdict == "open"]
+    counted = Counter(str(j.verdict) for j in claims if _kind(j.claim) == "paper")
     return [
         *tables,
         Table("Why", ("claim", "verdict", "reason"), why),
         Table("Still open", ("claim", "what would decide it"), still),
-        Table("Verdicts", ("verdict", "claims"), sorted(Counter(j.verdict or SETTING for j in judged).items())),
+        Table("Verdicts on the claims of the paper", ("verdict", "claims"), sorted(counted.items())),
     ]
+
+
+def _kind(claim: Claim) -> str:
+    return "part" if claim.part_of else claim.whose
+
+
+def _section(title: str, title_of_others: str, judged: Sequence[Judgement]) -> list[Table]:
+    """Its claims that loops decide, and those that they do not."""
+    from wristctl.comparison.ledger import worded
+
+    by_loop = [j for j in judged if any(name for name in j.found)]
+    others = [j for j in judged if j not in by_loop]
+    loops = list(dict.fromkeys(name for j in by_loop for name in j.found if name))
+    heads, tables = ("claim", "says", "paper", "unit"), []
+    if by_loop:
+        pairs = [part for name in loops for part in (f"ours, {name}", f"verdict, {name}")]
+        rows = [
+            (
+                *_claim(j),
+                worded(j.claim, str(j.verdict)),
+                *(part for name in loops for part in _cells(j.claim, j.found.get(name))),
+            )
+            for j in by_loop
+        ]
+        tables.append(Table(title, (*heads, "verdict", *pairs), rows))
+    if others:
+        sources = any(j.claim.source for j in others)
+        rows = [
+            (*_claim(j), *_cells(j.claim, j.found.get("")), ", ".join(j.shown_by), *(j.claim.source,) * sources)
+            for j in others
+        ]
+        tables.append(Table(title_of_others, (*heads, "ours", "verdict", "shown by", *("source",) * sources), rows))
+    return tables
 
 
 def _claim(judgement: Judgement) -> Iterator[str]:
@@ -54,12 +90,12 @@ def _bound(sense: str) -> str:
     return {"at most": "<= ", "at least": ">= "}.get(sense, "")
 
 
-def _cells(found: Finding | None) -> tuple[str, str]:
+def _cells(claim: Claim, found: Finding | None) -> tuple[str, str]:
     """Our range and the verdict, marked where it must be."""
-    from wristctl.comparison.ledger import interval
+    from wristctl.comparison.ledger import interval, worded
 
     if found is None:
-        return "", SETTING
+        return "", ""
     mark = f" ({found.mark})" if found.mark else ""
     ours = "" if found.low != found.low and not found.reason.startswith("fails") else interval(found.low, found.high)
-    return ours, found.verdict + mark
+    return ours, worded(claim, found.verdict) + mark

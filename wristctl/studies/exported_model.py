@@ -7,6 +7,8 @@ from pathlib import Path
 
 from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName
+from wristctl.config.printable import printable
+from wristctl.config.wording import FILE
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run
 from wristctl.records.files import write_text
@@ -43,6 +45,6 @@ def export_wrist(run: Run, program: str, file: Path | None, segments: int, direc
     if path.exists():
         raise UserError("a file is in the way", str(path), "remove it, or name another with --file")
     wrist, words = wrist_of(run)
-    about = f"{words}, as {direction} bends it; result {run.result_hash[:12]}"
-    write_text(path, writer(HingeChain.of(in_plane(wrist, direction), segments), about))
+    about = printable(f"{words}, as {direction} bends it; result {run.result_hash[:12]}")  # a comment of one line
+    write_text(path, writer(HingeChain.of(in_plane(wrist, direction), segments), about), FILE)
     return path

@@ -58,7 +58,7 @@ def write_mcap(run: Run, tables: Tables, about: Mapping[str, Mapping[str, str]],
             writer.add_metadata(name, dict(values))
         writer.finish()  # type: ignore[no-untyped-call]
     if not written:
-        raise UserError(f"nothing in that {run.kind} run went on in time", str(run.path), "--to mat or --to parquet")
+        raise UserError(f"nothing in that {run.kind} run went on in time", str(run.path), "--to mat")
 
 
 def _begins(tables: Tables) -> dict[int, float]:

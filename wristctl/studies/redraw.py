@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import Any
 
 from wristctl.config.errors import UserError
 from wristctl.records import Run
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.perform import Prepared, perform, prepare
-from wristctl.studies.procedure import Procedure
+from wristctl.studies.procedures import procedure_of
 from wristctl.studies.session import ShowProgress
 from wristctl.studies.study_result import StudyResult
 from wristctl.studies.unattended import Unattended
@@ -53,9 +52,7 @@ def redrawn(run: Run, show: ShowProgress) -> StudyResult:
 
 def _prepared(run: Run) -> Prepared[Any]:
     """The run's study with its inputs; gains that a comparison searched for itself are those that it found."""
-    name = run.kind.replace("-", "_")
-    procedure: Procedure[Any] = getattr(import_module(f"wristctl.studies.{name}"), name.upper())
-    study, out = run.config, run.path.parent
+    procedure, study, out = procedure_of(run), run.config, run.path.parent
     prepared = prepare(procedure, study, out)
     if run.kind == "compare" and study.compare.tuning is not None:
         settled = study.compare.model_copy(update={"tuning": None})

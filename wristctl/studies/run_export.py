@@ -1,4 +1,4 @@
-"""A run's data in formats of other programs: MATLAB's, Parquet, and MCAP, which robot log viewers open."""
+"""A run's data in formats of other programs: MATLAB's, and MCAP, which robot log viewers open."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wristctl.config.errors import UserError
+from wristctl.config.wording import FILE
 from wristctl.records import Run
 from wristctl.records.files import replacing
 from wristctl.records.formats import read_arrays, read_table
@@ -38,7 +39,7 @@ def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
 
 
 def export_run(run: Run, to: str, file: Path | None) -> Path:
-    """Write a run's data as `to` (mat, parquet, mcap); where they were written.
+    """Write a run's data as `to` (mat, mcap); where they were written.
 
     Raises UserError for a run without data, a file in the way, or a package that is not installed.
     """
@@ -66,7 +67,7 @@ def _mat(run: Run, path: Path) -> None:
         "metrics": {name: _number(each["value"]) for name, each in run.metrics.items()},
         "run": about(run),
     }
-    with replacing(path) as temporary:
+    with replacing(path, FILE) as temporary:
         savemat(
             str(temporary), _named(whole), appendmat=False, long_field_names=True, oned_as="column", do_compression=True
         )
@@ -104,34 +105,6 @@ def about(run: Run) -> dict[str, str]:
     return known | {"result_sha256": run.result_hash, "started": manifest.timing.started}
 
 
-def _parquet(run: Run, path: Path) -> None:
-    """A folder with a file for each table and for the arrays of one length; units are metadata of the columns."""
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise UserError("Parquet needs the package pyarrow, which is not installed", "--to parquet", INSTALL) from None
-    tables = tables_of(run).items()
-    found: dict[str, dict[str, Any]] = {name: {str(key): each for key, each in table.items()} for name, table in tables}
-    for name, arrays in arrays_of(run).items():
-        lengths = sorted({len(each) for each in arrays.values() if each.ndim})
-        for length in lengths:
-            label = f"{name}-arrays" if len(lengths) == 1 else f"{name}-arrays-{length}"
-            found[label] = {key: each for key, each in arrays.items() if each.ndim and len(each) == length}
-    whole = {key.encode(): value.encode() for key, value in about(run).items()}
-    path.mkdir()
-    for name, columns in found.items():
-        told, fields, values = columns_of(run, name), [], []
-        for key, each in columns.items():
-            own = pa.array(each if getattr(each, "ndim", 1) == 1 else np.asarray(each).tolist(), from_pandas=True)
-            unit, meaning = told.get(key, ("", ""))
-            fields.append(pa.field(key, own.type, metadata={"unit": unit, "meaning": meaning}))
-            values.append(own)
-        schema = pa.schema(fields, metadata=whole)
-        with replacing(path / f"{name}.parquet") as temporary:
-            pq.write_table(pa.table(values, schema=schema), temporary)
-
-
 def _mcap(run: Run, path: Path) -> None:
     try:
         from wristctl.studies.mcap_log import write_mcap
@@ -139,13 +112,12 @@ def _mcap(run: Run, path: Path) -> None:
         raise UserError("MCAP needs the package mcap, which is not installed", "--to mcap", INSTALL) from None
     tables = {name: (table, columns_of(run, name)) for name, table in tables_of(run).items()}
     metrics = {name: json.dumps(each) for name, each in run.metrics.items()}
-    with replacing(path) as temporary:
+    with replacing(path, FILE) as temporary:
         write_mcap(run, tables, {"run": about(run), "metrics": metrics}, temporary)
 
 
 FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
     "mat": (".mat", _mat),
-    "parquet": ("-parquet", _parquet),
     "mcap": (".mcap", _mcap),
 }
 """How each format's files end, and what writes them."""

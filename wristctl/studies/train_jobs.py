@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import UserError
 from wristctl.config.learning import NetworkSettings
 from wristctl.config.wording import Argument
+from wristctl.records.files import check_plain
 from wristctl.studies.session import Session
 
 if TYPE_CHECKING:
@@ -27,8 +28,13 @@ def checkpoints_of(session: Session) -> Path | None:
             raise UserError("a training is resumed in a run directory", "train.resume", Argument("out", metavar="DIR"))
         return None
     if stopped is not None and (stopped.path / CHECKPOINTS).is_dir():
-        shutil.copytree(stopped.path / CHECKPOINTS, run.path / CHECKPOINTS)
+        shutil.copytree(stopped.path / CHECKPOINTS, run.path / CHECKPOINTS, copy_function=_copy_plain)
     return run.path / CHECKPOINTS
+
+
+def _copy_plain(source: str, target: str) -> None:
+    check_plain(Path(source))
+    shutil.copyfile(source, target)
 
 
 def train_networks(

@@ -113,6 +113,8 @@ def _ranked(findings: Findings, settings: TrainSettings, table: pd.DataFrame, la
     for name in (name for name in names if rows_by_name[name].activation == "sigmoid"):
         says = f"C16: 1 where sigmoid's RMSE is below every other's of {label} at the 5 % level"
         findings.metric(f"c16_{name}_is_best", int(found.supports_best(name)), n=count, meaning=says)
+        says = f"C16: 1 where some other's RMSE of {label} is below sigmoid's at the 5 % level"
+        findings.metric(f"c16_{name}_is_beaten", int(found.supports_better(name)), n=count, meaning=says)
     heads = ("better", "worse", "median difference of RMSE [deg]", "p", "supported")
     title = f"Ranking of {label}: {' < '.join(found.order)} by mean RMSE; Friedman p = {found.friedman_p:.2g}"
     return Table(title, heads, rows)

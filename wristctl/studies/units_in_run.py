@@ -54,6 +54,8 @@ def performed(
                 session.findings.event("unit", name=unit.name, key=unit.key, **{counted: unit.size}, **spent)
 
         found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
+    if run is not None and stopped is not None:
+        run.took_over(stopped.id, len(found.taken_over), int(found.tried_again is not None))
     for each in found.poisoned:
         session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
     return found

@@ -34,7 +34,7 @@ from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trial_motions import at_rest, back, motion_of
 from wristctl.trial.trials import Trial
-from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
 
@@ -183,9 +183,8 @@ class Experiment:
         """One trial, and the way back to zero."""
         settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
         law, gains = self._laws[trial.row]
-        against = -DIRECTIONS[trial.direction].sign * trial.push
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        disturbances = Disturbances(push=settings.push.model_copy(update={"force": against}))
+        disturbances = Disturbances(push=trial.pushed(settings.push))
         testbed.begin(start, disturbances, self._draws.camera(trial.scenario, trial.repetition))
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         try:

@@ -41,7 +41,7 @@ def evaluated(
     found = dict.fromkeys(names, math.nan)
     if not len(time) or time[-1] < followed.horizon - 1.5 * period:
         return found
-    grid = followed.time
+    grid, goals = followed.time, followed.goals
     tensions = course[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
     plus = on_plus_side(trial.plane)
     sides = np.stack([tensions[:, plus].mean(axis=1), tensions[:, ~plus].mean(axis=1)], axis=1)
@@ -50,18 +50,18 @@ def evaluated(
 
     def judged(angle: Array) -> dict[str, float]:
         flags = np.interp(grid, time, saturated.astype(float)) > 0.5
-        return metrics_of(period, angle, followed.theta_ref, tension, followed.final, followed.rest, flags)
+        return metrics_of(period, angle, followed.theta_ref, tension, goals, flags)
 
     found |= judged(np.interp(grid, time, theta))
     if trial.push:
         seen = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - _EARLY), _LEAST_PUSH)
         if seen is not None:
             found["push_torque"] = seen.torque
-            found["recovery"] = recovery(time, error, followed.move, seen.end)
+            found["recovery"] = recovery(time, error, goals.move, seen.end)
     if truth is not None and len(truth):
         angle = np.interp(grid, truth["time"], truth["theta"])
         found |= {f"true_{name}": value for name, value in judged(angle).items() if name in JUDGED}
         if trial.push:
             ended = push.start + push.duration
-            found["true_recovery"] = recovery(grid, angle - followed.theta_ref, followed.move, ended)
+            found["true_recovery"] = recovery(grid, angle - followed.theta_ref, goals.move, ended)
     return found

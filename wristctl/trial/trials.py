@@ -9,6 +9,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
+from wristctl.config.plant import Push
 from wristctl.wrist.directions import DIRECTIONS
 
 _BEFORE = 0.5
@@ -35,6 +36,10 @@ class Trial(NamedTuple):
     def plane(self) -> str:
         """The bending plane."""
         return DIRECTIONS[self.direction].plane
+
+    def pushed(self, push: Push) -> Push:
+        """The push of an experiment as it acts in this trial, on a bench and in simulation: against the bend."""
+        return push.model_copy(update={"force": -DIRECTIONS[self.direction].sign * self.push})
 
 
 def trials_of(settings: HwRunSettings, rng: np.random.Generator) -> list[Trial]:

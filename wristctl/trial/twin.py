@@ -10,7 +10,6 @@ from wristctl.config.study import Study
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.repetitions import Simulation
 from wristctl.trial.trials import Trial
-from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse
 
 
@@ -20,11 +19,11 @@ def twin(
     """Simulate a trial of the study's hw-run section."""
     settings = study.hw_run
     row = settings.rows[trial.row]
-    push = settings.push.model_copy(update={"force": -DIRECTIONS[trial.direction].sign * trial.push})
+    disturbances = Disturbances(push=trial.pushed(settings.push))
     chosen = SimulateSettings(
         controller=row.controller,
         gains=row.gains,
-        loop=settings.loop.model_copy(update={"disturbances": Disturbances(push=push)}),
+        loop=settings.loop.model_copy(update={"disturbances": disturbances}),
         reference=settings.reference,
         direction=trial.direction,
         horizon=settings.horizon,

@@ -7,6 +7,7 @@ seen, among its best candidates and the law's presets, so that gains are not the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.control import TuneSettings
 from wristctl.config.errors import UserError, meant
+from wristctl.config.foreign import contained
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
 from wristctl.simulation.batch import sample_period
@@ -25,7 +27,7 @@ from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import loops_of
 from wristctl.tuning.objective import Judge
-from wristctl.tuning.optimisers import OPTIMISERS
+from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.tuning.space import GainSpace
 from wristctl.wrist.kinematics import Inverse
 
@@ -84,7 +86,8 @@ def check_loops(settings: TuneSettings) -> None:
 
 def check_optimiser(settings: TuneSettings) -> None:
     """UserError where the optimiser needs more candidates, or a package that is not installed."""
-    OPTIMISERS[settings.optimiser](2, settings.candidates, np.full(2, 0.5), np.random.default_rng(0))
+    with _contained(settings.optimiser):
+        OPTIMISERS[settings.optimiser](2, settings.candidates, np.full(2, 0.5), np.random.default_rng(0))
 
 
 def check_tunable(controller: Controller) -> None:
@@ -172,9 +175,23 @@ def _searches(
         start = _start(controller, space) if restart == 0 else np.full(len(controller.gains), 0.5)
         name = f"search {controller.name}" + (f" {restart}" if restart else "")
         rng = np.random.default_rng(streams(name))
-        optimiser = OPTIMISERS[settings.optimiser](len(start), settings.candidates, start, rng)
+        with _contained(settings.optimiser):
+            optimiser = OPTIMISERS[settings.optimiser](len(start), settings.candidates, start, rng)
+
+        def tell(values: Array, optimiser: Optimiser = optimiser) -> None:
+            with _contained(settings.optimiser):
+                optimiser.tell(values)
+
         for _ in range(settings.iterations):
-            yield space.gains(optimiser.ask()), optimiser.tell
+            with _contained(settings.optimiser):
+                asked = optimiser.ask()
+            yield space.gains(asked), tell
+
+
+def _contained(optimiser: str) -> AbstractContextManager[None]:
+    """What surrounds the calls of an optimiser: nothing, unless it is from elsewhere."""
+    origin = OPTIMISERS.origin(optimiser)
+    return contained(f"the optimiser {optimiser}", origin.reference) if origin else nullcontext()
 
 
 def _presets(controller: Controller, space: GainSpace) -> dict[str, Array]:

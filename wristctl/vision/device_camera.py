@@ -8,6 +8,7 @@ import time
 
 import cv2
 
+from wristctl.config.no_hardware import check_hardware_allowed
 from wristctl.config.vision import Device
 from wristctl.loop_priority import beside_the_loop
 from wristctl.vision.camera import CameraError, Frame, grey_of, without_warnings
@@ -22,13 +23,16 @@ _FRESH = 1.0
 
 
 class DeviceCamera:
-    """A camera by number, path or address, read by a thread of its own. Raises CameraError.
+    """A camera by number, path or address, read by a thread of its own.
+
+    Raises CameraError, and UserError where no camera may be opened.
 
     Frames are timed by their driver's stamps where the first of these is of the monotonic clock (V4L2), whatever they
     say later; else by when they came.
     """
 
     def __init__(self, source: str, settings: Device) -> None:
+        check_hardware_allowed("camera", source)
         self.name = source
         place: int | str = int(source) if source.isdigit() else source
         with without_warnings():

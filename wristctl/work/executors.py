@@ -18,8 +18,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument
 from wristctl.interrupt import deferred
 from wristctl.lanes.cores import cores
-from wristctl.work.serving import serve_parent
-from wristctl.work.slurm import SlurmProfile
+from wristctl.work.serving import safe_path, serve_parent
 
 EXECUTOR = Argument("executor", metavar="WHO")
 KINDS = "serial, processes, processes:N, dask://host:port or module:factory"
@@ -78,9 +77,6 @@ class Workers:
             return cls(named, many, lambda: _processes(many))
         if named.startswith("dask://"):
             return cls(named, 1, lambda: _dask(named.removeprefix("dask://")))
-        if named.startswith("slurm:"):
-            profile = SlurmProfile.read(Path(named.removeprefix("slurm:")))
-            return cls(named, 1, lambda: _slurm(profile))
         if _PLACE.fullmatch(named):
             factory = _factory(named)
             return cls(named, 1, lambda: _of_factory(named, factory))
@@ -100,16 +96,17 @@ def _begin(threads: int) -> None:
 @contextmanager
 def _processes(many: int) -> Iterator[Pool]:
     before = set(active_children())
-    pool = ProcessPoolExecutor(many, get_context("spawn"), _begin, (max(1, cores() // many),))
-    try:
-        with deferred():  # the workers', too, which begin with it
-            for _ in range(many):
-                pool.submit(int)
-        yield Pool(pool, lambda: many)
-    finally:
-        for worker in set(active_children()) - before:  # a pool waits for whatever it was given
-            worker.kill()
-        pool.shutdown(cancel_futures=True)
+    with safe_path():  # to the end: a pool begins workers when it likes
+        pool = ProcessPoolExecutor(many, get_context("spawn"), _begin, (max(1, cores() // many),))
+        try:
+            with deferred():  # the workers', too, which begin with it
+                for _ in range(many):
+                    pool.submit(int)
+            yield Pool(pool, lambda: many)
+        finally:
+            for worker in set(active_children()) - before:  # a pool waits for whatever it was given
+                worker.kill()
+            pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -130,12 +127,6 @@ def _dask(address: str) -> Iterator[Pool]:
         client.close(timeout=2)
 
 
-@contextmanager
-def _slurm(profile: SlurmProfile) -> Iterator[Pool]:
-    with profile.client() as client:
-        yield _of_client(client, client.scheduler.addr.removeprefix("tcp://"))
-
-
 def _of_client(client: Any, address: str) -> Pool:
     def width() -> int:
         """Twice the threads, so that none waits for the way here and back; none where nobody answers."""
@@ -154,8 +145,8 @@ def _of_client(client: Any, address: str) -> Pool:
 def _factory(named: str) -> Callable[[], Any]:
     module, _, name = named.partition(":")
     here = str(Path.cwd())
-    if here not in sys.path:  # as `python -m` has it: a factory stands beside the study
-        sys.path.insert(0, here)
+    if here not in sys.path:  # a factory stands beside the study, and takes nobody's place there
+        sys.path.append(here)
     try:
         found: Callable[[], Any] = getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
@@ -165,10 +156,11 @@ def _factory(named: str) -> Callable[[], Any]:
 
 @contextmanager
 def _of_factory(named: str, factory: Callable[[], Any]) -> Iterator[Pool]:
-    made = factory()
-    if not callable(getattr(made, "submit", None)):
-        what = f"{named} gives {type(made).__name__}, and no concurrent.futures.Executor"
-        raise UserError(what, EXECUTOR, "a factory that returns one")
-    many = int(getattr(made, "_max_workers", 0) or cores())
-    with made:
-        yield Pool(made, lambda: many)
+    with safe_path():
+        made = factory()
+        if not callable(getattr(made, "submit", None)):
+            what = f"{named} gives {type(made).__name__}, and no concurrent.futures.Executor"
+            raise UserError(what, EXECUTOR, "a factory that returns one")
+        many = int(getattr(made, "_max_workers", 0) or cores())
+        with made:
+            yield Pool(made, lambda: many)

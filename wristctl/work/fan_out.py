@@ -6,8 +6,9 @@ worker died of is tried alone, so that none is blamed for another.
 
 from __future__ import annotations
 
+import secrets
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from wristctl.config.errors import UserError
 from wristctl.config.wording import Argument
 from wristctl.work.executors import EXECUTOR, Pool, Workers
-from wristctl.work.unit import Unit, read_unit, take_over, write_unit
+from wristctl.work.unit import Unit, file_of, read_unit, same_arrays, write_unit
 from wristctl.work.worker import Computed, Furnish, Golden, WorkerDiffers, compute
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ _FINAL = ("KilledWorker",)
 """Errors after which no worker is risked again: several have died of it, since Dask tries by itself."""
 _LOOK = 0.5
 """Seconds between two looks at whether the cluster is still there."""
+RESUMED = Argument("resume")
 RESUME = ("go on with ", Argument("resume", "RUN"), ": what is done is kept")
 
 
@@ -47,15 +49,19 @@ class UnitsDone:
 
     arrays: list[dict[str, np.ndarray] | None]
     poisoned: list[Poisoned] = field(default_factory=list)
-    taken_over: int = 0
-    """Units that were there already."""
+    found: int = 0
+    """Units that were in the folder already."""
+    taken_over: list[Unit] = field(default_factory=list)
+    """Units that the earlier run had, and that were not computed here."""
+    tried_again: Unit | None = None
+    """One more of the earlier run's, drawn at random, that was computed here and gave the same."""
     seconds: float = 0.0
     """That workers have spent on units here, all together."""
     processor: float = 0.0
 
 
 Told = Callable[[Unit, Computed | None], None]
-"""Called with each unit that is done; None: it was there already."""
+"""Called with each unit that is done; None: it was there already, or in the earlier run."""
 
 
 def perform_units(
@@ -67,32 +73,39 @@ def perform_units(
     told: Told = lambda unit, computed: None,
     furnish: Furnish | None = None,
 ) -> UnitsDone:
-    """Compute units, those left out that are in `folder` or in the folder of an `earlier` run.
+    """Compute units, those left out that are in `folder` or in the folder of an `earlier` run, which are copied.
 
-    Workers elsewhere `furnish` themselves before.
+    An earlier run may be anybody's: one of its units, drawn at random, is computed all the same, and first. Workers
+    elsewhere `furnish` themselves before.
 
-    UserError, with exit code 3, where the workers compute other numbers or are gone; all that was done by then is in
-    `folder`.
+    UserError, with exit code 3, where that unit differs, and then none of the earlier run's is kept; where one of them
+    is no plain file; and where the workers compute other numbers or are gone; all that was done by then is in `folder`.
     """
     done = UnitsDone([None] * len(units))
     waiting = deque[int]()
+    earlier_ones: dict[int, dict[str, np.ndarray]] = {}
     for number, unit in enumerate(units):
-        done.arrays[number] = _known(unit, folder, earlier)
-        if done.arrays[number] is None:
-            waiting.append(number)
-        else:
-            done.taken_over += 1
+        done.arrays[number] = read_unit(folder, unit.key) if folder else None
+        if done.arrays[number] is not None:
+            done.found += 1
             told(unit, None)
+        elif earlier is not None and (arrays := read_unit(earlier, unit.key)) is not None:
+            earlier_ones[number] = arrays
+        else:
+            waiting.append(number)
+    drawn = secrets.choice([*earlier_ones]) if earlier_ones else None
+    expected = earlier_ones.pop(drawn) if drawn is not None else {}
+    for number, arrays in earlier_ones.items():
+        if folder is not None:
+            write_unit(folder, units[number].key, arrays)
+        done.arrays[number] = arrays
+        done.taken_over.append(units[number])
+        told(units[number], None)
+    if drawn is not None:
+        waiting.appendleft(drawn)
     if waiting:
-        _Fan(units, workers, golden, folder, told, done, waiting, furnish).run()
+        _Fan(units, workers, golden, folder, told, done, waiting, furnish, drawn, expected).run()
     return done
-
-
-def _known(unit: Unit, folder: Path | None, earlier: Path | None) -> dict[str, np.ndarray] | None:
-    found = read_unit(folder, unit.key) if folder else None
-    if found is None and earlier is not None:
-        found = take_over(earlier, folder, unit.key) if folder else read_unit(earlier, unit.key)
-    return found
 
 
 @dataclass
@@ -107,6 +120,9 @@ class _Fan:
     done: UnitsDone
     waiting: deque[int]
     furnish: Furnish | None
+    drawn: int | None = None
+    expected: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """What the earlier run has for the unit that was `drawn`."""
     alone: deque[int] = field(default_factory=deque)
     """Units that were under way when a worker died."""
     failures: Counter[int] = field(default_factory=Counter)
@@ -162,6 +178,8 @@ class _Fan:
             notes = " ".join(getattr(error, "__notes__", ()))
             self._failed(number, f"{type(error).__name__}: {error} {notes}", type(error).__name__ in _FINAL)
             return True
+        if number == self.drawn:
+            self._compare(unit, computed.arrays)
         if self.folder is not None:
             write_unit(self.folder, unit.key, computed.arrays)
         self.done.arrays[number] = dict(computed.arrays)
@@ -169,6 +187,17 @@ class _Fan:
         self.done.processor += computed.processor
         self.told(unit, computed)
         return True
+
+    def _compare(self, unit: Unit, arrays: Mapping[str, np.ndarray]) -> None:
+        """UserError where the earlier run has something else for a unit; none of its units is kept then."""
+        if same_arrays(self.expected, arrays):
+            self.done.tried_again = unit
+            return
+        if self.folder is not None:
+            for each in self.done.taken_over:
+                file_of(self.folder, each.key).unlink(missing_ok=True)
+        what = f"{unit.name or unit.key[:12]} gives other numbers here than the run to resume has"
+        raise UserError(what, RESUMED, "begin anew, without it: somebody has changed its units", exit_code=3)
 
     def _failed(self, number: int, why: str, final: bool = False) -> None:
         self.failures[number] += 1

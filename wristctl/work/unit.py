@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl.config.errors import UserError
 from wristctl.records.code import tree_digest
+from wristctl.records.files import check_plain
 from wristctl.records.formats import read_arrays, write_arrays
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 UNITS = "units"
 """The folder of a run that holds them."""
-_SEAL = "sha256"
+_KEY = "key"
+"""The array of a unit's file that says whose it is."""
 
 
 @dataclass(frozen=True)
@@ -72,39 +73,32 @@ def write_unit(folder: Path, key: str, arrays: Mapping[str, np.ndarray]) -> None
     """Keep what a unit gave, whole or not at all. UserError where the disk refuses."""
     import numpy as np
 
-    write_arrays(file_of(folder, key), {**arrays, _SEAL: np.array(_seal(key, arrays))})
+    write_arrays(file_of(folder, key), {**arrays, _KEY: np.array(key)})
 
 
 def read_unit(folder: Path, key: str) -> dict[str, np.ndarray] | None:
-    """What a unit gave; None where it is not there, or not as it was written."""
+    """What a unit gave; None where it is not there, damaged (a zip has a checksum of each array), or another's.
+
+    UserError where a link or something else that is no plain file stands in its place.
+    """
     file = file_of(folder, key)
+    if not os.path.lexists(file):
+        return None
+    check_plain(file)
     try:
         arrays = read_arrays(file)
     except (OSError, UserError):
         return None
-    sealed = arrays.pop(_SEAL, None)
-    return arrays if sealed is not None and str(sealed) == _seal(key, arrays) else None
+    known = arrays.pop(_KEY, None)
+    return arrays if known is not None and str(known) == key else None
 
 
-def take_over(source: Path, folder: Path, key: str) -> dict[str, np.ndarray] | None:
-    """What a unit gave in another run, whose file is linked into this one; None where it is not there or not whole."""
-    arrays = read_unit(source, key)
-    if arrays is not None:
-        try:
-            os.link(file_of(source, key), file_of(folder, key))
-        except FileExistsError:
-            pass
-        except OSError:  # another disk, or one without links
-            shutil.copyfile(file_of(source, key), file_of(folder, key))
-    return arrays
+def same_arrays(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:
+    """Whether two sets of arrays are the same, to the bit."""
+    return one.keys() == other.keys() and all(_bits(one[name]) == _bits(other[name]) for name in one)
 
 
-def _seal(key: str, arrays: Mapping[str, np.ndarray]) -> str:
+def _bits(array: np.ndarray) -> tuple[str, tuple[int, ...], bytes]:
     import numpy as np
 
-    digest = hashlib.sha256(key.encode())
-    for name in sorted(arrays):
-        each = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {each.dtype.str} {np.shape(arrays[name])} ".encode())
-        digest.update(each.tobytes())
-    return digest.hexdigest()
+    return array.dtype.str, np.shape(array), np.ascontiguousarray(array).tobytes()

@@ -8,6 +8,7 @@ arc's tendons, to third order. (Through holes in the discs they would squeeze th
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, dataclass
 from xml.etree import ElementTree
 
@@ -78,7 +79,7 @@ def mjcf(chain: HingeChain, about: str) -> str:
     the joints' angles; sensors give the tip and each joint. `about` says where the numbers come from.
     """
     root = ElementTree.Element("mujoco", model="wrist")
-    root.append(ElementTree.Comment(f" {about.replace('--', '-')} "))
+    root.append(ElementTree.Comment(f" {re.sub('-{2,}', '-', about)} "))
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     gravity = f"{chain.gravity[0]!r} {chain.gravity[1]!r} 0"
     option = ElementTree.SubElement(root, "option", timestep=repr(_STEP), integrator="implicitfast", gravity=gravity)

@@ -15,7 +15,7 @@ from wristctl.records import open_run
 
 def export(
     ref: Ref,
-    to: Annotated[Literal["mcap", "mat", "parquet"], typer.Option("--to", help="The format.")],
+    to: Annotated[Literal["mcap", "mat"], typer.Option("--to", help="The format.")],
     file: Annotated[
         Path | None, typer.Option("--file", help="Where to write it; by default the run's id, in this folder.")
     ] = None,
@@ -24,8 +24,8 @@ def export(
 ) -> None:
     """Write a run's tables, arrays and videos for other programs, with their units.
 
-    mat: one file for MATLAB and Octave. parquet: a folder with a file for each table. mcap: a log of what went on in
-    time, videos too, for Foxglove, PlotJuggler or Rerun.
+    mat: one file for MATLAB and Octave. mcap: a log of what went on in time, videos too, for Foxglove, PlotJuggler or
+    Rerun. A table for pandas is the CSV file of the run, or `wristctl.open_run(RUN).data(NAME)` in Python.
     """
     from wristctl.studies.run_export import export_run
 

@@ -11,12 +11,15 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.options import Debug, Out, Quiet
+from wristctl.cli.options import Debug, Out, Quiet, TrustCode
 from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.cli.say import say
+from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError, meant
-from wristctl.config.wording import Argument
+from wristctl.config.system_errors import writing
+from wristctl.config.trust import asking
+from wristctl.config.wording import TO, Argument
 from wristctl.records import Run, open_run
 from wristctl.records.index import DRAWN
 from wristctl.records.overview import read_overview
@@ -37,6 +40,7 @@ def figures(
         str | None, typer.Option("--width", help="Of the page or column: 88mm, 18cm, 7in; by default each its own.")
     ] = None,
     to: Annotated[Path | None, typer.Option("--to", help="Folder; by default one beside the run.")] = None,
+    trust_code: TrustCode = False,
     out: Out = RESULTS,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -52,17 +56,13 @@ def figures(
     run, inches = open_run(ref, out), _inches(width) if width else None
     folder = to or run.path.parent / f"{DRAWN}{run.id}"
     _check_names(names or (), read_overview(run.path).captions, run)
-    with listening(quiet, False) as console, for_paper(inches):
+    trust = asking(partial(asked_to_trust, trust_code))
+    with listening(quiet, False) as console, for_paper(inches), trust:
         found = redrawn(run, partial(progress, console, quiet=quiet)).figures
         _check_names(names or (), found, run)
         chosen = list(names or found)
-        try:
+        with writing(folder, TO):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            give = Argument("to", metavar="FOLDER")
-            raise UserError(
-                f"cannot write there: {error.strerror}", str(folder), ("name another with ", give)
-            ) from error
         with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as done:
             for count, name in enumerate(chosen, start=1):
                 made = found[name]

@@ -38,13 +38,14 @@ def unpack(
 ) -> None:
     """Take the runs out of an archive, after checking that they are as they were sealed. Nothing in them is run.
 
-    All arrive or none (exit code 3). That files are as sealed does not say by whom: `wristctl runs verify --signers`.
+    All arrive or none (exit code 3). A run that is here already is checked, and given the archive's signature where it
+    has none. That files are as sealed does not say by whom: `wristctl runs verify --signers`.
     """
     from wristctl.records.archive import unpack as read
 
     found = read(file, out)
     for each in found.known:
-        say(f"{each.id}  was here")
+        say(f"{each.id}  was here" + ", and has its signature now" * (each in found.signed))
     for each in found.new:
         say(f"{each.id}  as sealed")
     say(found.run.path)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,16 +22,18 @@ from wristctl.cli.say import say
 from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import check_trust
+from wristctl.config.load import read_study
+from wristctl.config.no_hardware import NO_HARDWARE
 from wristctl.config.trust import asking
 from wristctl.records import Run, list_runs, open_run
 from wristctl.records.difference import leaves_of
 from wristctl.records.leftovers import SCRATCH
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import RunLock
-from wristctl.records.manifest import CONFIG, KINDS, command_of
+from wristctl.records.manifest import CONFIG, Input, command_of
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
-from wristctl.records.run import NAME_A_RUN
 from wristctl.report.printed_table import Table
+from wristctl.studies.procedures import inputs_of, procedure_of
 
 _SAME = ("identical", "within tolerance", "volatile")
 
@@ -55,10 +59,10 @@ def replay(
 def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
-    if run.kind not in KINDS:  # it becomes a part of a command
-        raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
+    inputs = inputs_of(run)
     check_trust(leaves_of(run).values(), run.path / CONFIG)
-    if _moved_motors(run) or any(_key(text) == "port" for text in overrides):
+    study, _ = read_study([run.path / CONFIG], overrides, run.kind)
+    if getattr(getattr(study, run.kind.replace("-", "_")), "port", None) is not None:
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
         raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
     changed = changed_inputs(run)
@@ -67,7 +71,7 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     scratch = Path(tempfile.mkdtemp(prefix=SCRATCH))
     lock = RunLock(scratch)  # a sign of life, for `runs gc`
     try:
-        code = _again(run, scratch, overrides)
+        code = _again(run, scratch, [*_named(run, inputs), *overrides])
     except KeyboardInterrupt:
         shutil.rmtree(scratch, ignore_errors=True)
         raise
@@ -83,24 +87,23 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     _conclude(run, scratch, found, [] if alike else causes(run, ended[0]), as_json)
 
 
-def _moved_motors(run: Run) -> bool:
-    """Whether its command would open a real board's port."""
-    return getattr(getattr(run.config, run.kind.replace("-", "_"), None), "port", None) is not None
+def _named(run: Run, inputs: Mapping[str, Input | list[Input]]) -> Iterator[str]:
+    """What names a run's inputs where they are now, as overrides."""
+    for leaf, named in inputs.items():
+        paths = [str(input_run(run, each).path) for each in (named if isinstance(named, list) else [named])]
+        yield f"{procedure_of(run).subject}.{leaf}={json.dumps(paths if isinstance(named, list) else paths[0])}"
 
 
-def _key(override: str) -> str:
-    return override.partition("=")[0].strip().rpartition(".")[2]
+def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
+    """The same command on the same configuration, in a process of its own; its messages pass through.
 
-
-def _again(run: Run, scratch: Path, overrides: list[str]) -> int:
-    """The same command on the same configuration and inputs, in a process of its own; its messages pass through."""
-    inputs = {each.role: input_run(run, each).path for each in run.manifest.inputs}
-    named = [f"{run.kind}.{role}={json.dumps(str(path))}" for role, path in inputs.items()]
-    options = [part for text in [*named, *overrides] for part in ("--set", text)]
+    Whatever its configuration says, it opens no board and no camera.
+    """
+    options = [part for text in settings for part in ("--set", text)]
     again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
-    command = [sys.executable, "-P", "-m", "wristctl", *again]
-    whole = [*command, *options, "--label", "replay"]
-    return subprocess.run(whole, stdout=subprocess.DEVNULL, preexec_fn=end_with_parent).returncode
+    command = [sys.executable, "-P", "-m", "wristctl", *again, *options, "--label", "replay"]
+    alone = {**os.environ, NO_HARDWARE: "yes"}
+    return subprocess.run(command, stdout=subprocess.DEVNULL, env=alone, preexec_fn=end_with_parent).returncode
 
 
 def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: list[str], as_json: bool) -> None:

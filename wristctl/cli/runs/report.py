@@ -10,11 +10,14 @@ from typing import Annotated
 
 import typer
 
-from wristctl.cli.options import Debug, Out, Quiet
+from wristctl.cli.options import Debug, Out, Quiet, TrustCode
 from wristctl.cli.progress import listening, progress
 from wristctl.cli.runs.run_options import RESULTS, Refs
 from wristctl.cli.say import say
+from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
+from wristctl.config.trust import asking
+from wristctl.config.wording import TO
 from wristctl.records import Run, open_run
 from wristctl.records.files import write_text
 from wristctl.records.index import DRAWN
@@ -47,6 +50,7 @@ def report(
     all_figures: Annotated[
         bool, typer.Option("--all-figures", help="Draw those too that the run left for later, into a folder beside it.")
     ] = False,
+    trust_code: TrustCode = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -60,13 +64,14 @@ def report(
     runs = [open_run(ref, out) for ref in refs]
     name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
     file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
-    drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
-    text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
+    with asking(partial(asked_to_trust, trust_code)):
+        drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
+        text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
     try:
-        write_text(file, text)
+        write_text(file, text, TO)
     except UserError as error:
         if to:
-            raise UserError(error.what, error.where, "name another file with --to") from error
+            raise
         _log.warning("%s (%s): the page is written here", error.what, error.where)
         file = Path(file.name)
         write_text(file, text)

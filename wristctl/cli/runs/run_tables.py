@@ -9,7 +9,6 @@ import typer
 from wristctl.cli.options import Debug, Out
 from wristctl.cli.runs.run_options import RESULTS, Ref
 from wristctl.config.errors import UserError
-from wristctl.config.printable import printable
 from wristctl.records import open_run
 
 
@@ -35,9 +34,4 @@ def table(
         if not 1 <= each <= len(found):
             raise UserError(f"no table {each}", str(run.path), f"1 to {len(found)}")
     chosen = [found[each - 1] for each in number] if number else found
-    print("\n\n".join(latex_table(each) if latex else printable_text(each) for each in chosen))
-
-
-def printable_text(each: object) -> str:
-    """A table as the terminal shows it."""
-    return "\n".join(printable(line) for line in each.text().splitlines())  # type: ignore[attr-defined]
+    print("\n\n".join(latex_table(each) if latex else each.text() for each in chosen))
