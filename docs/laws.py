@@ -104,9 +104,9 @@ _BEGIN = f"""# Which law for which rig
 
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
 geometric mean of the RMSE with its 95 % interval over worlds. Rows of one group are not told apart from its first
-([how](worlds.md#who-is-best)); a row that fails or swings in any world stands in none. Made by
-`python docs/laws.py`. Every law is tuned first, with one
-budget, by `wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
+([how](worlds.md#who-is-best)); a row that fails or swings in any world stands in none. Made by `python docs/laws.py`.
+Every law is tuned first, with one budget, by
+`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
 
 ## When each wins
 
@@ -123,7 +123,8 @@ budget, by `wristctl compare experiments/scenarios/camera.yaml experiments/rival
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same law without one.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
-- **Jumps** (steps): no law beats feedforward by more than a hundredth, and most swing. Ask for motions instead.
+- **Jumps**: behind motors (steps) no law beats feedforward by more than a hundredth, and most swing; ask for motions
+  instead. With torques as commanded (ideal, steps) MPC is best, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
 
 An adaptive or gain-scheduled smc was not added: tuned smc-tracking ties with pid-ff, so there is nothing to schedule.

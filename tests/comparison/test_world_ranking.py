@@ -53,7 +53,7 @@ def test_rows_that_worlds_cannot_tell_apart_are_one_group_and_others_are_not() -
     assert gain.low < 1.0 / 0.3 < gain.high and gain.low > 3.0
     said = answer(found)
     assert "a/x, b/x (a tie) are best" in said or "b/x, a/x (a tie) are best" in said
-    assert "Next is c/x" in said and "cannot be told in 40 worlds" in said and "Not to be relied on" not in said
+    assert "Next is c/x" in said and "are told in 40 worlds" in said and "Not to be relied on" not in said
 
 
 def test_a_law_that_is_best_until_it_swings_is_never_called_best() -> None:

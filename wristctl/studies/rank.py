@@ -68,7 +68,7 @@ def answer(found: WorldRanking) -> str:
             f" Next is {found.rows[after].label}{_seldom(found, after)} with {degrees(found.means[after].value)} deg."
         )
     if len(found.rows) > 1 and math.isfinite(stands.floor):
-        said += f" Differences below {100.0 * (stands.floor - 1.0):.2g} % cannot be told in {found.worlds} worlds."
+        said += f" As a rule differences of {100.0 * (stands.floor - 1.0):.2g} % are told in {found.worlds} worlds."
     return said + _unreliable(found)
 
 
