@@ -20,6 +20,8 @@ from wristctl.config.families import Family
 from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.simulation.cases import Measured
+from wristctl.studies.compare import Compared
+from wristctl.studies.findings import Findings
 from wristctl.studies.rank import answer
 
 WORLDS = 40
@@ -152,6 +154,18 @@ def test_a_family_of_too_few_worlds_tells_so_and_ranks_nothing() -> None:
     said = answer(found)
     assert f"{LEAST_PAIRS} or more" in said and "3 worlds" in said and " best" not in said and "tie" not in said
     assert [line["fate"] for line in ranking_frame(found).to_dict("records")] == ["too few to tell"] * 2
+
+
+def test_a_comparison_has_a_fault_where_all_rows_are_unreliable_and_none_where_worlds_are_few() -> None:
+    study = load_study([], [])
+
+    def fault(swings: tuple[int, ...], worlds: int = WORLDS) -> bool:
+        rows = [row("feedforward/default", hard(), swings), row("a/x", hard(1), swings)]
+        few = [each._replace(rmse=each.rmse[:worlds], swings=each.swings[:worlds]) for each in rows]
+        found = ranking("made-up", FAMILY, few, 0)
+        return Compared(study, Findings(0), [], [], {}, {}, [], [found]).fault is not None
+
+    assert fault((0,)) and not fault(()) and not fault((), worlds=3) and fault((0,), worlds=3)
 
 
 def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() -> None:

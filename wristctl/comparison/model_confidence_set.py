@@ -90,8 +90,8 @@ def _transformed(first: Array, second: Array, third: Array, n: int) -> Array:
     """Size of Hall's transform of mean over deviation, by the first three moments about 0 of n differences.
 
     Few differences show less skewness than there is (that of 8 exponential ones is half of it), hence the factor. It
-    counts up to that of exponential differences, and never halves what Student's t says: his series is good near 0, and
-    beyond it one rare failure would hide any difference. None of it changes a rate where differences are symmetric.
+    counts up to that of exponential differences: beyond it the series says nothing, and one rare failure would hide any
+    difference. Neither changes a rate where differences are symmetric.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.maximum(second - first * first, 1e-12 * second)
@@ -101,7 +101,7 @@ def _transformed(first: Array, second: Array, third: Array, n: int) -> Array:
         skewness = np.clip((1.0 + 6.0 / n) * skewness, -_MOST_SKEWED, _MOST_SKEWED)
         bent = skewness * t / 3.0
         found = np.abs(t * (1.0 + bent * (1.0 + bent / 3.0)) + skewness / (6.0 * n))
-    return np.where(second > 0.0, np.maximum(found, 0.5 * np.abs(t)), 0.0)
+    return np.where(second > 0.0, found, 0.0)
 
 
 @lru_cache(maxsize=4)
