@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import paired_ratio, penalised
-from wristctl.comparison.world_ranking import FAILURE, rank, world_scores
+from wristctl.comparison.geometric_means import paired_ratio, penalised, plain
+from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.control import Row
 from wristctl.config.families import Drawn, Family, Worlds
 from wristctl.config.load import load_study
@@ -20,6 +20,7 @@ from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.studies.answer_lines import degrees
 from wristctl.studies.rank import answer
 
 HERE = Path(__file__).parent
@@ -40,24 +41,28 @@ BEST, BESIDE = ("ct-dob/stepper", "mpc/stepper", "smc-dob/stepper", "pid-ff/step
 
 
 def _ranking(study: Study, family: str) -> list[str]:
-    """The answer and a table."""
+    """The answer and a table, of smooth motions and of steps each."""
     rows = tuple(Row(controller=each.split("/")[0], gains=each.split("/")[1]) for each in RANKED[family])
     worlds = Worlds(family=family, draws=WORLDS)
-    found = rank(
+    rankings = rank(
         study.model_copy(update={"compare": study.compare.model_copy(update={"rows": rows, "worlds": worlds})})
     )
-    lines = [f"## {family}: {study.families[family].about}", "", answer(found), ""]
+    return [line for found in rankings for line in _table(found)]
+
+
+def _table(found: WorldRanking) -> list[str]:
+    lines = [f"## {found.name}: {found.family.about}", "", answer(found), ""]
     lines += [
         "| group | row | RMSE [deg] | times better than feedforward | fails, swings |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for at in found.order:
+    for at in found.standing.order:
         mean, gain, stands = found.means[at], found.gains[at], found.standing
-        low, value, high = np.degrees([mean.low, mean.value, mean.high])
+        ends = ", ".join(degrees(each, 3) for each in (mean.low, mean.high))
         fate = f"{stands.failures[at].times}, {stands.swings[at].times}"
-        times = f"{gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}]"
-        group = found.group(at) or "-"
-        lines.append(f"| {group} | {found.rows[at].label} | {value:.3f} [{low:.3f}, {high:.3f}] | {times} | {fate} |")
+        times = f"{plain(gain.value)} [{plain(gain.low)}, {plain(gain.high)}]"
+        group = stands.group(at) or "-"
+        lines.append(f"| {group} | {found.rows[at].label} | {degrees(mean.value, 3)} [{ends}] | {times} | {fate} |")
     return [*lines, ""]
 
 
@@ -66,7 +71,7 @@ def _scores(label: str, family: Family, study: Study) -> tuple[Array, int]:
     law = controller(name)
     cases = drawn_cases(family, "nominal", "test", 0, WORLDS, study.wrist)
     found = measure(law, np.array([gains_of(law, gains)]), cases, study.wrist, ["rmse", "oscillation"])
-    return penalised(world_scores(found, WORLDS)[0], FAILURE), int(found.swings.sum() + found.failed.sum())
+    return penalised(world_scores(found, WORLDS)[0]), int(found.swings.sum() + found.failed.sum())
 
 
 def _by_sheath(study: Study) -> list[str]:
@@ -98,9 +103,10 @@ def main() -> None:
 _BEGIN = f"""# Which law for which rig
 
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
-geometric mean of the RMSE with its 95 % interval over worlds. Rows of one group cannot be told apart (paired, Holm); a
-row that fails or swings in any world stands in none. Made by `python docs/laws.py`. Every law is tuned first, with one
-budget, by `wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
+geometric mean of the RMSE with its 95 % interval over worlds. Rows of one group are not told apart from its first
+([how](worlds.md#who-is-best)); a row that fails or swings in any world stands in none. Made by `python docs/laws.py`.
+Every law is tuned first, with one budget, by
+`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
 
 ## When each wins
 
@@ -117,7 +123,8 @@ budget, by `wristctl compare experiments/scenarios/camera.yaml experiments/rival
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same law without one.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
-- **Jumps** (steps): no law beats feedforward by more than a hundredth, and most swing. Ask for motions instead.
+- **Jumps**: behind motors (steps) no law beats feedforward by more than a hundredth, and most swing; ask for motions
+  instead. With torques as commanded (ideal, steps) MPC is best, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
 
 An adaptive or gain-scheduled smc was not added: tuned smc-tracking ties with pid-ff, so there is nothing to schedule.

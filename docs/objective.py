@@ -14,7 +14,6 @@ from scipy.stats import spearmanr
 
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import penalised
-from wristctl.comparison.world_ranking import FAILURE
 from wristctl.config.control import Objective
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
@@ -68,7 +67,7 @@ def judged(study: Study, family: str, name: str) -> Judged:
             judge = Judge(seen[:count], study.wrist, each)
             objectives[worlds, title] = judge.value(first_cases(measured, count))
     done = measure(law, gains, unseen, study.wrist, ["rmse"])
-    rmse = penalised(np.where(done.failed, np.inf, done.metrics["rmse"]), FAILURE)
+    rmse = penalised(np.where(done.failed, np.inf, done.metrics["rmse"]))
     return Judged(objectives, np.exp(np.log(rmse).mean(axis=1)))
 
 

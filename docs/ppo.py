@@ -20,7 +20,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
-from wristctl.comparison.world_ranking import FAILURE, world_scores
+from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.table import controller
@@ -178,7 +178,7 @@ class Row(NamedTuple):
 def row_of(name: str, found: Measured) -> Row:
     """One row of what was measured."""
     lost = (found.swings | found.failed).reshape(WORLDS, -1).any(axis=1)
-    return Row(name, penalised(world_scores(found, WORLDS), FAILURE)[0], int(lost.sum()))
+    return Row(name, penalised(world_scores(found, WORLDS))[0], int(lost.sum()))
 
 
 def rivals(study: Study) -> list[Row]:

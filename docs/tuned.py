@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
-from wristctl.comparison.world_ranking import FAILURE, world_scores
+from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
@@ -62,7 +62,7 @@ def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: st
     gains = np.array([[found.gains[name] for name in law.gains], gains_of(law, preset)])
     cases = drawn_cases(study.families[family], family, "test", study.seed, TEST_WORLDS, study.wrist)
     done = measure(law, gains, cases, study.wrist, ["rmse", "oscillation"])
-    own, known = penalised(world_scores(done, TEST_WORLDS), FAILURE)
+    own, known = penalised(world_scores(done, TEST_WORLDS))
     bad = done.swings | done.failed
     ratio, surely = (paired_ratio(known, own, 1, level) for level in (LEVEL, 1.0 - chance))
     rmse = float(np.exp(np.log(own).mean()))

@@ -105,7 +105,7 @@ def compare(
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
 
-    Where it names worlds of a family, the rows ranked on those: `.ranking` has groups of ties and intervals.
+    Where it names worlds of a family, the rows ranked on those: `.rankings`, of smooth motions and of steps.
 
     `network` (train) stands behind references with `inverse: network`, `tuned` (tune) behind rows with `gains: tuned`.
     The result has `.rows`, each with the simulation of its loop; `.frame()` is a row per combination: RMSE [rad],

@@ -10,11 +10,10 @@ import pytest
 
 from tests.studies.conftest import repeated
 from wristctl.api import load_study
-from wristctl.comparison.class_standing import ClassStanding, class_standings
+from wristctl.comparison.class_standing import ClassStanding, class_standings, standings_frame
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.condition_classes import CLASSES, class_of
-from wristctl.comparison.geometric_means import paired_ratio
-from wristctl.comparison.tie_groups import ALIKE, standing
+from wristctl.comparison.geometric_means import MEASURABLE, paired_ratio
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.repetitions import Repeated
@@ -69,11 +68,11 @@ def test_rows_stand_in_groups_over_the_motions_of_a_class() -> None:
     ]
     (found,) = stand([each for row in rows for each in row])
     assert (found.name, found.cells, found.loops) == ("sampled", "10 motions", ["a"])
-    assert [sorted(found.labels[at] for at in group.rows) for group in found.standing.groups] == [
+    assert [sorted(found.labels[at] for at in group) for group in found.standing.groups] == [
         ["a/x", "b/x"],
         ["c/x"],
     ]
-    assert found.group(2) == 2 and found.best("c") == 2 and found.best("z") is None
+    assert found.standing.group(2) == 2 and found.best("c") == 2 and found.best("z") is None
     ratio, reverse = found.times_better(0, 2), found.times_better(2, 0)
     assert ratio.value == pytest.approx(2.0, rel=0.03) and ratio.low < ratio.value < ratio.high
     assert reverse.value == pytest.approx(1.0 / ratio.value)
@@ -87,15 +86,106 @@ def test_classes_come_in_their_order_and_each_has_its_own_loops() -> None:
     assert [each.cells for each in found] == ["1 motion", "2 motions"]
 
 
-def test_what_swings_or_fails_is_in_no_group_and_what_does_not_arrive_is_told() -> None:
-    rows = compared("sound/x", [1e-3, 2e-3]) + compared("swings/x", [1e-4, 1e-4], oscillation=0.01)
-    failing = compared("fails/x", [1e-5, 1e-5])
-    failing[1] = replace(failing[1], repeated=repeated("fails/x", [np.nan], failed=1))
-    short = [replace(each, repeated=_short(each.repeated)) for each in compared("short/x", [1e-2, 1e-2])]
-    (found,) = stand([*rows, *failing, *short])
-    assert [found.labels[at] for group in found.standing.groups for at in group.rows] == ["sound/x", "short/x"]
-    assert {found.labels[at] for at in found.standing.unreliable} == {"swings/x", "fails/x"}
-    assert found.swing[1] == 0.01 and found.away.tolist() == [0, 0, 0, 2] and found.scores[2, 1] == np.inf
+def test_what_swings_or_fails_or_does_not_arrive_or_is_not_physical_is_in_no_group() -> None:
+    """Each row once; a row that fails and swings too is told by motions, each once."""
+    moves = 8
+    rows = compared("sound/x", [1e-3] * moves) + compared("swings/x", [1e-4] * moves, oscillation=0.01)
+    failing = compared("fails/x", [1e-5] * moves, oscillation=0.01)
+    failing[1] = replace(failing[1], repeated=repeated("fails/x", [np.nan], failed=1, oscillation=0.01))
+    short = [replace(each, repeated=_short(each.repeated)) for each in compared("short/x", [1e-5] * moves)]
+    short[1:] = compared("short/x", [1e-5] * moves)[1:]
+    strong = compared("strong/x", [1e-5] * moves, peak_tension=70.0)
+    strong = [replace(each, repeated=replace(each.repeated, bears=60.0)) for each in strong]
+    (found,) = stand([*rows, *failing, *short, *strong])
+    stands = found.standing
+    fates = ["ranked", "unreliable", "unreliable", "does not arrive", "not physical"]
+    assert [stands.fate(at) for at in range(5)] == fates and sorted(stands.order) == list(range(5))
+    assert stands.groups == [[0]] and stands.unphysical == [4] and stands.short == [3]
+    assert found.swing[1] == 0.01 and found.away.tolist() == [0, 0, 0, 1, 0] and found.scores[2, 1] == np.inf
+    assert (stands.failures[2].times, stands.swings[2].times, stands.lost[2].times) == (1, moves - 1, moves)
+    assert found.peak.tolist() == [0.0, 0.0, 0.0, 0.0, 70.0]
+
+
+@pytest.mark.parametrize("failed", [0, 1, 2])
+def test_a_row_that_fails_in_one_of_three_repetitions_is_unreliable(failed: int) -> None:
+    rows = compared("a/x", [1e-3] * 8) + compared("b/x", [1e-5] * 8)
+    rows[-1] = replace(rows[-1], repeated=repeated("b/x", [1e-5] * 3, failed=failed))
+    rows[7] = replace(rows[7], repeated=repeated("a/x", [1e-3] * 3))
+    (found,) = stand(rows)
+    assert found.standing.fate(1) == ("unreliable" if failed else "ranked")
+    assert np.isinf(found.scores[1]).tolist() == [False] * 7 + [failed > 0]
+    assert found.standing.failures[1].times == (failed > 0) and found.standing.groups[0] == ([0] if failed else [1])
+
+
+def test_a_row_that_swings_in_one_of_three_repetitions_is_unreliable() -> None:
+    rows = compared("a/x", [1e-3] * 8) + compared("b/x", [1e-5] * 8)
+    once = repeated("b/x", [1e-5] * 3)
+    swinging = {**once.metrics, "oscillation": np.array([0.0, 0.02, 0.0])}
+    rows[-1] = replace(rows[-1], repeated=replace(once, metrics=swinging))
+    (found,) = stand(rows)
+    assert found.standing.unreliable == [1] and found.standing.swings[1].times == 1 and found.swing[1] == 0.02
+
+
+def test_more_repetitions_than_motions_are_what_is_compared() -> None:
+    """Two motions tell nothing; twelve repetitions of both do, each by the mean over the motions."""
+    rng = np.random.default_rng(0)
+    rmse = {
+        label: factor * np.exp(0.1 * rng.standard_normal((2, 12))) for label, factor in (("a/x", 1e-2), ("b/x", 2e-2))
+    }
+    few = [each for label, own in rmse.items() for each in compared(label, own[:, 0].tolist())]
+    (found,) = stand(few)
+    assert found.cells == "2 motions" and found.standing.untold == [0, 1]
+    many = [
+        ComparedRow("a", f"move {k}", "none", label[0], "x", repeated(label, own[k].tolist()))
+        for label, own in rmse.items() for k in (0, 1)
+    ]  # fmt: skip
+    (found,) = stand(many)
+    assert found.cells == "12 repetitions" and found.standing.groups == [[0], [1]] and found.motions == 2
+    np.testing.assert_allclose(found.scores, [np.sqrt(own[0] * own[1]) for own in rmse.values()])
+    assert found.means[0].value == pytest.approx(np.exp(np.log(rmse["a/x"]).mean()))
+
+
+def test_too_few_motions_rank_nothing_whatever_the_difference() -> None:
+    """Three motions and rows 75 times apart in each of them."""
+    (found,) = stand(compared("a/x", [1e-3, 2e-3, 3e-3]) + compared("b/x", [0.075, 0.15, 0.22]))
+    assert found.standing.groups == [] and found.standing.untold == [0, 1]
+
+
+def test_steps_are_no_part_of_the_mean_of_smooth_motions() -> None:
+    """A jump costs each row the same; in one mean it would make a row that is 100 times better 5 times so."""
+
+    def both(label: str, smooth: float) -> list[ComparedRow]:
+        jump = replace(compared(label, [0.04])[0], reference="step 30 deg", jumps=True)
+        return [*compared(label, [smooth] * 8), jump]
+
+    rows = both("a/x", 1e-4) + both("b/x", 1e-2)
+    smooth, steps = stand(rows)
+    assert (smooth.name, smooth.cells, smooth.jumps) == ("sampled", "8 motions", False)
+    assert (steps.name, steps.cells, steps.jumps) == ("sampled, steps", "1 motion", True)
+    assert smooth.times_better(0, 1).value == pytest.approx(100.0) and smooth.standing.groups == [[0], [1]]
+    assert steps.means[0].value == steps.means[1].value == pytest.approx(0.04) and steps.standing.untold == [0, 1]
+    assert [len(each.of(rows)) for each in (smooth, steps)] == [16, 2]
+
+
+def test_an_error_of_nothing_counts_as_the_least_that_can_be_measured() -> None:
+    (found,) = stand(compared("a/x", [0.0] * 8) + compared("b/x", [1e-7] * 8) + compared("c/x", [1e-3] * 8))
+    assert found.standing.groups == [[0, 1], [2]]
+    assert found.means[0].value == found.means[1].value == pytest.approx(MEASURABLE)
+
+
+def test_the_table_of_standings_has_every_row_of_every_class_once() -> None:
+    rows = (
+        compared("a/x", [1e-3] * 8)
+        + compared("b/x", [2e-3] * 8, oscillation=0.01)
+        + compared("a/x", [1e-3] * 2, "soft")
+    )
+    rows += compared("b/x", [1e-3] * 2, "soft")
+    table = standings_frame(stand(rows, "{a: {}, soft: {plant: {stiffness_scale: 0.8}}}"))
+    told = table[["class", "row", "fate", "pairs", "swings"]].to_numpy().tolist()
+    assert told == [
+        ["sampled", "a/x", "ranked", 8, 0], ["sampled", "b/x", "unreliable", 8, 8],
+        ["off-nominal", "a/x", "too few to tell", 2, 0], ["off-nominal", "b/x", "too few to tell", 2, 0],
+    ]  # fmt: skip
 
 
 def _short(given: Repeated) -> Repeated:
@@ -107,14 +197,5 @@ def _short(given: Repeated) -> Repeated:
 
 def test_control_is_judged_without_a_network_where_it_can_be() -> None:
     both = compared("a/x", [1e-3]) + compared("a/x", [1.0], inverse="network")
-    assert stand(both)[0].scores.tolist() == [[1e-3]]
-    assert stand(compared("a/x", [1.0], inverse="network"))[0].scores.tolist() == [[1.0]]
-
-
-@pytest.mark.parametrize(("ahead", "groups"), [(ALIKE * 1.001, 2), (ALIKE * 0.999, 1)])
-def test_of_few_motions_a_row_is_behind_only_where_it_is_in_every_one(ahead: float, groups: int) -> None:
-    best = np.array([1.0, 3.0, 0.2])
-    found = standing([best, best * ahead], np.zeros((2, 3), bool), 90.0, 0, drawn=False)
-    assert len(found.groups) == groups and not found.unreliable
-    mixed = standing([best, best * [10.0, 10.0, 0.5]], np.zeros((2, 3), bool), 90.0, 0, drawn=False)
-    assert [group.rows for group in mixed.groups] == [[0, 1]], "ahead on two of three tells nothing"
+    assert stand(both)[0].scores == pytest.approx(1e-3)
+    assert stand(compared("a/x", [1.0], inverse="network"))[0].scores == pytest.approx(1.0)

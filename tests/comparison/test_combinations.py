@@ -46,6 +46,7 @@ def test_rows_come_by_loop_reference_direction_row_and_inverse(both: list[Compar
         for inverse in ("closed-form", "none")
     ]  # fmt: skip
     assert [(row.loop, row.reference, row.label, row.inverse) for row in both] == wanted
+    assert [row.jumps for row in both] == [reference.startswith("step") for _, reference, _, _ in wanted]
 
 
 def test_each_row_is_the_closed_loop_of_its_own_settings(both: list[ComparedRow]) -> None:

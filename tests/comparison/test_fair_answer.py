@@ -90,6 +90,13 @@ def test_a_law_that_swings_is_not_recommended_unless_so_little_is_tolerated() ->
     assert "run a/tuned" in said(row("a/tuned", 1.0, swings=1), row("bb/tuned", 1.5), tolerated=0.05)
 
 
+def test_a_law_that_is_seldom_lost_is_told_with_its_share_and_loses_its_place_where_that_is_shown_to_be_more() -> None:
+    """1 % is tolerated: 1 of 40 does not show more, 3 do."""
+    seldom, often = (said(row("a/tuned", 1.0, swings=count), row("bb/tuned", 1.5), tolerated=0.01) for count in (1, 3))
+    assert "run a/tuned" in seldom and "a/tuned in 2.5 % [0.063, 13]" in seldom and "Worlds lost" not in seldom
+    assert "run bb/tuned" in often and "Worlds lost, of 40: 3 in a/tuned." in often and "is tolerated: " not in often
+
+
 def test_every_law_that_is_lost_is_named_the_worst_first() -> None:
     rows = [row(f"{name}/tuned", 1.0, swings=count) for name, count in (("a", 2), ("b", 7), ("c", 2), ("d", 1))]
     text = said(*rows, row("e/tuned", 1.0, swings=3, failed=2), row("ff/tuned", 2.0))

@@ -15,10 +15,10 @@ from wristctl.comparison.shares import performance_profiles, share
 
 @pytest.mark.parametrize(
     ("count", "n", "low", "high"),
-    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0000, 0.1611), (1, 29, 0.0061, 0.1718)],
+    [(81, 263, 0.2527, 0.3676), (15, 148, 0.0578, 0.1617), (0, 20, 0.0000, 0.1684), (1, 29, 0.0009, 0.1776)],
 )
 def test_intervals_are_those_that_newcombe_printed(count: int, n: int, low: float, high: float) -> None:
-    """R. G. Newcombe, Stat. Med. 17 (1998) 857, table I, method 3."""
+    """R. G. Newcombe, Stat. Med. 17 (1998) 857, table I, method 5."""
     found = share(np.arange(n) < count)
     assert (found.low, found.high) == pytest.approx((low, high), abs=5e-5)
     assert (found.times, found.n) == (count, n) and found.value == pytest.approx(count / n)
@@ -30,7 +30,7 @@ def test_intervals_of_shares_hold_the_truth_as_often_as_they_say() -> None:
     ends = np.array([(found.low, found.high) for k in range(n + 1) if (found := share(np.arange(n) < k))])
     truth = np.linspace(0.02, 0.98, 97)[:, None]
     held = (binom.pmf(np.arange(n + 1), n, truth) * ((ends[:, 0] <= truth) & (truth <= ends[:, 1]))).sum(axis=1)
-    assert held.mean() == pytest.approx(0.95, abs=0.005) and held.min() > 0.86
+    assert held.min() >= 0.95 and held.mean() < 0.975, "never less often, and little more"
 
 
 def test_profiles_are_the_shares_within_a_factor_of_the_best() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.world_ranking import (
     RANKED,
     RankedRow,
@@ -17,7 +18,10 @@ from wristctl.comparison.world_ranking import (
 )
 from wristctl.config.families import Family
 from wristctl.config.load import load_study
+from wristctl.config.loop import Reference
 from wristctl.simulation.cases import Measured
+from wristctl.studies.compare import Compared
+from wristctl.studies.findings import Findings
 from wristctl.studies.rank import answer
 
 WORLDS = 40
@@ -45,28 +49,28 @@ def hard(seed: int = 0, scale: float = 1.0, spread: float = 0.05) -> Array:
 
 def test_rows_that_worlds_cannot_tell_apart_are_one_group_and_others_are_not() -> None:
     found = made_up(row("a/x", hard(1, 0.3)), row("b/x", hard(2, 0.301)), row("c/x", hard(3, 0.5)))
-    names = [[found.rows[at].label for at in group.rows] for group in found.standing.groups]
+    names = [[found.rows[at].label for at in group] for group in found.standing.groups]
     assert [set(each) for each in names] == [{"a/x", "b/x"}, {"c/x"}, {"feedforward/default"}]
-    gain = found.gains[found.standing.groups[0].rows[0]]
+    gain = found.gains[found.standing.groups[0][0]]
     assert gain.low < 1.0 / 0.3 < gain.high and gain.low > 3.0
     said = answer(found)
     assert "a/x, b/x (a tie) are best" in said or "b/x, a/x (a tie) are best" in said
-    assert "Next is c/x" in said and "cannot be told in 40 worlds" in said and "Not to be relied on" not in said
+    assert "Next is c/x" in said and "are told in 40 worlds" in said and "Not to be relied on" not in said
 
 
 def test_a_law_that_is_best_until_it_swings_is_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), swings=(7,)), row("calm/x", hard(2, 0.5)))
-    assert found.rows[found.standing.groups[0].rows[0]].label == "calm/x"
-    assert found.group(1) is None and found.order[-1] == 1
+    assert found.rows[found.standing.groups[0][0]].label == "calm/x"
+    assert found.standing.group(1) is None and found.standing.order[-1] == 1
     assert "calm/x is best" in answer(found) and "wild/x (swings in 1 of 40)" in answer(found)
 
 
 def test_a_law_that_fails_anywhere_is_kept_and_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), failed=(3, 4)), row("calm/x", hard(2, 0.5)))
-    assert "wild/x (fails in 2 of 40)" in answer(found) and found.rows[found.order[0]].label == "calm/x"
+    assert "wild/x (fails in 2 of 40)" in answer(found) and found.rows[found.standing.order[0]].label == "calm/x"
     lines = {line["row"]: line for line in ranking_frame(found).to_dict("records")}
     assert lines["wild/x"]["failures"] == 0.05 and lines["wild/x"]["worst_rmse"] == np.inf
-    assert found.group(1) is None and lines["calm/x"]["group"] == 1
+    assert found.standing.group(1) is None and lines["calm/x"]["group"] == 1
 
 
 def test_where_everything_swings_nothing_is_best() -> None:
@@ -85,19 +89,103 @@ SETTINGS = (
 
 def test_in_real_loops_an_observer_beats_none_and_what_is_too_fast_swings_or_fails() -> None:
     study = load_study([], list(SETTINGS))
-    found = rank(study)
-    labels = [found.rows[at].label for at in found.order]
+    (found,) = rank(study)
+    labels = [found.rows[at].label for at in found.standing.order]
     assert labels[:3] == ["ct-dob/default", "computed-torque/default", "feedforward/default"]
-    assert found.group(found.order[3]) is None
-    assert found.gains[found.order[0]].low > 3.0
+    assert found.standing.group(found.standing.order[3]) is None
+    assert found.gains[found.standing.order[0]].low > 3.0
     worlds = worlds_frame(found)
     own = worlds[worlds["row"] == "ct-dob/default"]
-    score = np.exp(np.log(own["rmse"]).groupby(own["world"]).mean())
-    assert found.means[0].value == pytest.approx(np.exp(np.log(score).mean())) and len(own) == 20
+    for world in range(10):
+        rmse = own["rmse"][own["world"] == world]
+        assert found.rows[0].rmse[world] == pytest.approx(np.exp(np.log(rmse).mean()), rel=1e-12)
+    assert found.means[0].value == pytest.approx(np.exp(np.log(found.rows[0].rmse).mean()))
+    assert sorted(zip(own["world"], own["motion"], strict=True)) == [(w, m) for w in range(10) for m in (0, 1)]
+
+
+def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> None:
+    """Errors that are 10^-(3 + world) and three times as much in the second motion."""
+    motions = np.array([1.0, 3.0])
+    family = Family(references=(Reference(), Reference(duration=2.0)))
+    rows = []
+    for factor, label in ((1.0, "feedforward/default"), (0.5, "a/x")):
+        rmse = (factor * 10.0 ** -(3.0 + np.arange(4.0))[:, None] * motions).reshape(1, -1)
+        metrics = dict.fromkeys(RANKED, rmse)
+        failed = np.zeros((1, 8), bool)
+        failed[0, 5] = label == "a/x"
+        measured = Measured(metrics, failed, np.ones((1, 8)), np.zeros(8, bool))
+        scores = np.sqrt(3.0) * factor * 10.0 ** -(3.0 + np.arange(4.0))
+        rows.append(RankedRow(label, scores, np.zeros(4, bool), measured))
+    found = worlds_frame(ranking("made-up", family, rows, 0))
+    for line in found.to_dict("records"):
+        factor = 0.5 if line["row"] == "a/x" else 1.0
+        assert line["rmse"] == pytest.approx(factor * 10.0 ** -(3.0 + line["world"]) * motions[line["motion"]])
+        assert line["failed"] == (line["row"] == "a/x" and line["world"] == 2 and line["motion"] == 1)
+    assert len(found) == 16 and len({(a, b, c) for a, b, c in found[["row", "world", "motion"]].to_numpy()}) == 16
+
+
+def test_steps_are_ranked_apart_from_smooth_motions() -> None:
+    """A law that fails and swings on steps alone keeps its place among smooth motions."""
+    settings = [
+        "families={mixed: {references: [{kind: step}, {duration: 0.5}, {duration: 0.4}], horizon: 1.6,"
+        " draw: {plant.stiffness: x0.9..1.1, reference.angle_deg: 10..30}}}",
+        "compare.worlds={family: mixed, draws: 8}",
+        "compare.rows=[{controller: ct-dob}]",
+    ]
+    smooth, steps = rank(load_study([], settings))
+    assert (smooth.name, smooth.jumps, smooth.motions) == ("mixed", False, 2)
+    assert (steps.name, steps.jumps, steps.motions) == ("mixed, steps", True, 1)
+    assert sorted(set(worlds_frame(smooth)["motion"])) == [1, 2] and set(worlds_frame(steps)["motion"]) == {0}
+    for found in (smooth, steps):
+        own = worlds_frame(found)
+        for at, row in enumerate(found.rows):
+            scores = own[own["row"] == row.label].groupby("world")["rmse"].apply(lambda x: np.exp(np.log(x).mean()))
+            assert found.rows[at].rmse == pytest.approx(scores.to_numpy(), rel=1e-12)
+    assert steps.rows[0].rmse.min() > 10.0 * smooth.rows[0].rmse.max()
+    alone = load_study([], [*settings, "families.mixed.references=[{kind: step}]"])
+    assert [each.name for each in rank(alone)] == ["mixed"]
+
+
+def test_a_family_of_too_few_worlds_tells_so_and_ranks_nothing() -> None:
+    def few(label: str, scale: float) -> RankedRow:
+        return RankedRow(label, scale * np.ones(3), np.zeros(3, bool), row(label, np.ones(WORLDS)).measured)
+
+    found = ranking("made-up", FAMILY, [few("feedforward/default", 1.0), few("a/x", 0.01)], 0)
+    said = answer(found)
+    assert f"{LEAST_PAIRS} or more" in said and "3 worlds" in said and " best" not in said and "tie" not in said
+    assert [line["fate"] for line in ranking_frame(found).to_dict("records")] == ["too few to tell"] * 2
+
+
+def test_a_comparison_has_a_fault_where_all_rows_are_unreliable_and_none_where_worlds_are_few() -> None:
+    study = load_study([], [])
+
+    def fault(swings: tuple[int, ...], worlds: int = WORLDS) -> bool:
+        rows = [row("feedforward/default", hard(), swings), row("a/x", hard(1), swings)]
+        few = [each._replace(rmse=each.rmse[:worlds], swings=each.swings[:worlds]) for each in rows]
+        found = ranking("made-up", FAMILY, few, 0)
+        return Compared(study, Findings(0), [], [], {}, {}, [], [found]).fault is not None
+
+    assert fault((0,)) and not fault(()) and not fault((), worlds=3) and fault((0,), worlds=3)
+
+
+def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() -> None:
+    rows = [row("feedforward/default", hard()), row("a/x", hard(1, 0.1), swings=(3,))]
+    kept, gone = (ranking("made-up", FAMILY, rows, 0, tolerated) for tolerated in (0.01, 0.0))
+    assert kept.standing.groups[0] == [1] and gone.standing.unreliable == [1]
+    assert "a/x (swings in 1: 2.5 % [0.063, 13]) is best" in answer(kept)
+    assert "Not to be relied on: a/x (swings in 1 of 40)" in answer(gone)
+    lines = {line["row"]: line for line in ranking_frame(kept).to_dict("records")}
+    assert (lines["a/x"]["lost"], lines["a/x"]["fate"]) == (1 / 40, "ranked")
+    assert lines["a/x"]["lost_low"] < 0.01 < lines["a/x"]["lost_high"]
+
+
+def test_errors_that_nobody_can_measure_are_said_to_be_less() -> None:
+    said = answer(made_up(row("a/x", np.full(WORLDS, 1e-9)), row("b/x", np.full(WORLDS, 1e-6))))
+    assert "a/x, b/x (a tie) are best: RMSE <0.001 deg" in said
 
 
 def test_the_same_worlds_give_the_same_ranking_whatever_stands_beside_a_row() -> None:
     study = load_study([], list(SETTINGS))
     alone = load_study([], [*SETTINGS, "compare.rows=[{controller: computed-torque}]"])
-    ours = [next(r for r in rank(each).rows if r.label == "computed-torque/default") for each in (study, alone)]
+    ours = [next(r for r in rank(each)[0].rows if r.label == "computed-torque/default") for each in (study, alone)]
     assert np.array_equal(ours[0].rmse, ours[1].rmse)

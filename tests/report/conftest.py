@@ -134,7 +134,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "tensions, late": lambda: tensions(late()),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
     "answer": lambda: answer_figure(standings()),
-    "error against variation": lambda: error_against_variation(results(), [("sampled", ["default"])]),
+    "error against variation": lambda: error_against_variation(results(), standings()),
     "tensions of several": lambda: tension_rows([course(row, 0.1 * k + 0.1) for k, row in enumerate(ROWS[:3])], "all"),
     "error over a disturbance": lambda: error_over_disturbance(
         pushed(), "disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0}

@@ -16,7 +16,7 @@ from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.reference import motion, reference_name, toward
+from wristctl.simulation.reference import jumps, motion, reference_name, toward
 from wristctl.simulation.tracked_range import range_untracked
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.kinematics import arc_tip, exact_arc
@@ -48,6 +48,16 @@ def text_of(**columns: np.ndarray) -> str:
 
 def recorded(file: Path, horizon: float = 3.0, **given: object) -> Motion:
     return motion(Reference.model_validate({"kind": "recording", "file": str(file), **given}), WRIST, horizon, 1e-3)
+
+
+@pytest.mark.parametrize("kind", [each for each in REFERENCES if each != "recording"])
+def test_a_kind_of_reference_is_one_of_steps_where_its_angle_jumps(kind: str) -> None:
+    """By more than a degree within a tenth of a millisecond, from rest at 0; on none of the others."""
+    path = {"tips": ((0.078, 0.014), (0.079, 0.01)), "inverse": "closed-form"}
+    targets: dict[str, dict[str, object]] = {"multi-step": {"angles_deg": (10.0, -5.0)}, "tip-path": path}
+    given = Reference.model_validate({"kind": kind} | targets.get(kind, {}))
+    theta = motion(given, WIDE, 3.0, 1e-4).theta_ref
+    assert jumps(given) == (np.abs(np.diff(theta, prepend=0.0)).max() > np.radians(1.0))
 
 
 @pytest.mark.parametrize("kind", SMOOTH)

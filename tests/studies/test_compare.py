@@ -30,7 +30,9 @@ Compare = Callable[..., Compared]
 
 def row(loop: str, reference: str, label: str, inverse: str = "closed-form", **how: Any) -> ComparedRow:
     controller, gains = label.split("/")
-    return ComparedRow(loop, reference, inverse, controller, gains, repeated(label, **how))
+    return ComparedRow(
+        loop, reference, inverse, controller, gains, repeated(label, **how), reference.startswith("step")
+    )
 
 
 def both(loop: str, reference: str, **how: Any) -> list[ComparedRow]:
@@ -127,7 +129,8 @@ def test_the_answer_is_drawn_and_each_class_by_itself(compare: Compare) -> None:
 
 def test_where_all_references_are_steps_the_first_of_them_is_drawn(compare: Compare) -> None:
     done = compare([*both("fast", STEP), *both("fast", "step 5 deg")])
-    assert done.figures["error-over-time-sampled"].axes[0].get_title("left") == f"sampled: loop fast, {STEP}"
+    drawn = done.figures["error-over-time-sampled-steps"].axes[0]
+    assert drawn.get_title("left") == f"sampled, steps: loop fast, {STEP}"
 
 
 def test_loops_stand_beside_each_other_for_each_reference(compare: Compare) -> None:

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from wristctl.comparison.class_standing import ClassStanding
 from wristctl.comparison.condition_classes import CLASSES
-from wristctl.comparison.geometric_means import geometric_mean
+from wristctl.comparison.geometric_means import geometric_mean, penalised
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.tie_groups import standing
-from wristctl.studies.answer_lines import COLUMNS
-from wristctl.studies.compare_answer import LADDER, LINES, answer_lines, two, wrapped
+from wristctl.studies.answer_lines import COLUMNS, two
+from wristctl.studies.compare_answer import LADDER, LINES, answer_lines, wrapped
 
 ROWS = ("mrac/default", "smc/exchanged", "smc/printed", "pid/printed", "gvsc/default", "nc/default")
 RUNGS = tuple(f"{name}/default" for name in LADDER)
@@ -27,35 +28,40 @@ def stands(
     rmse: dict[str, float] | None = None,
     swings: tuple[str, ...] = (),
     away: tuple[str, ...] = (),
+    strained: tuple[str, ...] = (),
+    motions: int = 12,
 ) -> ClassStanding:
-    """Rows on twelve motions, each its RMSE times what all share."""
+    """Rows on so many motions, each its RMSE times what all share."""
     errors = RMSE if rmse is None else rmse
     rng = np.random.default_rng(5)
-    shared, own = rng.normal(0.0, 0.5, 12), 0.02 * rng.standard_normal((len(errors), 12))
+    shared, own = rng.normal(0.0, 0.5, motions), 0.02 * rng.standard_normal((len(errors), motions))
     scores = np.array(list(errors.values()))[:, None] * np.exp(shared + own)
     labels = list(errors)
     swing = np.array([0.05 if label in swings else 0.0 for label in labels])
+    peak = np.array([70.0 if label in strained else 0.0 for label in labels])
+    short = np.array([motions if label in away else 0 for label in labels])
+    swinging = np.repeat(swing[:, None] > 0.0, motions, axis=1)
     return ClassStanding(
-        name, "12 motions", labels, ["a"], scores,
-        standing(scores, np.repeat(swing[:, None] > 0.0, 12, axis=1), 1.5, 0),
-        [geometric_mean(each, 0) for each in np.where(np.isfinite(scores), scores, 1.5)], swing,
-        np.array([12 if label in away else 0 for label in labels]), np.zeros(len(labels)),
+        name, f"{motions} motions", labels, ["a"], scores,
+        standing(scores, swinging, 0, short=short > 0, unphysical=peak > 0.0),
+        [geometric_mean(each, 0) for each in penalised(scores)], swing, peak, short, motions,
     )  # fmt: skip
 
 
 def test_the_best_stands_first_with_its_interval_and_what_it_buys() -> None:
     lines = answer_lines([stands()])
-    assert (
-        lines[2].startswith("sampled (12): ") and "1. mrac 0.000" in lines[2] and re.search(r"\[\S+, \S+\]", lines[2])
-    )
+    assert lines[2].startswith("sampled (12 motions): ") and "RMSE [deg]" in lines[0]
+    assert re.search(r"1\. mrac 0\.001 \[<0\.001, \S+\]", lines[2])
     said = " ".join(" ".join(lines).split())
-    assert re.search(r"errors beside mrac's: (pid|smc)-dob x10, feedforward x(9900|10000) \[", said), "next, then none"
-    assert "places of 11 rows, by class (-: none): smc/exchanged 8" in said
+    assert re.search(r"errors over mrac's: (pid|smc)-dob x5\.\d+, feedforward x5\d00 \[", said), "of 0.001 deg"
+    assert "smc/exchanged 7/10" in said, "of the 10 places of 11 rows, one of which two share"
 
 
 def test_the_paper_is_answered_by_name() -> None:
+    """What becomes of printed gains in each class adds up to all classes."""
     said = " ".join(answer_lines([stands(away=("smc/printed",)), stands("pushed", swings=("pid/printed",))]))
-    assert "printed gains: smc does not arrive in 1 of 2 classes; pid fails or swings in 1" in said
+    assert "smc does not arrive in 1, has a place in 1 of 2 classes" in said
+    assert "pid has a place in 1, fails or swings in 1" in said
     assert "the paper's order (least RMSE first: smc, mrac, pid, gvsc, nc) holds in 0 of 2 classes" in said
     order = dict(
         zip(("smc/tuned", "mrac/default", "pid/tuned", "gvsc/default", "nc/default"), (1, 2, 3, 4, 5), strict=True)
@@ -63,23 +69,57 @@ def test_the_paper_is_answered_by_name() -> None:
     theirs = stands(rmse={label: 1e-3 * value for label, value in order.items()})
     assert "holds in 1 of 2 classes (sampled)" in " ".join(answer_lines([theirs, stands("pushed")]))
     both = {"smc/printed": 1e-3, "feedforward/default": 1e-2}
-    assert "printed gains: smc works in all of 1 classes" in " ".join(answer_lines([stands(rmse=both)]))
+    assert "smc has a place in 1 of 1 classes" in " ".join(answer_lines([stands(rmse=both)]))
 
 
 def test_limit_cycles_failures_and_short_ends_are_named_with_how_often() -> None:
-    one = stands(swings=("pid/printed",), away=("smc/printed",))
-    scores = one.scores.copy()
-    scores[4, :5] = np.inf
-    half = replace(one, scores=scores, standing=standing(scores, np.zeros(scores.shape, bool), 1.5, 0))
+    one = stands(swings=("pid/printed",), away=("smc/printed",), strained=("gvsc/default",))
     lost = " ".join(answer_lines([one]))
-    assert "limit cycle: pid/printed +-2.9 deg; does not arrive: smc/printed" in lost
-    assert "fails: gvsc 5/12" in " ".join(answer_lines([half]))
+    assert "limit cycle: pid/printed +-2.9 deg; does not arrive: smc/printed; no tendon bears it: gvsc 70 N" in lost
+    scores, swings = one.scores.copy(), np.zeros(one.scores.shape, bool)
+    scores[4, :5], swings[4, 3:8] = np.inf, True
+    half = replace(one, scores=scores, standing=standing(scores, swings, 0), swing=np.full(11, 0.05))
+    assert "fails: gvsc 5/12 (+-2.9 deg in 3/12)" in " ".join(answer_lines([half])), "each motion once"
 
 
 def test_rows_that_tie_are_joined() -> None:
     alike = {"a/default": 1e-3, "b/default": 1e-3, "c/default": 5e-3}
     (line,) = [each for each in answer_lines([stands(rmse=alike)]) if "1." in each]
     assert re.search(r"1\. [ab] \S+ \[.*\] = [ab] \S+ 2\. c", line.replace(";", ""))
+
+
+def test_what_too_few_motions_tell_is_no_tie_and_has_no_number() -> None:
+    apart = {"a/default": 1e-3, "b/default": 1e-1}
+    said = " ".join(" ".join(answer_lines([stands(rmse=apart, motions=3)])).split())
+    block = said[said.index("sampled (3 motions)") :]
+    assert f"n=3, {LEAST_PAIRS} at least" in block and "--repetitions" in block
+    assert " = " not in block and "1." not in block.replace("1.0", "") and "a 0.0" in block and "b " in block
+
+
+def test_errors_that_nobody_can_measure_are_equal_and_said_to_be_less() -> None:
+    tiny = {"a/default": 1e-9, "b/default": 1e-7, "c/default": 5e-3}
+    (line,) = [each for each in answer_lines([stands(rmse=tiny)]) if "1." in each]
+    assert "1. a <0.001 = b <0.001" in line
+    said = " ".join(answer_lines([stands(rmse=tiny)]))
+    assert "errors over 0.001 deg: c x2" in said and "a's" not in said, "no ratio of what nobody can measure"
+
+
+def test_rows_shown_left_out_and_without_a_place_add_up_to_all_rows() -> None:
+    """However little room there is."""
+    swinging, away, strained = ("pid/printed", "nc/default"), ("smc/printed",), ("gvsc/default",)
+    for classes in (1, 5, 10):
+        names = [*CLASSES, *(f"{name}, steps" for name in CLASSES)][:classes]
+        lines = answer_lines([stands(name, None, swinging, away, strained) for name in names])
+        assert len(lines) <= LINES and all(any(line.startswith(f"{name} (") for line in lines) for name in names)
+    (first, *_) = names
+    text = "\n".join(answer_lines([stands(first, None, swinging, away, strained)]))
+    block = text[text.index(f"{first} (12 motions)") : text.index("errors over")]
+    shown = [label for label in RMSE if re.search(rf"(^|[ =]){re.escape(called(label))}[ ;]", block.replace("\n", " "))]
+    assert len(shown) == len(RMSE) and "more" not in block
+
+
+def called(label: str) -> str:
+    return label.removesuffix("/default")
 
 
 @settings(max_examples=25, deadline=None)
@@ -120,10 +160,19 @@ def test_what_does_not_fit_is_counted_and_nothing_else_is_lost() -> None:
 
 
 def test_whoever_swings_is_named_before_places_take_the_room() -> None:
-    """With five classes there are three lines for each: all that swing, fewer places."""
+    """With ten classes there are two lines for each: all that swing, fewer places, and how many are left out."""
     swinging = ("pid/printed", "smc/exchanged", "nc/default")
     lines = answer_lines([stands(name, swings=swinging) for name in CLASSES])
     assert len(lines) <= LINES and sum("limit cycle: " in line for line in lines) == 5
     for name in swinging:
         assert sum(line.count(f"{name.removesuffix('/default')} +-2.9 deg") for line in lines) == 5
-    assert sum("1. mrac " in line for line in lines) == 5 and len(re.findall(r"\+\d+ places", " ".join(lines))) >= 2
+    assert sum("1. mrac " in line for line in lines) == 5
+    many = {f"law{k}/default": 1e-3 * 1.5**k for k in range(14)}
+    squeezed = "".join(answer_lines([stands(f"class {k}", many) for k in range(10)]))
+    left_out = 0
+    for block in squeezed.split("class ")[1:]:
+        places = block.split("errors over")[0]
+        left = re.search(r"\+(\d+) more", places)
+        left_out += left is not None
+        assert len(re.findall(r"law\d+ ", places)) + int(left[1] if left else 0) == 14
+    assert left_out >= 5

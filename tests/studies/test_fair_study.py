@@ -167,6 +167,11 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
         "noise 0 is the same, alone or not"
     )
     assert not np.array_equal(first.rmse, rows[0].rmse)
+    pieces = judge_unit.judged(whole.spec)
+    for motion in range(pieces["rmse"].shape[1]):
+        alone = judge_unit.row_of("one", [pieces], [motion])
+        assert alone.rmse == pytest.approx(np.exp(np.log(pieces["rmse"][:, motion]).mean(axis=1)))
+        assert alone.measured.failed.shape == (1, 20)
 
 
 @pytest.mark.parametrize(

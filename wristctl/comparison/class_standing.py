@@ -1,9 +1,13 @@
-"""Rows in order within a class of conditions, or over the worlds of a family: what an answer in words is made of."""
+"""Rows in order within a class of conditions, or over the worlds of a family: what an answer in words is made of.
+
+Steps and smooth motions are judged apart: a jump's error is much the same for every law, and would hide all others.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +15,22 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.condition_classes import CLASSES, class_of
-from wristctl.comparison.geometric_means import GeometricMean, geometric_mean, paired_ratio, penalised
-from wristctl.comparison.statistics import spread
+from wristctl.comparison.geometric_means import (
+    MEASURABLE,
+    GeometricMean,
+    geometric_mean,
+    paired_ratio,
+    penalised,
+)  # fmt: skip
 from wristctl.comparison.tie_groups import Standing, standing
-from wristctl.comparison.world_ranking import FAILURE, WorldRanking
+from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.config.control import CompareSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest
+from wristctl.simulation.repetitions import Repeated
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _STREAM = 20_041
 """Of the resampling: the same rows give the same intervals."""
@@ -29,78 +43,92 @@ class ClassStanding:
     """Rows over the cells of one class: every loop, motion and direction of it; or over the worlds of a family."""
 
     name: str
+    """Of the class; with `, steps` where the motions are jumps."""
     cells: str
-    """What they are, counted: 8 motions, 60 worlds."""
+    """What rows are compared over, counted: 8 motions, 30 repetitions, 60 worlds."""
     labels: list[str]
     """controller/gains of each row."""
     loops: list[str]
     """Names of the loops that they are on."""
     scores: Array
-    """RMSE [rad], (R, W); inf where the row failed."""
+    """RMSE [rad] over W motions, repetitions or worlds, (R, W); inf where the row failed."""
     standing: Standing
     means: list[GeometricMean]
     """Of each row's RMSE [rad]; a failure counts as 90 deg."""
     swing: Array
     """Half of the largest swing at rest [rad], (R,); 0 where all rest."""
-    away: NDArray[np.int_]
-    """In how many cells each row stays within its range and does not arrive, (R,)."""
     peak: Array
     """Largest tension of a row that is above what a tendon bears [N], (R,); 0 elsewhere."""
+    away: NDArray[np.int_]
+    """In how many motions each row stays within its range and does not arrive, (R,)."""
+    motions: int
+    """How many motions there are."""
+    jumps: bool = False
+    """Whether they are steps."""
 
-    @property
-    def order(self) -> list[int]:
-        """Rows from best to worst, those that cannot be relied on last."""
-        return [row for group in self.standing.groups for row in group.rows] + self.standing.unreliable
-
-    def group(self, row: int) -> int | None:
-        """The number of a row's group, from 1; None where it fails or swings."""
-        return next((at for at, each in enumerate(self.standing.groups, start=1) if row in each.rows), None)
+    def of(self, results: Sequence[ComparedRow]) -> list[ComparedRow]:
+        """Those of a comparison's rows that are in this class and of its kind of motion."""
+        return [each for each in results if each.loop in self.loops and each.jumps == self.jumps]
 
     def best(self, controller: str) -> int | None:
         """The best row of a controller; None where it has none."""
-        return next((row for row in self.order if self.labels[row].split("/")[0] == controller), None)
+        return next((row for row in self.standing.order if self.labels[row].split("/")[0] == controller), None)
 
     def times_better(self, row: int, other: int) -> GeometricMean:
         """How many times less one row's RMSE is than another's in the same cells."""
-        known = penalised(self.scores, FAILURE)
+        known = penalised(self.scores)
         return paired_ratio(known[other], known[row], _STREAM)
 
 
 def class_standings(
     results: Sequence[ComparedRow], settings: CompareSettings, wrist: WristParameters
 ) -> list[ClassStanding]:
-    """The rows of a comparison in each class of conditions that it has, in the order of CLASSES."""
+    """The rows of a comparison in each class of conditions that it has, in the order of CLASSES, steps last."""
     through = next(each for each in _INVERSES if any(result.inverse == each for result in results))
     classes = {name: class_of(loop, wrist) for name, loop in settings.loops.items()}
     own = [result for result in results if result.inverse == through]
     found = []
-    for name in CLASSES:
-        if here := [result for result in own if classes[result.loop] == name]:
-            found.append(_standing(name, here))
+    for jumps in (False, True):
+        for name in CLASSES:
+            if here := [result for result in own if classes[result.loop] == name and result.jumps == jumps]:
+                found.append(_standing(f"{name}, steps" if jumps else name, here, jumps))
     return found
 
 
-def _standing(name: str, results: Sequence[ComparedRow]) -> ClassStanding:
+def _standing(name: str, results: Sequence[ComparedRow], jumps: bool) -> ClassStanding:
+    """Rows of one class; over its motions, or over repetitions where all motions have more of them."""
     labels = list(dict.fromkeys(result.label for result in results))
     cells = list(dict.fromkeys((result.loop, result.reference) for result in results))
     at = {(each.label, each.loop, each.reference): each.repeated for each in results}
     table = [[at[label, *cell] for cell in cells] for label in labels]
-    scores = np.array([[_score(each.failed, each.metrics["rmse"]) for each in row] for row in table])
-    swing = np.array([[each.swing for each in row] for row in table])
-    counted = f"{len(cells)} motion{'s' * (len(cells) > 1)}"
+    repetitions = {len(each.failed) for row in table for each in row}
+    redrawn = len(repetitions) == 1 and max(repetitions) > len(cells)
+    logs = [[np.log(_rmse(each)) for each in row] for row in table]
+    scores = np.exp([np.mean(row, axis=0) if redrawn else [each.mean() for each in row] for row in logs])
+    ripples = [[_ripple(each) for each in row] for row in table]
+    ripple = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in ripples])
+    away = np.array([sum(not each.arrives and not each.failed.any() for each in row) for row in table])
+    peak = np.array([max(each.beyond for each in row) for row in table])
+    what = "repetition" if redrawn else "motion"
     return ClassStanding(
-        name, counted, labels, list(dict.fromkeys(loop for loop, _ in cells)), scores,
-        standing(scores, swing > 0.0, FAILURE, _STREAM, drawn=False),
-        [geometric_mean(each, _STREAM) for each in penalised(scores, FAILURE)],
-        swing.max(axis=1),
-        np.array([sum(not each.arrives and not each.failed.any() for each in row) for row in table]),
-        np.array([max(each.beyond for each in row) for row in table]),
+        name, f"{scores.shape[1]} {what}{'s' * (scores.shape[1] > 1)}", labels,
+        list(dict.fromkeys(loop for loop, _ in cells)), scores,
+        standing(scores, ripple > 0.0, _STREAM, short=away > 0, unphysical=peak > 0.0),
+        [geometric_mean(each, _STREAM) for each in penalised(scores)],
+        ripple.max(axis=1), peak, away, len(cells), jumps,
     )  # fmt: skip
 
 
-def _score(failed: NDArray[np.bool_], rmse: Array) -> float:
-    """The median of repetitions; inf where one failed. An error of nothing at all is one of rounding."""
-    return np.inf if failed.any() else max(spread(rmse).median, 1e-15)
+def _rmse(repeated: Repeated) -> Array:
+    """RMSE of each repetition [rad], inf where it failed. What nobody can measure is no better than the least."""
+    rmse = np.maximum(repeated.metrics["rmse"], MEASURABLE)
+    return np.where(repeated.failed | ~np.isfinite(rmse), np.inf, rmse)
+
+
+def _ripple(repeated: Repeated) -> Array:
+    """Half of each repetition's swing at rest, where it is a limit cycle [rad]; else 0."""
+    oscillation = repeated.metrics.get("oscillation", np.zeros(len(repeated.failed)))
+    return np.where((oscillation > LIMIT_CYCLE) & at_rest(repeated.first.trajectory), oscillation, 0.0)
 
 
 def of_ranking(found: WorldRanking) -> ClassStanding:
@@ -110,5 +138,37 @@ def of_ranking(found: WorldRanking) -> ClassStanding:
     return ClassStanding(
         found.name, f"{found.worlds} worlds", [row.label for row in found.rows], [],
         np.array([row.rmse for row in found.rows]), found.standing, found.means,
-        np.array([np.nanmax(each, initial=0.0) for each in swings]), none.astype(int), none,
+        np.array([np.nanmax(each, initial=0.0) for each in swings]), none, none.astype(int), found.motions, found.jumps,
     )  # fmt: skip
+
+
+def standings_frame(found: Sequence[ClassStanding]) -> pd.DataFrame:
+    """A row for each row of each class, in order: its group, what becomes of it, its mean, and how often it is lost."""
+    import pandas as pd
+
+    lines = []
+    for each in found:
+        stands = each.standing
+        for row in stands.order:
+            mean, lost = each.means[row], stands.lost[row]
+            lines.append(
+                {
+                    "class": each.name,
+                    "row": each.labels[row],
+                    "group": stands.group(row),
+                    "fate": stands.fate(row),
+                    "rmse": mean.value,
+                    "rmse_low": mean.low,
+                    "rmse_high": mean.high,
+                    "pairs": lost.n,
+                    "fails": stands.failures[row].times,
+                    "swings": stands.swings[row].times,
+                    "lost_low": lost.low,
+                    "lost_high": lost.high,
+                    "motions": each.motions,
+                    "does_not_arrive": int(each.away[row]),
+                    "swing": each.swing[row],
+                    "peak": each.peak[row],
+                }
+            )
+    return pd.DataFrame(lines)

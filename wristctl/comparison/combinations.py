@@ -17,7 +17,7 @@ from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.reference import motion, reference_name, toward
+from wristctl.simulation.reference import jumps, motion, reference_name, toward
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.worlds import loop_facing
 from wristctl.wrist.kinematics import Inverse
@@ -33,6 +33,8 @@ class ComparedRow:
     controller: str
     gains: str
     repeated: Repeated
+    jumps: bool = False
+    """Whether its reference is made of steps."""
 
     @property
     def simulation(self) -> Simulation:
@@ -77,12 +79,13 @@ class Condition:
 
 @dataclass(frozen=True)
 class ReferenceCourse:
-    """A reference in a direction through one inverse: its name, its scenario's, and the motion."""
+    """A reference in a direction through one inverse: its name, its scenario's, the motion, and whether it jumps."""
 
     reference: str
     inverse: str
     scenario: str
     motion: Motion
+    jumps: bool
 
 
 def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
@@ -139,7 +142,7 @@ def compare(
                 row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]
                 own = repeated.labelled(f"{name}/{row.gains_name}")
                 found = (condition.name, course.reference, course.inverse, name, row.gains_name)
-                results.append(ComparedRow(*found, own))
+                results.append(ComparedRow(*found, own, course.jumps))
     return _in_order(results, chosen)
 
 
@@ -152,7 +155,8 @@ def _courses(
         for inverse in chosen.inverses:
             own = toward(reference, direction).model_copy(update={"inverse": inverse})
             name, scenario = course_name(reference, direction, chosen), scenario_of(reference, direction)
-            found.append(ReferenceCourse(name, inverse, scenario, motion(own, wrist, chosen.horizon, period, network)))
+            course = motion(own, wrist, chosen.horizon, period, network)
+            found.append(ReferenceCourse(name, inverse, scenario, course, jumps(reference)))
     return found
 
 

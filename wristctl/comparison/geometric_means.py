@@ -18,8 +18,11 @@ LEVEL = 0.95
 FEWEST_WORLDS = 8
 """Worlds below which no interval is given: it would hold the truth too seldom, whatever its level."""
 _RESAMPLES, _AT_ONCE = 9999, 500
+FAILURE = float(np.deg2rad(90.0))
+"""RMSE [rad] that a failure counts as in means."""
+MEASURABLE = float(np.deg2rad(0.001))
+"""RMSE [rad] below which errors are equal: no rig measures less, and a simulation has its own rounding there."""
 _GRID = 2.0**-40
-"""Logarithms are multiples of this, so that what differs by rounding alone is the same, and sums have no order."""
 
 
 class GeometricMean(NamedTuple):
@@ -41,8 +44,8 @@ def plain(ratio: float) -> str:
     return f"{ratio:.3g}" if ratio < 1000.0 else f"{ratio:.0f}"
 
 
-def penalised(scores: ArrayLike, failure: float) -> Array:
-    """Scores of any shape where a failure (inf or nan) counts as `failure`, and nothing counts as worse.
+def penalised(scores: ArrayLike, failure: float = FAILURE, floor: float = MEASURABLE) -> Array:
+    """Scores of any shape: a failure (inf or nan) counts as `failure`, nothing as worse, and nothing below `floor`.
 
     What a failure counts as does not depend on the other rows, so that means, ratios and orders agree with each other
     and stay when a row joins: the penalised average of algorithm configuration (Hutter et al., J. Artif. Intell. Res.
@@ -51,7 +54,12 @@ def penalised(scores: ArrayLike, failure: float) -> Array:
     given = np.asarray(scores, float)
     if not failure > 0.0 or np.any(given <= 0.0):
         raise ValueError("geometric means are of positive scores")
-    return np.where(given < failure, given, failure)
+    return np.maximum(np.where(given < failure, given, failure), floor)
+
+
+def on_grid(logarithms: Array) -> Array:
+    """Logarithms as multiples of 2^-40: what differs by rounding alone is the same, and sums have no order."""
+    return np.asarray(_GRID * np.round(np.atleast_2d(logarithms) / _GRID))
 
 
 class Resampled:
@@ -62,19 +70,11 @@ class Resampled:
     """
 
     def __init__(self, logarithms: Array, seed: int | Entropy) -> None:
-        self._rows = _GRID * np.round(np.atleast_2d(logarithms) / _GRID)
+        self._rows = on_grid(logarithms)
         self.means: Array = self._rows.mean(axis=1)
         self._varied = np.ptp(self._rows, axis=1) > 0.0
         self._enough = self._rows.shape[1] >= FEWEST_WORLDS
-        self._drawn: Any = None
         self._seed = seed
-
-    @property
-    def evidence(self) -> Array:
-        """How many standard errors each mean is away from 0, (m,)."""
-        spread = self._rows.std(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.means == 0.0, 0.0, np.abs(self.means) / spread)
 
     def intervals(self, level: float = LEVEL) -> Array:
         """Ends of the means' intervals, (2, m); without end for fewer worlds than FEWEST_WORLDS."""
@@ -88,13 +88,11 @@ class Resampled:
     def _bca(self, level: float) -> Array:
         from scipy.stats import bootstrap
 
-        known: dict[str, Any] = {"n_resamples": _RESAMPLES, "rng": np.random.default_rng(self._seed)}
-        if self._drawn is not None:
-            known = {"n_resamples": 0, "bootstrap_result": self._drawn}
-        self._drawn = bootstrap(
-            (self._rows[self._varied],), np.mean, axis=-1, batch=_AT_ONCE, confidence_level=level, method="BCa", **known
-        )
-        return np.stack(self._drawn.confidence_interval)
+        found: Any = bootstrap(
+            (self._rows[self._varied],), np.mean, axis=-1, batch=_AT_ONCE, confidence_level=level, method="BCa",
+            n_resamples=_RESAMPLES, rng=np.random.default_rng(self._seed),
+        )  # fmt: skip
+        return np.stack(found.confidence_interval)
 
     def estimates(self, level: float = LEVEL) -> list[GeometricMean]:
         """Each row's exponential with its interval."""

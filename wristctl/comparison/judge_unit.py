@@ -68,12 +68,18 @@ def judged(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     }
 
 
-def row_of(label: str, pieces: Sequence[Mapping[str, np.ndarray]], noises: int | None = None) -> RankedRow:
-    """A row of a ranking from its ranges of worlds in order; of so many of the noises, all where not said.
+def row_of(
+    label: str,
+    pieces: Sequence[Mapping[str, np.ndarray]],
+    motions: Sequence[int] | None = None,
+    noises: int | None = None,
+) -> RankedRow:
+    """A row of a ranking from its ranges of worlds in order; of these motions and so many of the noises, or of all.
 
     It swings in a world where it does in the middle one of its noises, on any motion that rests.
     """
-    whole = {name: np.concatenate([each[name] for each in pieces])[:, :, :noises] for name in pieces[0]}
+    chosen = slice(None) if motions is None else list(motions)
+    whole = {name: np.concatenate([each[name] for each in pieces])[:, chosen, :noises] for name in pieces[0]}
     failed, worlds = whole["failed"], len(whole["failed"])
     rmse = np.where(failed, np.inf, whole["rmse"])
     scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))

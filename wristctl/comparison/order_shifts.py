@@ -9,7 +9,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import Resampled, penalised
-from wristctl.comparison.world_ranking import FAILURE, RankedRow
+from wristctl.comparison.world_ranking import RankedRow
 
 _STREAM = 20_033
 
@@ -35,7 +35,7 @@ def order_shift(variant: str, before: list[RankedRow], after: list[RankedRow]) -
     """Compare rows of the same laws, in the same order, on the same worlds."""
     from scipy.stats import kendalltau
 
-    known, other = (np.log([penalised(row.rmse, FAILURE) for row in rows]) for rows in (before, after))
+    known, other = (np.log([penalised(row.rmse) for row in rows]) for rows in (before, after))
     means = known.mean(axis=1), other.mean(axis=1)
     signs = _signs(known) * _signs(other)
     best = tuple(rows[int(np.argmin(each))].label for rows, each in zip((before, after), means, strict=True))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from wristctl.comparison.geometric_means import GeometricMean, paired_ratio, penalised, plain
-from wristctl.comparison.world_ranking import FAILURE, WorldRanking
+from wristctl.comparison.world_ranking import WorldRanking
 
 _STREAM = 20_032
 
@@ -40,14 +40,14 @@ def _ratio(value: float) -> str:
 
 def term_values(found: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:
     """Of the terms, by the labels of the rows without and with each, those of which the ranking has both."""
-    places = {row.label: at for at, row in enumerate(found.rows)}
+    places, lost = {row.label: at for at, row in enumerate(found.rows)}, found.standing.lost
     values = []
     for term, (without, given) in terms.items():
         if without in places and given in places:
             pair = places[without], places[given]
-            scores, others = (penalised(found.rows[at].rmse, FAILURE) for at in pair)
+            scores, others = (penalised(found.rows[at].rmse) for at in pair)
             times = paired_ratio(scores, others, _STREAM)
             values.append(
-                TermValue(term, found.name, without, given, times, (found.lost(pair[0]), found.lost(pair[1])))
+                TermValue(term, found.name, without, given, times, (lost[pair[0]].times, lost[pair[1]].times))
             )
     return values

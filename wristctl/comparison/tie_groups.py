@@ -1,117 +1,106 @@
-"""Who is best, in groups that the worlds cannot tell apart, and what difference they could tell."""
+"""Who is best, in groups that the worlds cannot tell apart, who stands in none and why, and what could be told."""
 
 from __future__ import annotations
 
-from itertools import combinations
-from typing import NamedTuple
+from itertools import chain
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import FEWEST_WORLDS, LEVEL, GeometricMean, Resampled, penalised
+from wristctl.comparison.geometric_means import FAILURE, MEASURABLE, penalised
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS, PairedComparisons
 from wristctl.comparison.shares import Share, share
 from wristctl.seeds import Entropy
 
-ALIKE = 1.05
-"""Ratio of scores up to which rows are alike where there are too few worlds to tell."""
-
-
-class TieGroup(NamedTuple):
-    """Rows that may all be as good as the first of them."""
-
-    rows: list[int]
-    """From best to worst."""
-    ratios: list[GeometricMean]
-    """Of each row's geometric mean to the first one's, at the level at which it was judged."""
+Fate = Literal["ranked", "too few to tell", "not physical", "does not arrive", "unreliable"]
+"""What may become of a row; each row has one."""
 
 
 class Standing(NamedTuple):
-    """Rows of scores in order."""
+    """Rows of scores in order; each row stands in exactly one of the five lists."""
 
-    groups: list[TieGroup]
-    """Of rows that can be relied on, the best group first. No row is better than an earlier group's, but one may tie
-    with the group's first where another, between them, does not."""
+    groups: list[list[int]]
+    """Of ranked rows, the best group first, each from best to worst: with 95 % all that are as good as its first."""
+    untold: list[int]
+    """Rows that could be ranked, from best to worst, were there worlds enough to tell them apart."""
+    unphysical: list[int]
+    """Rows that pull harder than a tendon bears, from best to worst."""
+    short: list[int]
+    """Rows that stay within their range and do not arrive, from best to worst."""
     unreliable: list[int]
-    """Rows that fail or swing too often to be called best at anything, the rarest first."""
+    """Rows that are shown to fail or swing in more than the tolerated share of worlds, the rarest first."""
+    lost: list[Share]
+    """Worlds in which each row fails or swings."""
     failures: list[Share]
     """Of each row."""
     swings: list[Share]
-    """Of each row."""
+    """Of each row, where it does not fail."""
     floor: float
-    """`resolution_floor` of the rows that can be relied on."""
+    """The smallest ratio of scores that the ranked rows are told apart by as a rule; nan for fewer than two."""
+
+    @property
+    def order(self) -> list[int]:
+        """All rows: ranked from best to worst, then those that stand in no group."""
+        return [*chain.from_iterable(self.groups), *self.untold, *self.unphysical, *self.short, *self.unreliable]
+
+    def group(self, row: int) -> int | None:
+        """The number of a row's group, from 1; None where it stands in none."""
+        return next((at for at, rows in enumerate(self.groups, start=1) if row in rows), None)
+
+    def fate(self, row: int) -> Fate:
+        """In which of the lists a row stands."""
+        fates: dict[Fate, list[int]] = {
+            "too few to tell": self.untold,
+            "not physical": self.unphysical,
+            "does not arrive": self.short,
+            "unreliable": self.unreliable,
+        }
+        return next((fate for fate, rows in fates.items() if row in rows), "ranked")
 
 
 def standing(
     scores: ArrayLike,
     swings: NDArray[np.bool_],
-    failure: float,
     seed: int | Entropy,
     tolerated: float = 0.0,
-    drawn: bool = True,
+    short: ArrayLike = False,
+    unphysical: ArrayLike = False,
+    failure: float = FAILURE,
+    floor: float = MEASURABLE,
 ) -> Standing:
     """Order rows of positive scores (R, W) over the same worlds, less being better.
 
-    A row fails where its score is inf or nan and is in a limit cycle where `swings` (R, W). One that does either in
-    more than the `tolerated` share of the worlds is unreliable, however good its scores: it stands in no group. Where
-    it is tolerated, a failure counts as the score `failure`, and nothing as worse. Worlds that are not `drawn` are all
-    there are: of too few for an interval a row is then behind where the best is ahead by more than ALIKE in every one.
+    A row fails where its score is inf or nan and is in a limit cycle where `swings` (R, W). It is unreliable, however
+    good its scores, where its share of such worlds is shown to exceed the `tolerated` one: where the 95 % interval of
+    that share lies above it. Else a failure counts as the score `failure`. What is below `floor` is equal. Rows (R,)
+    that are `short` or `unphysical` are not ranked either.
+
+    Two rows or more of fewer worlds than LEAST_PAIRS are not told apart, nor called a tie.
     """
     given = np.asarray(scores, float)
     failed = ~np.isfinite(given)
-    known = np.log(penalised(given, failure))
-    lost = (failed | swings).mean(axis=1)
-    order = [int(row) for row in np.lexsort((known.mean(axis=1), lost))]
-    sound = [row for row in np.argsort(known.mean(axis=1), kind="stable").tolist() if lost[row] <= tolerated]
-    groups, rest = [], sound
-    while rest:
-        groups.append(_group(known, rest, seed, drawn))
-        rest = [row for row in rest if row not in groups[-1].rows]
+    known = np.log(penalised(given, failure, floor))
+    lost = [share(each) for each in failed | swings]
+    means = known.mean(axis=1)
+    by_mean = np.argsort(means, kind="stable").tolist()
+    rarest = np.lexsort((means, [each.value for each in lost])).tolist()
+    marks = [np.broadcast_to(each, len(lost)) for each in ([each.low > tolerated for each in lost], short, unphysical)]
+    fates = np.select(marks, ["unreliable", "short", "unphysical"], "sound")
+    sound, far, strained = ([row for row in by_mean if fates[row] == fate] for fate in ("sound", "short", "unphysical"))
+    compared = PairedComparisons(known, seed)
+    enough = len(sound) < 2 or given.shape[1] >= LEAST_PAIRS
     return Standing(
-        groups,
-        [row for row in order if lost[row] > tolerated],
-        [share(each) for each in failed],
-        [share(each) for each in swings],
-        resolution_floor(np.exp(known[sound]), seed),
-    )
+        _groups(compared, sound) if enough else [], [] if enough else sound, strained, far,
+        [row for row in rarest if fates[row] == "unreliable"],
+        lost, [share(each) for each in failed], [share(each) for each in swings & ~failed],
+        compared.resolution(sound),
+    )  # fmt: skip
 
 
-def _group(known: Array, rows: list[int], seed: int | Entropy, drawn: bool) -> TieGroup:
-    """Those of rows, the best first, that may be as good as the first.
-
-    Holm's step down (Scand. J. Stat. 6 (1979) 65): of m comparisons the clearest is judged at the level 1 - 5 %/m, the
-    next at 1 - 5 %/(m - 1), to the first that may be a tie; all after it at that one's level. Then in all but 5 % of
-    cases no row is left out that is as good.
-    """
-    best, others = rows[0], rows[1:]
-    itself = GeometricMean(1.0, 1.0, 1.0, LEVEL)
-    if not others:
-        return TieGroup([best], [itself])
-    compared = Resampled(known[others] - known[best], seed)
-    if known.shape[1] < FEWEST_WORLDS and not drawn:
-        others = [row for row in others if (known[row] - known[best]).min() <= np.log(ALIKE)]
-        every = dict(zip(rows[1:], compared.estimates(LEVEL), strict=True))
-        return TieGroup([best, *others], [itself, *(every[row] for row in others)])
-    ratios: dict[int, GeometricMean] = {}
-    level, tied = LEVEL, False
-    for done, at in enumerate(np.argsort(-compared.evidence, kind="stable").tolist()):
-        if not tied:
-            level = 1.0 - (1.0 - LEVEL) / (len(others) - done)
-        ratios[others[at]] = ratio = compared.estimates(level)[at]
-        tied = tied or ratio.is_one
-    joined = [row for row in others if ratios[row].is_one]
-    return TieGroup([best, *joined], [itself, *(ratios[row] for row in joined)])
-
-
-def resolution_floor(scores: ArrayLike, seed: int | Entropy) -> float:
-    """The smallest ratio that these worlds can tell from 1: the half width of a pair's interval, the median of all.
-
-    Scores are positive, (R, W); nan for fewer than two rows, inf for too few worlds.
-    """
-    known = np.log(np.asarray(scores, float))
-    pairs = list(combinations(range(len(known)), 2))
-    if not pairs:
-        return float("nan")
-    first, second = np.array(pairs).T
-    low, high = Resampled(known[first] - known[second], seed).intervals()
-    return float(np.exp(np.median(0.5 * (high - low))))
+def _groups(compared: PairedComparisons, rows: list[int]) -> list[list[int]]:
+    groups = []
+    while rows:
+        groups.append(compared.best(rows))
+        rows = [row for row in rows if row not in groups[-1]]
+    return groups

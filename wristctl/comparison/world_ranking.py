@@ -1,7 +1,7 @@
 """Rows ranked over the worlds of a family: groups of ties, what each is worth beside feedforward, how often it fails.
 
 All rows meet the same worlds, motions and noise. A row's score in a world is the geometric mean of its RMSE over the
-motions there; intervals are over worlds.
+motions there; intervals are over worlds. Where a family has both, smooth motions are one ranking and steps another.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from wristctl.config.study import Study
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.reference import jumps
 from wristctl.tuning.objective import YARDSTICK
 from wristctl.wrist.kinematics import Inverse
 
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 RANKED = ("rmse", "steady_state", "oscillation", "chattering", "peak_tension", "rms_tension", "saturation", "energy")
 """Metrics that are kept of every row in every case."""
-FAILURE = float(np.deg2rad(90.0))
-"""RMSE [rad] that a failure counts as in means; a row that fails stands in no group."""
 _STREAM = 20_031
 """Of the resampling: the same worlds give the same intervals."""
 
@@ -52,7 +51,12 @@ class WorldRanking:
     """Rows over a family's worlds; `yardstick` is the number of feedforward's."""
 
     name: str
+    """Of the family; with `, steps` where it has smooth motions too, and these are its others."""
     family: Family
+    motions: int
+    """How many of the family's motions these are."""
+    jumps: bool
+    """Whether they are steps."""
     worlds: int
     rows: list[RankedRow]
     yardstick: int
@@ -62,19 +66,12 @@ class WorldRanking:
     gains: list[GeometricMean]
     """How many times less each row's RMSE is than feedforward's."""
 
-    @property
-    def order(self) -> list[int]:
-        """Rows from best to worst, those that cannot be relied on last."""
-        return [row for group in self.standing.groups for row in group.rows] + self.standing.unreliable
 
-    def group(self, row: int) -> int | None:
-        """The number of a row's group, from 1; None where it fails or swings."""
-        return next((at for at, each in enumerate(self.standing.groups, start=1) if row in each.rows), None)
-
-    def lost(self, row: int) -> int:
-        """Worlds in which a row fails or swings."""
-        own = self.rows[row]
-        return int(np.sum(~np.isfinite(own.rmse) | own.swings))
+def kinds_of(family: Family) -> dict[bool, list[int]]:
+    """The numbers of a family's references by whether they are steps, smooth ones first; no mean is of both."""
+    numbers = range(len(family.references))
+    kinds = {kind: [at for at in numbers if jumps(family.references[at]) == kind] for kind in (False, True)}
+    return {kind: chosen for kind, chosen in kinds.items() if chosen}
 
 
 def seed_of(study: Study, worlds: Worlds) -> int:
@@ -87,10 +84,10 @@ def rank(
     tuned: TunedGains | None = None,
     network: Inverse | None = None,
     progress: Callable[[float], None] | None = None,
-) -> WorldRanking:
+) -> list[WorldRanking]:
     """Rank the rows of the study's `compare` section on the worlds that it names; feedforward joins as the yardstick.
 
-    UserError for unknown gains.
+    A ranking of smooth motions, one of steps, or both. UserError for unknown gains.
     """
     worlds = study.compare.worlds
     family, name = study.families[worlds.family], worlds.family
@@ -98,7 +95,8 @@ def rank(
     rows = list(study.compare.rows)
     if not any(row.controller == YARDSTICK for row in rows):
         rows.append(Row(controller=YARDSTICK, gains="default"))
-    ranked = []
+    kinds = kinds_of(family)
+    ranked: dict[bool, list[RankedRow]] = {kind: [] for kind in kinds}
     for number, row in enumerate(rows):
         law = controller(row.controller)
 
@@ -107,8 +105,11 @@ def rank(
                 progress((number + share) / len(rows))
 
         gains = np.array([gains_of(law, row.gains, tuned)])
-        ranked.append(_row(row.label, measure(law, gains, cases, study.wrist, RANKED, report), worlds.draws))
-    return ranking(name, family, ranked, next(k for k, row in enumerate(rows) if row.controller == YARDSTICK))
+        found = measure(law, gains, cases, study.wrist, RANKED, report)
+        for kind, chosen in kinds.items():
+            ranked[kind].append(_row(row.label, found.of_motions(chosen, len(family.references)), worlds.draws))
+    yardstick = next(k for k, row in enumerate(rows) if row.controller == YARDSTICK)
+    return [ranking(name, family, ranked[kind], yardstick, steps=kind) for kind in kinds]
 
 
 def _row(label: str, found: Measured, worlds: int) -> RankedRow:
@@ -124,15 +125,29 @@ def world_scores(found: Measured, worlds: int) -> Array:
 
 
 def ranking(
-    name: str, family: Family, rows: Sequence[RankedRow], yardstick: int, tolerated: float = 0.0
+    name: str,
+    family: Family,
+    rows: Sequence[RankedRow],
+    yardstick: int,
+    tolerated: float = 0.0,
+    steps: bool | None = None,
 ) -> WorldRanking:
-    """The ranking of rows that were measured on the same worlds, of which each may fail or swing in a share."""
+    """The ranking of rows that were measured on the same worlds, of which each may fail or swing in a share.
+
+    They were on those motions of the family that are steps, where `steps`, or on its others; of a family of one kind
+    that need not be said.
+    """
+    kinds = kinds_of(family)
+    kind = next(iter(kinds)) if steps is None else steps
     scores = np.array([row.rmse for row in rows])
-    known = penalised(scores, FAILURE)
-    stands = standing(scores, np.array([row.swings for row in rows]), FAILURE, _STREAM, tolerated)
+    known = penalised(scores)
+    stands = standing(scores, np.array([row.swings for row in rows]), _STREAM, tolerated)
     means = [geometric_mean(each, _STREAM) for each in known]
     gains = [paired_ratio(known[yardstick], each, _STREAM) for each in known]
-    return WorldRanking(name, family, scores.shape[1], list(rows), yardstick, stands, means, gains)
+    shown = f"{name}, steps" if kind and len(kinds) > 1 else name
+    return WorldRanking(
+        shown, family, len(kinds[kind]), kind, scores.shape[1], list(rows), yardstick, stands, means, gains
+    )  # fmt: skip
 
 
 def ranking_frame(found: WorldRanking) -> pd.DataFrame:
@@ -140,13 +155,14 @@ def ranking_frame(found: WorldRanking) -> pd.DataFrame:
     import pandas as pd
 
     lines = []
-    for at in found.order:
+    for at in found.standing.order:
         row, mean, gain = found.rows[at], found.means[at], found.gains[at]
-        failures, swings = found.standing.failures[at], found.standing.swings[at]
+        failures, swings, lost = found.standing.failures[at], found.standing.swings[at], found.standing.lost[at]
         lines.append(
             {
                 "row": row.label,
-                "group": found.group(at),
+                "group": found.standing.group(at),
+                "fate": found.standing.fate(at),
                 "rmse": mean.value,
                 "rmse_low": mean.low,
                 "rmse_high": mean.high,
@@ -158,6 +174,9 @@ def ranking_frame(found: WorldRanking) -> pd.DataFrame:
                 "failures_high": failures.high,
                 "swings": swings.value,
                 "swings_high": swings.high,
+                "lost": lost.value,
+                "lost_low": lost.low,
+                "lost_high": lost.high,
             }
             | {name: _median(row.measured.metrics[name]) for name in RANKED[1:]}
         )
@@ -171,14 +190,17 @@ def _median(values: Array) -> float:
 
 
 def worlds_frame(found: WorldRanking) -> pd.DataFrame:
-    """Every row in every world and motion."""
+    """Every row in every world and motion; motions by their number among the family's references."""
     import pandas as pd
 
     parts = []
+    numbers = kinds_of(found.family)[found.jumps]
     for row in found.rows:
-        count = row.measured.failed.shape[1]
-        motions = count // found.worlds
-        where = {"row": row.label, "world": np.arange(count) // motions, "motion": np.arange(count) % motions}
+        where = {
+            "row": row.label,
+            "world": np.repeat(np.arange(found.worlds), found.motions),
+            "motion": np.tile(numbers, found.worlds),
+        }
         values = {name: values[0] for name, values in row.measured.metrics.items()}
         parts.append(pd.DataFrame(where | {"failed": row.measured.failed[0]} | values))
     return pd.concat(parts, ignore_index=True)

@@ -50,7 +50,10 @@ class FairStudySettings(Section):
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("differential-evolution", "ask/tell optimiser of searches")
     objective: Objective = Objective()
     tolerated: float = choice(
-        0.01, "share of the worlds in which a row may fail or swing and still be recommended", ge=0, lt=1
+        0.01,
+        "share of the worlds in which a row may fail or swing; shown to do so in more, it is not recommended",
+        ge=0,
+        lt=1,
     )
     variants: dict[str, StudyVariant] = choice({}, "other ways to tune, by name")
     varied: str = choice("", "the family that the variants are tried on; empty: the first")

@@ -24,12 +24,17 @@ from wristctl.report.style import (
     title,
 )
 
+_BEST = "best, or tied with it"
 _MARKS: dict[str, dict[str, Any]] = {
-    "best, or tied with it": {"marker": "o", "markersize": 7.0, "markeredgecolor": BLACK},
-    "behind it": {"marker": "o", "markersize": 4.5},
-    "fails or limit-cycles": {"marker": "x", "color": VERMILLION, "markersize": 6.0, "markeredgewidth": 1.8},
+    _BEST: {"marker": "o", "markersize": 7.0, "markeredgecolor": BLACK},
+    "ranked": {"marker": "o", "markersize": 4.5},
+    "too few to tell": {"marker": "o", "markersize": 4.5, "markerfacecolor": "none"},
+    "unreliable": {"marker": "x", "color": VERMILLION, "markersize": 6.0, "markeredgewidth": 1.8},
     "does not arrive": {"marker": "v", "color": GREY, "markersize": 5.5},
+    "not physical": {"marker": "^", "color": GREY, "markersize": 5.5},
 }
+"""By what becomes of a row."""
+_SHOWN = {"ranked": "behind it", "unreliable": "fails or limit-cycles"}
 
 
 def answer_figure(found: Sequence[ClassStanding]) -> Figure:
@@ -46,8 +51,11 @@ def answer_figure(found: Sequence[ClassStanding]) -> Figure:
     axes[0, 0].invert_yaxis()
     axes[-1, (columns - 1) // 2].set_xlabel("RMSE [deg]: geometric mean with 95 % interval", fontsize=9.0)
     plain: dict[str, Any] = {"linestyle": "none", "color": GREY}
-    handles = [Line2D([], [], label=name, **plain | mark) for name, mark in _MARKS.items()]
-    legend_under(made, handles, 4)
+    kinds = {_kind(each, row) for each in found for row in range(len(each.labels))}
+    handles = [
+        Line2D([], [], label=_SHOWN.get(name, name), **plain | mark) for name, mark in _MARKS.items() if name in kinds
+    ]
+    legend_under(made, handles, 3)
     return made
 
 
@@ -67,17 +75,13 @@ def _panel(panel: Axes, each: ClassStanding, labels: Sequence[str]) -> None:
 
 
 def _kind(each: ClassStanding, row: int) -> str:
-    best, behind, lost, away = _MARKS
-    if each.away[row] > 0.5 * each.scores.shape[1]:
-        return away
-    group = each.group(row)
-    return lost if group is None else best if group == 1 else behind
+    return _BEST if each.standing.group(row) == 1 else each.standing.fate(row)
 
 
 def _rows(found: Sequence[ClassStanding]) -> list[str]:
     """Labels by their mean place over the classes."""
     places: dict[str, list[int]] = {}
     for each in found:
-        for place, row in enumerate(each.order):
+        for place, row in enumerate(each.standing.order):
             places.setdefault(each.labels[row], []).append(place)
     return sorted(places, key=lambda label: float(np.mean(places[label])))

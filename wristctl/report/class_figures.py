@@ -35,7 +35,7 @@ MOST = 5
 
 def shown_rows(standing: ClassStanding) -> list[str]:
     """Which rows a figure of several shows: the best two, then the best of the paper's law, of PID and feedforward."""
-    order = [standing.labels[row] for row in standing.order]
+    order = [standing.labels[row] for row in standing.standing.order]
     beside = [standing.labels[row] for name in _BESIDE if (row := standing.best(name)) is not None]
     return list(dict.fromkeys([*order[:2], *beside, *order[2:]]))[:MOST]
 
@@ -60,27 +60,27 @@ def tension_rows(courses: Sequence[Trajectory], heading: str = "") -> Figure:
 
 
 def error_against_variation(
-    results: Sequence[ComparedRow], classes: Sequence[tuple[str, Sequence[str]]], heading: str = ""
+    results: Sequence[ComparedRow], classes: Sequence[ClassStanding], heading: str = ""
 ) -> Figure:
     """RMSE [deg] against the tensions' total variation [N/s] of each row, medians over motions: a panel for each class.
 
-    `classes` are names with their loops. A line joins what nothing beats in both (Pareto's front); a row that fails or
-    swings somewhere, or does not arrive, is a cross and no part of it.
+    A line joins what nothing beats in both (Pareto's front); a row that is unreliable, does not arrive or is not
+    physical is a cross and no part of it.
     """
     columns = columns_within(len(classes), 1.8)
     deep = -(-len(classes) // columns)
     made, axes = figure(deep, columns, height=2.4 * deep + 0.9, sharex=True, sharey=True)
     seen: dict[str, Line2D] = {}
-    for panel, (name, loops) in zip(axes.ravel().tolist(), classes, strict=False):
-        own = [each for each in results if each.loop in loops]
-        points, sound = _points(own)
+    for panel, standing in zip(axes.ravel().tolist(), classes, strict=False):
+        points, stands = _points(standing.of(results)), standing.standing
+        sound = {label: stands.fate(row) in ("ranked", "too few to tell") for row, label in enumerate(standing.labels)}
         for row, (error, variation) in points.items():
             style = {"color": colour(row.split("/")[0]), "linestyle": "none", "marker": "o" if sound[row] else "x"}
             (drawn,) = panel.plot(variation, error, markersize=5.0, **style)
             seen.setdefault(row.split("/")[0], drawn)
         front = pareto_front(np.array([points[row] for row in points if sound[row]]).reshape(-1, 2))
         panel.plot(front[:, 1], front[:, 0], color=BLACK, linewidth=0.8, zorder=1.5)
-        title(panel, name)
+        title(panel, standing.name)
     for panel in axes.ravel().tolist()[len(classes) :]:
         panel.set_visible(False)
     for panel in axes.ravel().tolist():
@@ -108,14 +108,13 @@ def pareto_front(points: np.ndarray) -> np.ndarray:
     return np.array(sorted(kept, key=lambda each: (each[1], each[0]))).reshape(-1, 2)
 
 
-def _points(results: Sequence[ComparedRow]) -> tuple[dict[str, tuple[float, float]], dict[str, bool]]:
-    """Median RMSE [deg] and variation of each row over its motions, and whether it always arrives, and rests there."""
-    points, sound = {}, {}
+def _points(results: Sequence[ComparedRow]) -> dict[str, tuple[float, float]]:
+    """Median RMSE [deg] and variation of each row over its motions."""
+    points = {}
     for row in dict.fromkeys(each.label for each in results):
         own = [each for each in results if each.label == row]
         known = [metrics_of(each) for each in own]
         error, variation = (np.array([each[name] for each in known]) for name in ("rmse", "chattering"))
         if np.isfinite(error).any():
             points[row] = float(np.degrees(np.nanmedian(error))), max(float(np.nanmedian(variation)), 1e-3)
-            sound[row] = all(each.repeated.arrives and each.repeated.swing == 0.0 for each in own)
-    return points, sound
+    return points

@@ -50,7 +50,7 @@ def undominated(costs: Array) -> NDArray[np.bool_]:
 def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     """How many times less than feedforward's each row's RMSE is on each family; with the number of its group.
 
-    A dash stands for rows that fail or swing too often, whatever their error.
+    A dash stands for rows that have no place, whatever their error.
     """
     labels = list(dict.fromkeys(row.label for found in rankings.values() for row in found.rows))
     times, marks = np.full((len(labels), len(rankings)), np.nan), np.full((len(labels), len(rankings)), "", object)
@@ -58,7 +58,7 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
         for at, row in enumerate(found.rows):
             place = labels.index(row.label), column
             times[place] = found.gains[at].value
-            group = found.group(at)
+            group = found.standing.group(at)
             marks[place] = f"{plain(times[place])}  ({group})" if group else f"{plain(times[place])}  -"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
     made, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
@@ -75,7 +75,7 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[at] for at in order])
     axes.invert_yaxis()
     axes.xaxis.tick_top()
-    heading = "How many times less error than feedforward; (group of ties); - and slanted: fails or swings"
+    heading = "How many times less error than feedforward; (group of ties); - and slanted: no place"
     made.suptitle(heading, fontsize=10.0)
     return made
 
@@ -124,11 +124,11 @@ def pareto(found: WorldRanking) -> Figure:
 
 
 def _front(axes: Axes, cost: Array, rmse: Array, found: WorldRanking) -> None:
-    sound = np.array([found.group(at) is not None for at in range(len(rmse))])
+    sound = np.array([found.standing.group(at) is not None for at in range(len(rmse))])
     best = np.flatnonzero(sound)[undominated(np.column_stack([cost, rmse])[sound])]
     best = best[np.argsort(cost[best])]
     axes.plot(cost[best], rmse[best], color=GREY, linewidth=1.0, zorder=1)
-    for at in found.order:
+    for at in found.standing.order:
         own = colour(found.rows[at].label.split("/")[0])
         axes.plot(cost[at], rmse[at], "o", color=own, markersize=6.0, markerfacecolor=own if sound[at] else "none",
                   linestyle="none", label=found.rows[at].label)  # fmt: skip
@@ -144,7 +144,7 @@ def world_map(found: WorldRanking) -> Figure:
     """Each row's RMSE over the best row's in each world, sorted by that best; crosses fail, dots swing."""
     scores = np.array([row.rmse for row in found.rows])
     best = np.where(np.isfinite(scores), scores, np.inf).min(axis=0)
-    worlds, rows = np.argsort(best, kind="stable"), np.array(found.order)
+    worlds, rows = np.argsort(best, kind="stable"), np.array(found.standing.order)
     made, ((axes,),) = figure(height=1.3 + 0.22 * len(rows))
     undress(axes)
     ratios = (scores / best)[np.ix_(rows, worlds)]

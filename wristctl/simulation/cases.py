@@ -70,6 +70,12 @@ class Measured:
         found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
         return found
 
+    def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
+        """The same of cases that are some of the motions of their world, which are so many."""
+        own = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
+        metrics = {name: values[:, own] for name, values in self.metrics.items()}
+        return Measured(metrics, self.failed[:, own], self.lasted[:, own], self.rests[own])
+
 
 def measure(
     law: Controller,

@@ -107,6 +107,7 @@ SQUARE = ReferenceKind(
     described=lambda reference: f"square {reference.frequency:g} Hz {_swing(reference)}",
     targets="none",
     parameters={"offset_deg": _OFFSET},
+    jumps=True,
 )
 RANDOM_STEPS = ReferenceKind(
     "jumps to angles drawn evenly between offset - angle and offset + angle, one each `duration`",
@@ -116,4 +117,5 @@ RANDOM_STEPS = ReferenceKind(
     ),
     targets="none",
     parameters={"seed": Parameter(0, "", "of the draw: another one, other angles"), "offset_deg": _OFFSET},
+    jumps=True,
 )

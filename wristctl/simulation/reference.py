@@ -50,6 +50,8 @@ class ReferenceKind:
     """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
     plane: Literal["", "ulnar", "flexion"] = ""
     """Plane in which its angles are anatomical, whatever direction is named; empty: they count toward the direction."""
+    jumps: bool = False
+    """Whether it asks for steps, which no wrist can follow: their errors are compared with each other alone."""
 
 
 REFERENCES: Choices[ReferenceKind] = _TABLE
@@ -58,6 +60,11 @@ REFERENCES: Choices[ReferenceKind] = _TABLE
 def reference_name(reference: Reference) -> str:
     """A short name: kind, duration and target."""
     return REFERENCES[reference.kind].described(reference)
+
+
+def jumps(reference: Reference) -> bool:
+    """Whether it is made of steps."""
+    return bool(REFERENCES[reference.kind].jumps)
 
 
 def toward(reference: Reference, direction: DirectionName) -> Reference:

@@ -43,6 +43,7 @@ STEP = ReferenceKind(
     course=_step,
     rest=lambda reference, begin, horizon: begin,
     described=lambda reference: f"step {_target(reference)}",
+    jumps=True,
 )
 MINIMUM_JERK = ReferenceKind(
     "a smooth move of `duration` to an angle or a tip position (Flash and Hogan 1985)",
@@ -63,6 +64,7 @@ MULTI_STEP = ReferenceKind(
         f"steps {reference.duration:g} s {' '.join(f'{angle:g}' for angle in reference.angles_deg)} deg"
     ),
     targets="angles_deg",
+    jumps=True,
 )
 TIP_PATH = ReferenceKind(
     "smooth moves of `duration` through tip positions",

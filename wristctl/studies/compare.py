@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 from wristctl.config.errors import UserError, under
 from wristctl.config.study import Study
 from wristctl.studies.compare_answer import answer_lines, head_with_the_best
-from wristctl.studies.compare_outputs import loop_tables, step_table, units
+from wristctl.studies.compare_outputs import STANDING_UNITS, loop_tables, step_table, units
 from wristctl.studies.compare_pictures import draw
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
@@ -57,13 +58,13 @@ class Compared(StudyResult):
     """median and 99th percentile of a control step on this machine [us], by controller/gains"""
     standings: list[ClassStanding]
     """of the rows in each class of conditions, or over the worlds of a family"""
-    ranking: WorldRanking | None = None
-    """over the worlds of a family, where one is named; there are no `rows` then"""
+    rankings: Sequence[WorldRanking] = ()
+    """over the worlds of a family, where one is named: of its smooth motions, of its steps; there are no `rows` then"""
 
     @property
     def fault(self) -> UserError | None:
         """That nothing in a ranking can be relied on."""
-        if self.ranking is None or self.ranking.standing.groups:
+        if any(len(found.standing.unreliable) < len(found.rows) for found in self.rankings) or not self.rankings:
             return None
         where = str(self.findings.run.path) if self.findings.run else ""
         return UserError("every row fails or swings in some world", where, "other gains, or milder worlds", exit_code=3)
@@ -75,11 +76,15 @@ class Compared(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
+        import pandas as pd
+
         from wristctl.comparison.comparison_data import frame
         from wristctl.comparison.paper_cells import paper_cells
         from wristctl.comparison.world_ranking import ranking_frame
 
-        return frame(self.rows, paper_cells(self.study)) if self.ranking is None else ranking_frame(self.ranking)
+        if self.rankings:
+            return pd.concat([ranking_frame(found) for found in self.rankings], ignore_index=True)
+        return frame(self.rows, paper_cells(self.study))
 
     def series(self) -> dict[str, np.ndarray]:
         """Courses over time, one row per combination, every fifth sample; SI units."""
@@ -122,7 +127,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
-    from wristctl.comparison.class_standing import class_standings, of_ranking
+    from wristctl.comparison.class_standing import class_standings, of_ranking, standings_frame
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
     from wristctl.comparison.paper_cells import paper_cells
@@ -142,10 +147,10 @@ def compare(session: Session) -> Compared:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
     if settings.worlds.family:
-        ranking, table = ranked(session, study, network, tuned)
-        stands = of_ranking(ranking)
-        head_with_the_best(findings, [stands])
-        return Compared(study, findings, [table], [], searches, {}, [stands], ranking)
+        rankings, shown = ranked(session, study, network, tuned)
+        stands = [of_ranking(ranking) for ranking in rankings]
+        head_with_the_best(findings, stands)
+        return Compared(study, findings, shown, [], searches, {}, stands, rankings)
     with session.progress("comparing", total=100, unit="%") as done:
         results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
     scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
@@ -160,6 +165,7 @@ def compare(session: Session) -> Compared:
         found = spread(result.repeated.metrics["rmse"])
         findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
     standings = class_standings(results, settings, study.wrist)
+    findings.table("data/standings.csv", standings_frame(standings), units=STANDING_UNITS)
     head_with_the_best(findings, standings)
     times = _step_times(session, tuned)
     with session.progress("drawing"):

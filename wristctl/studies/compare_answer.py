@@ -7,13 +7,13 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.studies.answer_lines import COLUMNS, in_lines
+from wristctl.studies.answer_lines import COLUMNS, degrees, in_lines, two
 from wristctl.studies.findings import Findings
 
 if TYPE_CHECKING:
     from wristctl.comparison.class_standing import ClassStanding
 
-LINES = 24
+LINES = 32
 """What an answer may take of a terminal."""
 LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
 """What each more of a law buys: a term is worth what it adds to the rung below."""
@@ -21,6 +21,8 @@ PAPERS, PRINTED = "smc", "printed"
 """The paper's own law, and the gains that it prints."""
 _INDENT = "    "
 _WIDTH = COLUMNS - len(_INDENT)
+_EQUAL = "="
+"""Before a row that is not told apart from the best of its place."""
 _HELD = "\u00a0"
 """A blank at which no line ends."""
 _WHERE = "every row and metric: --all prints them, the run's report.html sorts and filters them"
@@ -33,15 +35,14 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
     from wristctl.simulation.oscillation import LIMIT_CYCLE
 
     names, rest = _names(found), deg(LIMIT_CYCLE)
-    cells = "motions" if found[0].loops else "worlds"
     head = [
-        f"RMSE [deg], geometric mean over {cells} [95 % interval], best first; = is a tie (paired, Holm);",
-        f"no place: fails or swings (limit cycle, > {rest} deg at rest) in some case there; without n/m: in all",
+        "RMSE [deg], geometric mean [95 % interval], best first; = not told apart from the best of its place;",
+        f"no place: fails, limit-cycles (> {rest} deg at rest), is short, not physical; without n/m: in all",
     ]
     end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 2), *wrapped(_papers_order(found), 1)]
     end.append(_WHERE)
     room = LINES - len(head) - len(end)
-    rooms = [max(2, room // len(found))] * len(found)
+    rooms = [max(1, room // len(found))] * len(found)
     for at in sorted(range(len(found)), key=lambda at: -len(wrapped(_lost(found[at], names), LINES, _WIDTH))):
         rooms[at] += sum(rooms) < room
     blocks = [_block(each, names, own) for each, own in zip(found, rooms, strict=True)]
@@ -53,8 +54,8 @@ def head_with_the_best(findings: Findings, found: Sequence[ClassStanding]) -> No
     names: list[str] = []
     for each in found:
         if each.standing.groups:
-            best = each.standing.groups[0].rows[0]
-            mean, names = each.means[best], [*names, f"best_{each.name.replace(' ', '_')}"]
+            best = each.standing.groups[0][0]
+            mean, names = each.means[best], [*names, f"best_{each.name.replace(',', '').replace(' ', '_')}"]
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
             meaning = f"RMSE of {each.labels[best]}, the best row there, over {each.cells}"
             findings.metric(names[-1], mean.value, "rad", "lower", each.scores.shape[1], interval, meaning)
@@ -70,54 +71,63 @@ def _names(found: Sequence[ClassStanding]) -> dict[str, str]:
 
 
 def _block(each: ClassStanding, names: dict[str, str], room: int) -> list[str]:
-    """Groups in order, who cannot be relied on (of both as much as there is room for), and what the best one buys."""
-    name = f"{each.name} ({each.cells.split()[0]}): "
+    """Groups in order, who has no place (of both as much as there is room for), and what the best one buys."""
+    name = f"{each.name} ({each.cells}): "
     groups, lost, bought = _groups(each, names), _lost(each, names), _buys(each, names)
-    lines = wrapped(lost, room - 1 if room < 3 else room - 2, _WIDTH)
+    below = (room - 1 if room < 3 else room - 2) if room > 1 else 0
+    lines = wrapped(lost, below, _WIDTH) if below else []
     ends = wrapped(bought, 1, _WIDTH) if len(lines) < room - 1 else []
-    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH, "places"), *lines, *ends]
+    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH), *lines, *ends]
     return [line if at == 0 else f"{_INDENT}{line}" for at, line in enumerate(lines)]
 
 
 def _groups(each: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Each group as a piece: its number, its best row with its mean, and what ties with it."""
+    """Each row as a piece: the first of a group with its number, those that are not told apart from it after =."""
+    if untold := each.standing.untold:
+        return _untold(each, [f"{names[each.labels[row]]} {degrees(each.means[row].value)}" for row in untold])
     if not each.standing.groups:
-        return ["nothing can be relied on: every row fails or swings somewhere"]
+        return ["nothing has a place"]
     pieces = []
     for number, group in enumerate(each.standing.groups, start=1):
-        first, *ties = group.rows
-        mean = each.means[first]
-        ends = f" [{deg(mean.low)}, {deg(mean.high)}]" if number == 1 and math.isfinite(mean.high) else ""
-        shown = f"{number}.{_HELD}{names[each.labels[first]]} {deg(mean.value)}{ends}"
-        pieces.append(" = ".join([shown, *(f"{names[each.labels[row]]} {deg(each.means[row].value)}" for row in ties)]))
+        for at, row in enumerate(group):
+            mean = each.means[row]
+            known = number == 1 and at == 0 and math.isfinite(mean.high) and mean.high > mean.low
+            ends = f" [{degrees(mean.low)}, {degrees(mean.high)}]" if known else ""
+            begin = f"{_EQUAL}{_HELD}" if at else f"{number}.{_HELD}"
+            pieces.append(f"{begin}{names[each.labels[row]]} {degrees(mean.value)}{ends}")
     return pieces
 
 
-def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Who fails, swings, does not arrive, or pulls harder than tendons bear; in how many cells where not in all."""
-    count = each.scores.shape[1]
+def _untold(each: ClassStanding, rows: list[str]) -> list[str]:
+    """That there are too few motions to tell these rows apart, least error first, and what would help."""
+    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 
-    def among(times: int) -> str:
+    n, what = each.scores.shape[1], each.cells.split()[1].rstrip("s")
+    more = "more motions or --repetitions" if each.loops else "more worlds"
+    said = f"too few {what}s to tell (n={n}, {LEAST_PAIRS} at least): {more}; least error first, not ranked:"
+    return [f"{said} {rows[0]},", *(f"{row}," for row in rows[1:])]
+
+
+def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
+    """Who has no place: each row once, with in how many motions where not in all."""
+    stands, motions = each.standing, each.motions
+    called = [names[label] for label in each.labels]
+
+    def among(times: int, count: int) -> str:
         return "" if times == count else f" {times}/{count}"
 
-    fails, swings = each.standing.failures, each.standing.swings
-    kinds = {
-        "fails": [
-            f"{names[each.labels[row]]}{among(fails[row].times)}"
-            for row in each.standing.unreliable
-            if fails[row].times
-        ],
-        "limit cycle": [
-            f"{names[each.labels[row]]} +-{deg(each.swing[row])} deg{among(swings[row].times)}"
-            for row in each.standing.unreliable
-            if swings[row].times
-        ],
-        "does not arrive": [
-            f"{names[each.labels[row]]}{among(int(each.away[row]))}" for row in each.order if each.away[row]
-        ],
-        "no tendon bears it": [
-            f"{names[each.labels[row]]} {each.peak[row]:.2g} N" for row in each.order if each.peak[row] > 0.0
-        ],
+    unreliable: dict[str, list[str]] = {"fails": [], "limit cycle": []}
+    for row in stands.unreliable:
+        fails, swings = stands.failures[row], stands.swings[row]
+        also = f" (+-{deg(each.swing[row])} deg in {swings.times}/{swings.n})" if swings.times else ""
+        if fails.times:
+            unreliable["fails"].append(f"{called[row]}{among(fails.times, fails.n)}{also}")
+        else:
+            told = f"{called[row]} +-{deg(each.swing[row])} deg{among(swings.times, swings.n)}"
+            unreliable["limit cycle"].append(told)
+    kinds = unreliable | {
+        "does not arrive": [f"{called[row]}{among(int(each.away[row]), motions)}" for row in stands.short],
+        "no tendon bears it": [f"{called[row]} {each.peak[row]:.2g} N" for row in stands.unphysical],
     }
     pieces = []
     for kind, rows in kinds.items():
@@ -126,37 +136,38 @@ def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
 
 
 def _buys(each: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Errors of the next place, of feedforward and of the rungs of the ladder, in those of the best row."""
+    """Errors of the next place, of feedforward and of the rungs of the ladder, over that of the best row."""
     groups = each.standing.groups
     if not groups:
         return []
-    best = groups[0].rows[0]
+    best = groups[0][0]
     rungs = {name: row for name in LADDER if (row := each.best(name)) is not None and row != best}
-    following = [groups[1].rows[0]] if len(groups) > 1 else []
+    following = [groups[1][0]] if len(groups) > 1 else []
     pieces: list[str] = []
     for row in dict.fromkeys([*following, *rungs.values()]):
         ratio, name = each.times_better(best, row), names[each.labels[row]]
         known = name == LADDER[0] and math.isfinite(ratio.high)
         times = f"{ratio.value:.2f}" if ratio.value < 10.0 else two(ratio.value)
         pieces.append(f"{name} x{times}" + f" [{two(ratio.low)}, {two(ratio.high)}]" * known + ",")
-    return [f"errors beside {names[each.labels[best]]}'s: {pieces[0]}", *pieces[1:]] if pieces else []
+    least = degrees(each.means[best].value)
+    beside = f"{names[each.labels[best]]}'s" if not least.startswith("<") else f"{least[1:]} deg"
+    return [f"errors over {beside}: {pieces[0]}", *pieces[1:]] if pieces else []
 
 
 def _printed(found: Sequence[ClassStanding]) -> list[str]:
-    """What becomes of the gains that the paper prints."""
+    """What becomes of the gains that the paper prints: in how many classes which fate, which add up to all."""
     said: list[str] = []
     for label in dict.fromkeys(label for each in found for label in each.labels if label.endswith(f"/{PRINTED}")):
-        own = [(each, each.labels.index(label)) for each in found if label in each.labels]
-        away = sum(each.away[row] > 0.5 * each.scores.shape[1] for each, row in own)
-        lost = sum(row in each.standing.unreliable for each, row in own)
-        kinds = [f"does not arrive in {away}"] * bool(away) + [f"fails or swings in {lost}"] * bool(lost)
+        own = [each.standing.fate(each.labels.index(label)) for each in found if label in each.labels]
+        words = {"unreliable": "fails or swings", "ranked": "has a place"}
+        kinds = [f"{words.get(fate, fate)} in {times}" for fate, times in Counter(own).items()]
         begin, classes = ("", "") if said else ("printed gains: ", f" of {len(own)} classes")
-        said.append(f"{begin}{label.split('/')[0]} {', '.join(kinds) or 'works in all'}{classes}")
+        said.append(f"{begin}{label.split('/')[0]} {', '.join(kinds)}{classes}")
     return said
 
 
 def _papers_places(found: Sequence[ClassStanding], names: dict[str, str]) -> list[str]:
-    """The places of the paper's law in each class."""
+    """The places of the paper's law in each class, of how many places."""
     said = []
     for label in names:
         law, _, gains = label.partition("/")
@@ -164,12 +175,12 @@ def _papers_places(found: Sequence[ClassStanding], names: dict[str, str]) -> lis
             continue
         places = []
         for each in found:
-            row = each.labels.index(label) if label in each.labels else None
-            places.append("-" if row is None or each.group(row) is None else str(each.order.index(row) + 1))
+            group = each.standing.group(each.labels.index(label)) if label in each.labels else None
+            places.append("-" if group is None else f"{group}/{len(each.standing.groups)}")
         said.append(f"{label} {', '.join(places)}")
     if not said:
         return []
-    return [f"places of {len(found[0].labels)} rows, by class (-: none): {said[0]}", *said[1:]]
+    return [f"place of all places, by class (-: none): {said[0]}", *said[1:]]
 
 
 def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
@@ -177,7 +188,7 @@ def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
     from wristctl.comparison.paper import T2
 
     printed = sorted(T2, key=lambda name: T2[name].rmse)
-    rows = {each.name: [each.labels[row].split("/")[0] for row in each.order] for each in found}
+    rows = {each.name: [each.labels[row].split("/")[0] for row in each.standing.order] for each in found}
     known = {name: list(dict.fromkeys(law for law in laws if law in T2)) for name, laws in rows.items()}
     ours = {name: laws for name, laws in known.items() if len(laws) == len(T2)}
     if not ours:
@@ -189,10 +200,13 @@ def _papers_order(found: Sequence[ClassStanding]) -> list[str]:
 
 
 def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS, rest: str = "more") -> list[str]:
-    """As many of the pieces as there is room for in lines, and how many more (places, say) there are."""
+    """As many of the pieces as there is room for in lines, and how many more there are."""
     given = [piece for piece in pieces if piece]
     for kept in range(len(given), 0, -1):
-        text = "".join(f"{each} " if each.endswith(",") else f"{each}; " for each in given[:kept]).rstrip(" ,;")
+        text = "".join(
+            f"{each} " if each.endswith(",") or after.startswith(_EQUAL) else f"{each}; "
+            for each, after in zip(given[:kept], [*given[1:kept], ""], strict=True)
+        ).rstrip(" ,;")
         text += f"; +{len(given) - kept} {rest}" if kept < len(given) else ""
         found = in_lines(text, columns)
         if len(found) <= lines:
@@ -205,12 +219,3 @@ def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS, rest: str
 def deg(value: float) -> str:
     """An angle [rad] in degrees, to two digits."""
     return two(math.degrees(value))
-
-
-def two(value: float) -> str:
-    """A number to two digits, as short as it goes: 15000, 0.012, 3.1e-5."""
-    shown = f"{value:.2g}"
-    if "e+" in shown and abs(value) < 1e6:
-        return f"{float(shown):.0f}"
-    digits, _, power = shown.partition("e")
-    return f"{digits}e{int(power)}" if power else digits

@@ -16,6 +16,9 @@ _OF_REST = ("settling", "overshoot")
 _FIRST = ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension", "saturation")
 """Metrics in the order of the printed table's columns; others that have a heading follow."""
 
+STANDING_UNITS = dict.fromkeys(("rmse", "rmse_low", "rmse_high", "swing"), "rad") | {"peak": "N"}
+"""Of the columns of the table of standings."""
+
 
 def units() -> dict[str, str]:
     """Of the columns of its table."""

@@ -27,10 +27,9 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], standings
     for standing in standings:
         _of_class(findings, standing, results)
     later = partial(findings.figure, later=True)
-    classes = [(each.name, each.loops) for each in standings]
     first = [each for each in results if each.inverse == _stands_for(results)[2]]
     caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
-    later("rmse-against-tension-variation", error_against_variation, first, classes, caption=caption)
+    later("rmse-against-tension-variation", error_against_variation, first, standings, caption=caption)
     for leaf, sizes in series_of_sizes(study.compare.loops).items():
         caption = f"RMSE over {leaf}, medians over motions"
         later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
@@ -44,7 +43,7 @@ def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[Com
     from wristctl.report.repetition_figures import error_sizes
 
     later = partial(findings.figure, later=True)
-    cell = _stands_for([each for each in results if each.loop in standing.loops])
+    cell = _stands_for(standing.of(results))
     here = {each.label: each for each in results if (each.loop, each.reference, each.inverse) == cell}
     own = [here[row] for row in shown_rows(standing) if row in here]
     courses = [each.simulation.trajectory for each in own]
@@ -80,7 +79,7 @@ def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRo
 
 def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
     """The loop, reference and inverse of the first row that is no step and, if there are others, not of a network."""
-    chosen = min(results, key=lambda each: (each.inverse == "network", each.reference.startswith("step")))
+    chosen = min(results, key=lambda each: (each.inverse == "network", each.jumps))
     return chosen.loop, chosen.reference, chosen.inverse
 
 

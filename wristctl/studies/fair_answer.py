@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.studies.answer_lines import in_lines
+from wristctl.studies.answer_lines import degrees, in_lines, percent
 
 if TYPE_CHECKING:
     from wristctl.comparison.order_shifts import OrderShift
@@ -52,8 +52,8 @@ def _rig(found: WorldRanking) -> str:
 
     groups = found.standing.groups
     if not groups:
-        return f"run none of these.{_lost(found)}"
-    best, known = groups[0].rows, found.yardstick
+        return f"{_none(found)}{_lost(found)}"
+    best, known = groups[0], found.yardstick
     first, ties = best[0], [at for at in best[1:] if at != known]
     if known in best:
         said = f"run feedforward, {_interval(found, known)} deg: no law is told apart from it for the better."
@@ -67,12 +67,22 @@ def _rig(found: WorldRanking) -> str:
         said += f" Not told apart from it: {', '.join(_named(found, at) for at in ties)}."
         said += f" Of all these {found.rows[quietest(found, best)].label} moves the tendons least."
     if len(groups) > 1:
-        said += f" Told apart, the nearest: {_named(found, groups[1].rows[0])}."
+        said += f" Told apart, the nearest: {_named(found, groups[1][0])}."
     papers = next((at for at, row in enumerate(found.rows) if row.label == PAPERS and at not in best), None)
     if papers is not None:
         ratio = found.means[papers].value / found.means[first].value
         said += f" The paper's law, tuned: {_deg(found.means[papers].value)}, {plain(ratio)} times the lowest."
-    return f"{said}{_floor(found)}{_lost(found)}"
+    return f"{said}{_floor(found)}{_seldom(found)}{_lost(found)}"
+
+
+def _none(found: WorldRanking) -> str:
+    """Why nothing is recommended."""
+    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+
+    if not found.standing.untold:
+        return "run none of these."
+    names = ", ".join(_named(found, at) for at in found.standing.untold)
+    return f"{found.worlds} worlds are too few to tell apart {names}: {LEAST_PAIRS} or more."
 
 
 def _floor(found: WorldRanking) -> str:
@@ -81,11 +91,19 @@ def _floor(found: WorldRanking) -> str:
     return f" As a rule differences of {100.0 * (floor - 1.0):.2g} % or more are told apart." if known else ""
 
 
+def _seldom(found: WorldRanking) -> str:
+    """The ranked rows that fail or swing in some world, with their shares."""
+    stands = found.standing
+    some = [at for at in stands.order if stands.fate(at) != "unreliable" and stands.lost[at].times]
+    each = [f"{found.rows[at].label} in {percent(stands.lost[at])}" for at in some]
+    return f" Lost, not shown to be so in more worlds than is tolerated: {', '.join(each)}." if each else ""
+
+
 def _lost(found: WorldRanking) -> str:
     """Every row that fails or swings too often to stand, by how often."""
     by_count: dict[int, list[str]] = {}
     for at in found.standing.unreliable:
-        by_count.setdefault(found.lost(at), []).append(found.rows[at].label)
+        by_count.setdefault(found.standing.lost[at].times, []).append(found.rows[at].label)
     each = [f"{count} in {', '.join(by_count[count])}" for count in sorted(by_count, reverse=True)]
     return f" Worlds lost, of {found.worlds}: {'; '.join(each)}." if each else ""
 
@@ -98,8 +116,9 @@ def _legend(found: WorldRanking) -> str:
     return (
         "RMSE is the geometric mean over worlds, with its 95 % interval. A world is a wrist and a rig drawn anew, on "
         "which no gains were searched or chosen. A law is lost where the wrist leaves its range, or swings by more "
-        f"than {_deg(LIMIT_CYCLE)} deg at rest; one that is lost in more than is tolerated stands nowhere{still}. "
-        "Ties are with the lowest: two of them may be told apart from each other."
+        f"than {_deg(LIMIT_CYCLE)} deg at rest; one that is shown to be lost in more worlds than is tolerated (its "
+        f"share's 95 % interval lies above) stands nowhere{still}. Rows that are not told apart from the lowest "
+        "are with 95 % all that are as good (model confidence set); two of them may be told apart from each other."
     )
 
 
@@ -127,4 +146,4 @@ def _interval(found: WorldRanking, at: int) -> str:
 
 
 def _deg(value: float) -> str:
-    return f"{math.degrees(value):.3g}"
+    return degrees(value, 3)

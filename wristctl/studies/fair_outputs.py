@@ -50,24 +50,30 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
 
 
 def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
+    """By their names: a family's, and `family, steps` of those of its motions where it has others."""
     from wristctl.comparison.judge_unit import row_of
-    from wristctl.comparison.world_ranking import ranking
+    from wristctl.comparison.world_ranking import kinds_of, ranking
     from wristctl.tuning.objective import YARDSTICK
 
     found = {}
     for family in families_of(study):
         own = {place: each for place, each in judged.items() if (place.variant, place.family) == (BASE, family)}
         laws = [place.law for place in own]
-        if YARDSTICK in laws:
-            rows = [row_of(place.label, pieces) for place, pieces in own.items()]
-            family_of = study.families[family]
-            found[family] = ranking(family, family_of, rows, laws.index(YARDSTICK), study.study.tolerated)
+        if YARDSTICK not in laws:
+            continue
+        family_of = study.families[family]
+        for steps, motions in kinds_of(family_of).items():
+            rows = [row_of(place.label, pieces, motions) for place, pieces in own.items()]
+            one = ranking(family, family_of, rows, laws.index(YARDSTICK), study.study.tolerated, steps)
+            found[one.name] = one
     return found
 
 
 def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
+    """On the smooth motions of each variant's family, where it has any."""
     from wristctl.comparison.judge_unit import row_of
     from wristctl.comparison.order_shifts import order_shift
+    from wristctl.comparison.world_ranking import kinds_of
 
     found = []
     for variant, way in study.study.variants.items():
@@ -75,7 +81,10 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
         before = {place: judged.get(place._replace(variant=way.beside or BASE)) for place in after}
         pairs = [(place, known, after[place]) for place, known in before.items() if known is not None]
         rows = [
-            [row_of(place.label, pieces, noises=1) for place, pieces in side]
+            [
+                row_of(place.label, pieces, next(iter(kinds_of(study.families[place.family]).values())), noises=1)
+                for place, pieces in side
+            ]
             for side in ([(p, b) for p, b, _ in pairs], [(p, a) for p, _, a in pairs])
         ]
         if pairs:
@@ -111,15 +120,17 @@ def _tables(
     findings = session.findings
     units = {name: METRICS[name].unit or "1" for name in RANKED}
     units |= dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
-    for family, found in rankings.items():
-        findings.table(f"data/ranking-{family}.csv", ranking_frame(found), units=units)
+    for name, found in rankings.items():
+        slug = _slug(name)
+        findings.table(f"data/ranking-{slug}.csv", ranking_frame(found), units=units)
         worlds = {"world": range(found.worlds)} | {row.label: row.rmse for row in found.rows}
         meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in found.rows}
-        findings.table(f"data/worlds-{family}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
+        findings.table(f"data/worlds-{slug}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
         for at, row in enumerate(found.rows):
             mean = found.means[at]
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{family}_{row.label}", mean.value, "rad", "lower", found.worlds, interval)
+            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", found.worlds, interval)
+    for family in families_of(session.study):
         if file := findings.file(f"data/gains-{family}.json"):
             own = {
                 place.law: each.gains
@@ -166,11 +177,16 @@ def _draw(session: Session, rankings: Mapping[str, WorldRanking], terms: Sequenc
         findings.overview.figure = "laws"
     if terms:
         findings.figure("terms", terms_by_rig, terms)
-    for family, found in rankings.items():
-        findings.figure(f"ranking-{family}", ranking_intervals, found)
-        findings.figure(f"profiles-{family}", world_profiles, found)
-        findings.figure(f"pareto-{family}", pareto, found)
-        findings.figure(f"worlds-{family}", world_map, found)
+    for name, found in rankings.items():
+        findings.figure(f"ranking-{_slug(name)}", ranking_intervals, found)
+        findings.figure(f"profiles-{_slug(name)}", world_profiles, found)
+        findings.figure(f"pareto-{_slug(name)}", pareto, found)
+        findings.figure(f"worlds-{_slug(name)}", world_map, found)
+
+
+def _slug(name: str) -> str:
+    """A ranking's name as a file's."""
+    return name.replace(", ", "-")
 
 
 def _best(rankings: Mapping[str, WorldRanking]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
@@ -188,7 +204,7 @@ def _best(rankings: Mapping[str, WorldRanking]) -> tuple[tuple[str, ...], list[t
     rows: list[tuple[object, ...]] = []
     for family, found in rankings.items():
         floor = 100.0 * (found.standing.floor - 1.0)
-        for at in found.standing.groups[0].rows if found.standing.groups else []:
+        for at in found.standing.groups[0] if found.standing.groups else []:
             mean, gain = found.means[at], found.gains[at]
             ends = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
             rows.append((family, found.rows[at].label, *ends, gain.value, f"{gain.low:.3g} to {gain.high:.3g}", floor))
@@ -204,8 +220,8 @@ def _ranking_table(found: WorldRanking, times: Mapping[str, StepTime]) -> Table:
     rmse = np.array([each.value for each in found.means])
     front = undominated(np.column_stack([rmse, chattering, energy]))
     rows = []
-    for at in found.order:
-        mean, gain, group = found.means[at], found.gains[at], found.group(at)
+    for at in found.standing.order:
+        mean, gain, group = found.means[at], found.gains[at], found.standing.group(at)
         failures, swings = found.standing.failures[at], found.standing.swings[at]
         lost = [f"{100 * each.value:.3g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
         tick = times.get(found.rows[at].label.split("/")[0])
@@ -219,5 +235,5 @@ def _ranking_table(found: WorldRanking, times: Mapping[str, StepTime]) -> Table:
         "group", "row", "RMSE [deg]", "95 % low", "high", "times less", "95 %", "fails", "swings", "tension [N/s]",
         "work [J]", "tick [us]", "undominated",
     )  # fmt: skip
-    motions = len(found.family.references)
-    return Table(f"{found.name}: {found.worlds} held-out worlds, {motions} motions each", heads, rows)
+    title = f"{found.name}: {found.worlds} held-out worlds, {found.motions} motions each"
+    return Table(title, heads, rows)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.config.study import Study
 from wristctl.report.printed_table import Table
+from wristctl.studies.answer_lines import degrees, percent
 
 if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
@@ -15,8 +16,12 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 
-def ranked(session: Session, study: Study, network: Inverse | None, tuned: TunedGains) -> tuple[WorldRanking, Table]:
-    """Rank the rows of `compare` on the worlds that it names, write it down, and give the table that is printed."""
+def ranked(
+    session: Session, study: Study, network: Inverse | None, tuned: TunedGains
+) -> tuple[list[WorldRanking], list[Table]]:
+    """Rank the rows of `compare` on the worlds that it names, write it down, and give the tables that are printed."""
+    import pandas as pd
+
     from wristctl.comparison.world_ranking import RANKED, rank, ranking_frame, worlds_frame
     from wristctl.report.ranking_figures import ranking_intervals, world_profiles
     from wristctl.simulation.drawn_worlds import streams_of
@@ -24,20 +29,25 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
 
     findings, worlds = session.findings, study.compare.worlds
     with session.progress("ranking", total=100, unit="%") as done:
-        found = rank(study, tuned, network, lambda share: done(round(100 * share)))
+        rankings = rank(study, tuned, network, lambda share: done(round(100 * share)))
     if worlds.sealed is None:
         findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
-    findings.summary(f"**{answer(found)}**\n\n![ranking](figures/ranking.png)")
+    answers = "\n\n".join(f"**{answer(found)}**" for found in rankings)
+    findings.summary(f"{answers}\n\n![ranking](figures/ranking.png)")
     units = {name: METRICS[name].unit or "1" for name in RANKED} | {f"rmse_{end}": "rad" for end in ("low", "high")}
-    findings.table("data/ranking.csv", ranking_frame(found), units=units | {"worst_rmse": "rad"})
-    findings.table("data/worlds.csv", worlds_frame(found), units=units)
-    for row, mean in zip(found.rows, found.means, strict=True):
-        interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-        findings.metric(f"rmse_{row.label}", mean.value, "rad", "lower", found.worlds, interval)
-    with session.progress("drawing"):
-        findings.figure("ranking", ranking_intervals, found)
-        findings.figure("profiles", world_profiles, found)
-    return found, _table(found)
+    ranking = pd.concat([ranking_frame(found) for found in rankings], ignore_index=True)
+    findings.table("data/ranking.csv", ranking, units=units | {"worst_rmse": "rad"})
+    frames = pd.concat([worlds_frame(found) for found in rankings], ignore_index=True)
+    findings.table("data/worlds.csv", frames, units=units)
+    for at, found in enumerate(rankings):
+        end = "_steps" if at else ""
+        for row, mean in zip(found.rows, found.means, strict=True):
+            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
+            findings.metric(f"rmse_{row.label}{end}", mean.value, "rad", "lower", found.worlds, interval)
+        with session.progress("drawing"):
+            findings.figure(f"ranking{end}", ranking_intervals, found)
+            findings.figure(f"profiles{end}", world_profiles, found)
+    return rankings, [_table(found) for found in rankings]
 
 
 def answer(found: WorldRanking) -> str:
@@ -45,44 +55,58 @@ def answer(found: WorldRanking) -> str:
     stands = found.standing
     said = f"On {found.name}"
     if not stands.groups:
-        return f"{said} nothing can be relied on: every row fails or swings in some of {found.worlds} worlds."
-    best = stands.groups[0].rows
+        return said + _none_ranked(found)
+    best = stands.groups[0]
     gain, mean = found.gains[best[0]], found.means[best[0]]
-    names = ", ".join(found.rows[at].label for at in best)
+    names = ", ".join(f"{found.rows[at].label}{_seldom(found, at)}" for at in best)
     tie = "" if len(best) == 1 else " (a tie)"
-    said += f" {names}{tie} {'is' if len(best) == 1 else 'are'} best: RMSE {_deg(mean.value)} deg, "
+    said += f" {names}{tie} {'is' if len(best) == 1 else 'are'} best: RMSE {degrees(mean.value)} deg, "
     said += f"{gain.value:.3g} times less than feedforward's [{gain.low:.3g} to {gain.high:.3g}]."
     if len(stands.groups) > 1:
-        after = stands.groups[1].rows[0]
-        said += f" Next is {found.rows[after].label} with {_deg(found.means[after].value)} deg."
+        after = stands.groups[1][0]
+        said += (
+            f" Next is {found.rows[after].label}{_seldom(found, after)} with {degrees(found.means[after].value)} deg."
+        )
     if len(found.rows) > 1 and math.isfinite(stands.floor):
-        said += f" Differences below {100.0 * (stands.floor - 1.0):.2g} % cannot be told in {found.worlds} worlds."
-    if stands.unreliable:
-        fates = (_fate(found, at) for at in stands.unreliable)
-        said += f" Not to be relied on: {', '.join(fates)}."
-    return said
+        said += f" As a rule differences of {100.0 * (stands.floor - 1.0):.2g} % are told in {found.worlds} worlds."
+    return said + _unreliable(found)
+
+
+def _none_ranked(found: WorldRanking) -> str:
+    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+
+    if untold := found.standing.untold:
+        names = ", ".join(found.rows[at].label for at in untold)
+        return f" {found.worlds} worlds are too few to tell {names} apart: {LEAST_PAIRS} or more.{_unreliable(found)}"
+    return f" nothing can be relied on: every row fails or swings in some of {found.worlds} worlds."
+
+
+def _unreliable(found: WorldRanking) -> str:
+    fates = [f"{found.rows[at].label} ({_fate(found, at)} of {found.worlds})" for at in found.standing.unreliable]
+    return f" Not to be relied on: {', '.join(fates)}." if fates else ""
 
 
 def _fate(found: WorldRanking, at: int) -> str:
     failures, swings = found.standing.failures[at], found.standing.swings[at]
     told = [f"fails in {failures.times}"] * bool(failures.times) + [f"swings in {swings.times}"] * bool(swings.times)
-    return f"{found.rows[at].label} ({' and '.join(told)} of {found.worlds})"
+    return " and ".join(told)
 
 
-def _deg(value: float) -> str:
-    return f"{math.degrees(value):.2g}"
+def _seldom(found: WorldRanking, at: int) -> str:
+    """How often a row fails or swings that is not shown to do so too often; empty where it never does."""
+    lost = found.standing.lost[at]
+    return f" ({_fate(found, at)}: {percent(lost)})" if lost.times else ""
 
 
 def _table(found: WorldRanking) -> Table:
     rows = []
-    for at in found.order:
-        mean, gain, group = found.means[at], found.gains[at], found.group(at)
+    for at in found.standing.order:
+        mean, gain, group = found.means[at], found.gains[at], found.standing.group(at)
         failures, swings = found.standing.failures[at], found.standing.swings[at]
-        interval = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
+        ends = tuple(degrees(each) for each in (mean.value, mean.low, mean.high))
         times = (gain.value, f"{gain.low:.3g} to {gain.high:.3g}")
         lost = (f"{failures.times} (< {100 * failures.high:.0f} %)", f"{swings.times} (< {100 * swings.high:.0f} %)")
         worst = math.degrees(float(found.rows[at].rmse.max()))
-        rows.append(("-" if group is None else str(group), found.rows[at].label, *interval, *times, worst, *lost))
+        rows.append(("-" if group is None else str(group), found.rows[at].label, *ends, *times, worst, *lost))
     heads = ("group", "row", "RMSE [deg]", "95 % low", "high", "times better", "95 %", "worst [deg]", "fails", "swings")
-    motions = len(found.family.references)
-    return Table(f"{answer(found)} {found.worlds} worlds, {motions} motions each", heads, rows)
+    return Table(f"{answer(found)} {found.worlds} worlds, {found.motions} motions each", heads, rows)
