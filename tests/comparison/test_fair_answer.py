@@ -31,7 +31,10 @@ def row(
     noise = np.random.default_rng(len(label)).normal(0.0, spread, WORLDS)
     rmse = HARD * factor * np.exp(noise - noise.mean())
     rmse[:failed] = np.inf
-    metrics = {name: np.full((1, WORLDS), quiet) for name in RANKED} | {"rmse": rmse[None]}
+    metrics = {name: np.full((1, WORLDS), quiet) for name in RANKED} | {
+        "rmse": rmse[None],
+        "drift": np.zeros((1, WORLDS)),
+    }
     ones = np.ones((1, WORLDS))
     measured = Measured(metrics, np.isinf(rmse)[None], ones, np.ones(WORLDS, bool))
     return RankedRow(label, rmse, np.arange(WORLDS) < swings, measured)

@@ -30,7 +30,7 @@ FAMILY = Family()
 
 def row(label: str, rmse: Array, swings: tuple[int, ...] = (), failed: tuple[int, ...] = ()) -> RankedRow:
     lost, swung = np.isin(np.arange(WORLDS), failed), np.isin(np.arange(WORLDS), swings)
-    metrics = dict.fromkeys(RANKED, rmse[None])
+    metrics = dict.fromkeys(RANKED, rmse[None]) | {"drift": np.zeros((1, WORLDS))}
     nothing = np.zeros((1, WORLDS), bool)
     measured = Measured(metrics, lost[None], np.ones((1, WORLDS)), nothing[0])
     return RankedRow(label, np.where(lost, np.inf, rmse), swung, measured)
@@ -110,7 +110,7 @@ def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> Non
     rows = []
     for factor, label in ((1.0, "feedforward/default"), (0.5, "a/x")):
         rmse = (factor * 10.0 ** -(3.0 + np.arange(4.0))[:, None] * motions).reshape(1, -1)
-        metrics = dict.fromkeys(RANKED, rmse)
+        metrics = dict.fromkeys(RANKED, rmse) | {"drift": np.zeros((1, 8))}
         failed = np.zeros((1, 8), bool)
         failed[0, 5] = label == "a/x"
         measured = Measured(metrics, failed, np.ones((1, 8)), np.zeros(8, bool))

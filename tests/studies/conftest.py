@@ -57,9 +57,12 @@ def course(label: str, diverges: bool = False) -> Trajectory:
 
 
 def repeated(label: str, rmse: Sequence[float] = (1e-3,), failed: int = 0, **metrics: float) -> Repeated:
-    """A loop done as often as there are RMSEs, the last `failed` of which failed; it does not swing, all else is 1."""
+    """A loop done as often as there are RMSEs, the last `failed` of which failed.
+
+    It does not swing and has converged; all else is 1.
+    """
     every = {name: np.ones(len(rmse)) for name in METRICS}
-    every |= {"rmse": np.array(rmse), "oscillation": np.zeros(len(rmse))}
+    every |= {"rmse": np.array(rmse), "oscillation": np.zeros(len(rmse)), "drift": np.zeros(len(rmse))}
     every |= {name: np.full(len(rmse), value) for name, value in metrics.items()}
     bad = np.arange(len(rmse)) >= len(rmse) - failed
     one = course(label, bool(bad[0]))

@@ -124,7 +124,7 @@ def made_up(loop_cells: tuple[int, ...], **metrics: list[float]) -> tuple[Judge,
     judge = Judge(cases, study.wrist, Objective.model_validate(weights | {"rmse": 1.0}))
     known, rests = {name: np.ones((1, len(cases))) for name in METRICS}, np.array([True] * len(cases))
     judge._yardstick = Measured(known, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
-    values = {name: np.array([given]) for name, given in metrics.items()}
+    values = {name: np.array([given]) for name, given in metrics.items()} | {"drift": np.zeros((1, len(cases)))}
     return judge, Measured(values, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
 
 

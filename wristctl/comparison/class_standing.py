@@ -107,13 +107,15 @@ def _standing(name: str, results: Sequence[ComparedRow], jumps: bool) -> ClassSt
     scores = np.exp([np.mean(row, axis=0) if redrawn else [each.mean() for each in row] for row in logs])
     ripples = [[_ripple(each) for each in row] for row in table]
     ripple = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in ripples])
+    drift = [[each.metrics.get("drift", np.zeros(len(each.failed))) for each in row] for row in table]
+    drifts = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in drift]) > 0.0
     away = np.array([sum(not each.arrives and not each.failed.any() for each in row) for row in table])
     peak = np.array([max(each.beyond for each in row) for row in table])
     what = "repetition" if redrawn else "motion"
     return ClassStanding(
         name, f"{scores.shape[1]} {what}{'s' * (scores.shape[1] > 1)}", labels,
         list(dict.fromkeys(loop for loop, _ in cells)), scores,
-        standing(scores, ripple > 0.0, _STREAM, short=away > 0, unphysical=peak > 0.0),
+        standing(scores, (ripple > 0.0) | drifts, _STREAM, short=away > 0, unphysical=peak > 0.0),
         [geometric_mean(each, _STREAM) for each in penalised(scores)],
         ripple.max(axis=1), peak, away, len(cells), jumps,
     )  # fmt: skip

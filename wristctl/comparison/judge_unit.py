@@ -76,7 +76,8 @@ def row_of(
 ) -> RankedRow:
     """A row of a ranking from its ranges of worlds in order; of these motions and so many of the noises, or of all.
 
-    It swings in a world where it does in the middle one of its noises, on any motion that rests.
+    It swings in a world where it does in the middle one of its noises, on any motion that rests, or where a motion
+    depends on the integration step however short.
     """
     chosen = slice(None) if motions is None else list(motions)
     whole = {name: np.concatenate([each[name] for each in pieces])[:, chosen, :noises] for name in pieces[0]}
@@ -84,7 +85,7 @@ def row_of(
     rmse = np.where(failed, np.inf, whole["rmse"])
     scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))
     left = np.median(np.where(np.isnan(whole["oscillation"]), 0.0, whole["oscillation"]), axis=2)
-    swings = ((left > LIMIT_CYCLE) & whole["rests"][:, :, 0]).any(axis=1)
+    swings = ((left > LIMIT_CYCLE) & whole["rests"][:, :, 0]).any(axis=1) | (whole["drift"] > 0.0).any(axis=(1, 2))
     metrics = {name: whole[name].reshape(1, -1) for name in RANKED}
     measured = Measured(metrics, failed.reshape(1, -1), whole["lasted"].reshape(1, -1), whole["rests"].ravel())
     return RankedRow(label, scores, swings, measured)

@@ -29,7 +29,17 @@ from wristctl.wrist.kinematics import Inverse
 if TYPE_CHECKING:
     import pandas as pd
 
-RANKED = ("rmse", "steady_state", "oscillation", "chattering", "peak_tension", "rms_tension", "saturation", "energy")
+RANKED = (
+    "rmse",
+    "steady_state",
+    "oscillation",
+    "chattering",
+    "peak_tension",
+    "rms_tension",
+    "saturation",
+    "energy",
+    "drift",
+)
 """Metrics that are kept of every row in every case."""
 _STREAM = 20_031
 """Of the resampling: the same worlds give the same intervals."""

@@ -179,6 +179,8 @@ METRICS: Choices[Any] = Choices(
         "tip_steady_mm": "wristctl.simulation.metrics:TIP_STEADY",
         "oscillation": "wristctl.simulation.metrics:OSCILLATION",
         "hunting": "wristctl.simulation.metrics:HUNTING",
+        "substeps": "wristctl.simulation.metrics:SUBSTEPS",
+        "drift": "wristctl.simulation.metrics:DRIFT",
         "observer_consistency": "wristctl.simulation.metrics:OBSERVER",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
         "range_untracked": "wristctl.simulation.tracked_range:RANGE_UNTRACKED",

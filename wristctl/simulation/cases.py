@@ -32,7 +32,7 @@ _RECORDED_AT_ONCE = 6_000_000
 _SPECTRA = 256
 """Loops whose spectra are worked out at once."""
 
-AT_ONCE = ("oscillation", "energy")
+AT_ONCE = ("oscillation", "energy", "substeps", "drift")
 """Metrics of courses that are taken of many rollouts without a trajectory for each."""
 
 
@@ -66,9 +66,9 @@ class Measured:
 
     @property
     def swings(self) -> NDArray[np.bool_]:
-        """Where the reference rests and the wrist does not, (P, C)."""
+        """Where the reference rests and the wrist does not, or its motion depends on the integration step, (P, C)."""
         found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
-        return found
+        return found | (self.metrics["drift"] > 0.0)
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
         """The same of cases that are some of the motions of their world, which are so many."""
@@ -84,16 +84,20 @@ def measure(
     wrist: WristParameters,
     metrics: Sequence[str],
     progress: Callable[[float], None] | None = None,
+    converge: bool = True,
 ) -> Measured:
-    """Run gains (P, g) of a law on all the cases."""
-    shape = len(gains), len(cases)
+    """Run gains (P, g) of a law on all the cases; with `converge` at integration steps that are short enough.
+
+    `drift` is always among the metrics.
+    """
+    shape, metrics = (len(gains), len(cases)), list(dict.fromkeys([*metrics, "drift"]))
     found = {name: np.empty(shape) for name in metrics}
     failed, lasted = np.empty(shape, bool), np.empty(shape)
     done = 0
     for own in _alike(cases):
         for rows, there in _pieces(len(gains), own, cases[own[0]], _recorded(metrics)):
             chosen = [cases[each] for each in there]
-            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics)
+            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge)
             at = np.ix_(rows, there)
             for name in metrics:
                 found[name][at] = values[name].reshape(len(rows), -1)
@@ -110,7 +114,7 @@ def _recorded(metrics: Sequence[str]) -> How:
     """What the metrics need beyond sums."""
     if any(METRICS[name].of_totals is None and name not in AT_ONCE for name in metrics):
         return True
-    return "briefly" if any(name in AT_ONCE for name in metrics) else False
+    return "briefly" if any(name in ("oscillation", "energy") for name in metrics) else False
 
 
 def _alike(cases: Sequence[Case]) -> list[list[int]]:
@@ -142,13 +146,17 @@ def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], 
     found = dict[str, Array]()
     if "oscillation" in metrics:
         found["oscillation"] = _oscillation(outcome, which, step)
+    if "substeps" in metrics:
+        found["substeps"] = outcome.steps.astype(float)
+    if "drift" in metrics:
+        found["drift"] = outcome.drift
     if "energy" in metrics:
         found["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
     return found
 
 
 def _measured(
-    law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters, metrics: Sequence[str]
+    law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters, metrics: Sequence[str], converge: bool
 ) -> tuple[Outcome, dict[str, Array]]:
     """The metrics (rows * cases,) of a batch."""
     motions = list({id(case.motion): case.motion for case in cases}.values())
@@ -159,7 +167,7 @@ def _measured(
     one = all(each is loops[0] for each in loops)
     outcome = rollout(
         law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
-        streams=[case.stream for case in cases] * rows, record=_recorded(metrics),
+        streams=[case.stream for case in cases] * rows, record=_recorded(metrics), converge=converge,
     )  # fmt: skip
     found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
     slow = [name for name in metrics if name not in found and name not in AT_ONCE]

@@ -126,6 +126,8 @@ def trajectory(
         seen=outcome.column("seen", index),
         load=None if expected is None else outcome.column("load", index),
         expected=math.nan if expected is None else expected,
+        substeps=int(outcome.steps[index]),
+        drift=float(outcome.drift[index]),
         outside=followed.outside,
     )
 

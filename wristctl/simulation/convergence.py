@@ -54,9 +54,8 @@ def _swinging(outcome: Outcome) -> Mask:
 
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    most = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
-    doubtful: Mask = outcome.step_error > most
-    return doubtful | (kinked & _swinging(outcome))
+    most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
+    return (outcome.step_error > most) | (kinked & _swinging(outcome))
 
 
 def agree(one: Outcome, other: Outcome) -> Mask:

@@ -244,6 +244,19 @@ HUNTING = Metric(
     of_trajectory=hunting,
     floor=2.0 * _ANGLE,
 )
+SUBSTEPS = Metric(
+    "",
+    "integration steps in a control period that it took",
+    of_trajectory=lambda course: float(course.substeps),
+    of_error=False,
+)
+DRIFT = Metric(
+    "rad",
+    "change of RMSE or of the error at the end with the integration step, at the shortest tried; 0: converged",
+    of_trajectory=lambda course: course.drift,
+    of_error=False,
+    floor=_ANGLE,
+)
 OBSERVER = Metric(
     "",
     "RMS of the observer's error over what it expects by what it believes: 1 where that is so",

@@ -60,7 +60,7 @@ class Repeated:
     @property
     def fate(self) -> str:
         """In words what became of it: failed, short, swings, ripples, pulls harder than tendons can; else empty."""
-        return "; ".join(each for each in (self._end, self._strain) if each)
+        return "; ".join(each for each in (self._end, self._strain, self._accuracy) if each)
 
     @property
     def beyond(self) -> float:
@@ -85,6 +85,11 @@ class Repeated:
         return ripple if ripple > LIMIT_CYCLE else 0.0
 
     @property
+    def drift(self) -> float:
+        """Largest change of a repetition's numbers with the integration step [rad]; 0 where all have converged."""
+        return float(np.max(self.metrics.get("drift", np.zeros(1))))
+
+    @property
     def arrives(self) -> bool:
         """Whether the first repetition ends where it was asked to."""
         return not self.first.failed and arrives(self.first.trajectory)
@@ -93,6 +98,13 @@ class Repeated:
     def _strain(self) -> str:
         most = self.beyond
         return f"NOT PHYSICAL: {most:.3g} N in a tendon that bears {self.bears:g}" if most > 0.0 else ""
+
+    @property
+    def _accuracy(self) -> str:
+        if self.drift == 0.0:
+            return ""
+        by = f"by {np.degrees(self.drift):.2g} deg " if math.isfinite(self.drift) else ""
+        return f"NOT CONVERGED: changes {by}with the integration step"
 
     @property
     def _end(self) -> str:

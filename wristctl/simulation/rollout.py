@@ -59,6 +59,7 @@ def rollout(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Event | None = None,
+    converge: bool = True,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
@@ -68,7 +69,8 @@ def rollout(
     ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
     (count,) are the entropies of the cameras' noise; all meet the same where none is given. Where another thread sets
     `stop`, the outcome comes soon and is of no use. Where a loop's `substeps` are null and its integration step
-    turns out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`). Raises what
+    turns out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`), unless
+    `converge` is false. Raises what
     a plain law has raised; such rollouts run one by one.
     """
     count = len(gains)
@@ -95,7 +97,7 @@ def rollout(
         return Outcome.joined(parts, np.arange(len(rollouts)))
 
     outcome = run(everyone, 1, progress)
-    if stop.is_set():
+    if stop.is_set() or not converge:
         return outcome
     by_hand = np.array([there.loop.substeps is not None for there in worlds])[world]
     kinked = np.array([has_kinks(there.loop) for there in worlds])[world]

@@ -70,6 +70,10 @@ class Trajectory:
     """Load torque as the observer estimates it, (T,); None where there is no observer."""
     expected: float = math.nan
     """Standard deviation of the observer's error of the angle by what it believes [rad]."""
+    substeps: int = 1
+    """Integration steps in a control period that it took."""
+    drift: float = 0.0
+    """By how much its numbers still change with the integration step [rad]; 0 where they have converged."""
     outside: float = 0.0
     """Share of the wanted tips outside the domain of the network behind the reference."""
 

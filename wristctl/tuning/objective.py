@@ -40,6 +40,22 @@ class Judge:
         """Objective (P,) of gains (P, g)."""
         return self.value(measure(law, gains, self._cases, self._wrist, self._metrics))
 
+    def beside(self, law: Controller, gains: Array, best: float) -> Array:
+        """Objective (P,) of gains (P, g) in a search whose best so far is `best`.
+
+        At the default integration step; only gains that would be the best are measured at steps that are short enough,
+        the most promising first, so that a search never ends with what the step alone makes good.
+        """
+        found = measure(law, gains, self._cases, self._wrist, self._metrics, converge=False)
+        values, sure = self.value(found), np.zeros(len(gains), bool)
+        while not sure.all():
+            next_ = int(np.argmin(np.where(sure, np.inf, values)))
+            if values[next_] >= best:
+                break
+            values[next_], sure[next_] = self(law, gains[next_ : next_ + 1])[0], True
+            best = min(best, float(values[next_]))
+        return values
+
     def value(self, found: Measured) -> Array:
         """Objective (P,) of what was measured on the cases."""
         value = np.zeros(found.failed.shape)

@@ -157,7 +157,7 @@ def search(
                 raise UserError(what, "tune.resume", "the settings, seed and version that it had")
             value = known.values[at]
         else:
-            value = judge(controller, gains)
+            value = judge.beside(controller, gains, min((float(each.min()) for each in values), default=np.inf))
         tell(value)
         values.append(value)
         tried.append(gains)
@@ -224,7 +224,7 @@ def _chosen(controller: Controller, found: Search, judge: Judge, choose: Judge |
         for (name, each), value in zip(presets.items(), judged, strict=True):
             known.append((tuple(map(float, each)), name, float(value)))
     if choose is None:
-        validated = np.array([value for *_, value in known])
+        validated = judge(controller, np.array([gains for gains, *_ in known]))
     else:
         validated = choose(controller, np.array([gains for gains, *_ in known]))
     every = [Finalist(*each, float(value)) for each, value in zip(known, validated, strict=True)]

@@ -1,0 +1,156 @@
+"""Numbers do not depend on the integration step, or are marked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.api import simulate as simulated
+from wristctl.comparison.box import drawn_settings
+from wristctl.config.load import load_study
+from wristctl.config.loop import LOOPS, Loop, Reference
+from wristctl.config.unstated import PaperSetting
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.simulation.convergence import agree, in_doubt, tolerance
+from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout, structure
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import tuning_cases
+
+UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
+NONE = np.zeros(1, np.int64)
+
+
+def run(law: str, gains: str, loop: Loop, limit: float = 60.0, side: float = 1.0, **how: Any) -> Outcome:
+    wrist = WristParameters(tension_limit=limit, length=how.pop("length", 0.08))
+    followed = motion(Reference(angle_deg=30.0 * side), wrist, 4.0, max(1e-3, loop.control_period))
+    chosen = controller(law)
+    return rollout(chosen, np.array([gains_of(chosen, gains)]), [followed], NONE, loop, wrist, record=True, **how)
+
+
+def missing_deg(outcome: Outcome) -> float:
+    return float(np.degrees(outcome.metrics["steady_state"][0]))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_exchanged_gains_move_the_front_pages_wrist_and_no_step_a_tick_says_so(side: float) -> None:
+    """58 N, four segments, 1 kHz: one integration step a tick leaves the wrist where it was."""
+    coarse = run("smc", "exchanged", Loop(substeps=1), 58.0, side)
+    found = run("smc", "exchanged", LOOPS["default"], 58.0, side)
+    fine = run("smc", "exchanged", Loop(substeps=20), 58.0, side)
+    assert missing_deg(coarse) > 29.0 and coarse.unconverged.all()
+    assert missing_deg(found) < 0.05 and found.steps[0] > 1 and not found.unconverged.any()
+    assert found.metrics["rmse"] == pytest.approx(fine.metrics["rmse"], rel=0.02)
+
+
+def test_at_60_newtons_they_arrive_at_every_step_but_one_and_their_rmse_is_marked() -> None:
+    found = [run("smc", "exchanged", Loop(substeps=steps)) for steps in (4, 8, 16)]
+    own = run("smc", "exchanged", LOOPS["default"])
+    assert max(map(missing_deg, [*found, own])) < 0.05
+    assert own.unconverged.all() and own.steps == 64 and 0.0 < own.drift[0] < 0.05 * own.metrics["rmse"][0]
+    assert own.metrics["rmse"] == pytest.approx(found[0].metrics["rmse"], rel=0.05)
+
+
+def test_beyond_the_threshold_they_move_nothing_at_any_step() -> None:
+    for limit in (61.0, 80.0):
+        found = run("smc", "exchanged", LOOPS["default"], limit)
+        fine = run("smc", "exchanged", Loop(substeps=20), limit)
+        assert missing_deg(found) > 29.0 and missing_deg(fine) > 29.0 and not found.unconverged.any()
+
+
+@pytest.mark.parametrize("law", ["ct-dob", "pid-ff", "feedforward"])
+def test_a_smooth_loop_keeps_its_one_step_to_the_bit(law: str) -> None:
+    found, one = run(law, "default", LOOPS["default"]), run(law, "default", Loop(substeps=1))
+    assert found.steps == 1 and not found.unconverged.any() and not one.unconverged.any()
+    assert found.column("theta", 0).tobytes() == one.column("theta", 0).tobytes()
+
+
+def settings(count: int) -> list[PaperSetting]:
+    """Settings that the paper leaves open, at periods of 1 to 10 ms and limits of 40 to 100 N."""
+    rng, found = np.random.default_rng(5), []
+    for each in drawn_settings(load_study([UNKNOWNS]).audit.box, WristParameters(), 5):
+        if each.measured != "ideal" or each.loop.control_period < 1e-3:
+            continue
+        loop = each.loop.model_copy(update={"limits": True})
+        limit = float(np.exp(rng.uniform(np.log(40.0), np.log(100.0))))
+        found.append(each._replace(loop=loop, wrist=each.wrist.model_copy(update={"tension_limit": limit})))
+    return found[:count]
+
+
+@pytest.mark.parametrize("row", [("smc", "exchanged"), ("pid", "printed"), ("smc-tracking", "default")])
+def test_an_rmse_is_that_of_twenty_times_the_steps_or_marked(row: tuple[str, str]) -> None:
+    law, groups = controller(row[0]), dict[tuple[object, ...], list[PaperSetting]]()
+    for each in settings(24):
+        groups.setdefault(structure(each.loop), []).append(each)
+    off = dict.fromkeys(("one", "own"), 0)
+    for own in groups.values():
+        gains = np.tile(gains_of(law, row[1], None), (len(own), 1))
+        motions = [motion(each.reference, each.wrist, 4.0, each.loop.control_period) for each in own]
+
+        def errors(
+            steps: int | None, own: list[PaperSetting] = own, gains: Any = gains, motions: Any = motions
+        ) -> Outcome:
+            loops = [each.loop.model_copy(update={"substeps": steps}) for each in own]
+            wrists = [each.wrist for each in own]
+            return rollout(law, gains, motions, np.arange(len(own)), loops, wrists)
+
+        fine, free, one = errors(20), errors(None), errors(1)
+        for name, found in (("one", one), ("own", free)):
+            apart = np.abs(found.metrics["rmse"] - fine.metrics["rmse"])
+            wrong = (apart > 2.0 * tolerance(fine.metrics["rmse"])) | (found.failed != fine.failed)
+            off[name] += int((wrong & ~(free.unconverged & (name == "own"))).sum())
+    assert off["own"] == 0
+    assert off["one"] > 0 or row[0] == "smc-tracking"
+
+
+def test_friction_and_slack_are_no_reason_to_doubt_a_quiet_loop_and_a_swing_is() -> None:
+    rig = {"control_period": 5e-3, "actuator": {"level": "tendon", "friction": 0.1}, "sensor": {"level": "camera"}}
+    quiet, swinging = (run(*row, Loop.model_validate(rig)) for row in (("ct-dob", "stepper"), ("pid", "printed")))
+    assert quiet.steps == 5 and not in_doubt(quiet, np.array([True])).any()
+    quick = swinging.metrics["chattering"]
+    assert in_doubt(swinging, np.array([True])).all()
+    swinging.step_error[:] = 0.0
+    assert in_doubt(swinging, np.array([True])).all() and not in_doubt(swinging, np.array([False])).any()
+    swinging.metrics["chattering"] = 0.1 * quick
+    assert not in_doubt(swinging, np.array([True])).any()
+
+
+def test_rollouts_that_differ_beyond_the_tolerance_do_not_agree() -> None:
+    one, other = (run("ct-dob", "default", Loop(substeps=1), limit) for limit in (60.0, 60.0))
+    assert agree(one, other).all()
+    for name, by in (("rmse", np.deg2rad(0.0011)), ("steady_state", np.deg2rad(0.011))):
+        other.metrics[name] = one.metrics[name] + by
+        assert not agree(one, other).any()
+        other.metrics[name] = one.metrics[name] + 0.4 * by
+        assert agree(one, other).all()
+        other.metrics[name] = np.full(1, np.nan)
+        assert not agree(one, other).any(), "a failure is no agreement"
+        other.metrics[name] = one.metrics[name]
+
+
+def test_the_best_gains_of_a_search_are_what_they_are_at_a_step_that_is_short_enough() -> None:
+    chosen = ["tune.controllers=[pid]", "tune.scenarios=[{loop: default}]", "tune.horizon=3"]
+    study, law = load_study([], chosen, "tune"), controller("pid")
+    judge = Judge(tuning_cases(study)[0], study.wrist, study.tune.objective)
+    gains = 10.0 ** np.random.default_rng(1).uniform([1.0, 0.0, -1.0], [3.5, 2.0, 1.5], (24, 3))
+    sure, coarse, told = judge(law, gains), judge.beside(law, gains, -np.inf), judge.beside(law, gains, np.inf)
+    assert (np.abs(sure - coarse) > 0.01).sum() > 3, "the step changes some"
+    assert told.min() == pytest.approx(sure[told.argmin()], rel=1e-12)
+    between = float(np.median(coarse))
+    some = judge.beside(law, gains, between)
+    assert (some[some < between] == sure[some < between]).all() and (
+        some[coarse >= between] == coarse[coarse >= between]
+    ).all()
+
+
+def test_what_is_simulated_says_how_many_steps_it_took_and_whether_they_were_enough() -> None:
+    chosen = ["simulate.controller=smc", "simulate.gains=exchanged", "simulate.horizon=3"]
+    enough = simulated(load_study([], [*chosen, "wrist.tension_limit=58"], "simulate"))
+    short = simulated(load_study([], [*chosen, "wrist.tension_limit=58", "simulate.loop.substeps=1"], "simulate"))
+    assert enough.metrics["substeps"] > 1 and enough.metrics["drift"] == 0.0
+    assert short.metrics["substeps"] == 1 and short.metrics["drift"] > 0.0
