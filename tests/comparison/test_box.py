@@ -218,16 +218,16 @@ def test_a_thresholds_interval_holds_the_true_one_19_times_of_20() -> None:
 
 
 def test_how_the_rate_is_measured_decides_at_60_newton() -> None:
-    """Four segments at 1 kHz: nothing arrives with the rate as it is, and behind the observer it does."""
+    """Four segments at 1 kHz: with the rate as it is the wrist comes late, and behind the observer it follows."""
     own = box(24, measured={"one_of": {name: {"measured": name} for name in ("ideal", "differenced", "observer")}})
     settings = drawn_settings(own.model_copy(update={"draws": 3, "horizon": 5.0}), WRIST, 0)
     rmse = react([EXCHANGED], settings).found["smc/exchanged"]["rmse"]
     found = {each.measured: value for each, value in zip(settings, rmse, strict=True)}
-    assert found["ideal"] == pytest.approx(0.49, abs=0.01) and found["observer"] == pytest.approx(0.0014, abs=1e-4)
+    assert found["ideal"] == pytest.approx(0.155, rel=0.03) and found["observer"] == pytest.approx(0.0014, abs=1e-4)
 
 
 def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None:
-    """Two draws of the limit alone around the 53 N that four segments at 1 kHz stand."""
+    """Draws of the limit alone around the 60 N that four segments at 1 kHz stand."""
     own = box(64, wrist__tension_limit={"draw": "40..70"}).model_copy(update={"horizon": 4.0})
     settings = drawn_settings(own, WRIST, 0)
     claim = Claim(
@@ -235,8 +235,8 @@ def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None
         value=0.01745, sense="at most",
     )  # fmt: skip
     (strip,) = strips([claim], react(rows_in_box([claim]), settings))
-    assert strip.split is not None and 52.5 < strip.split.at < 55.0 and strip.leaves[0].share > 0.8
-    assert strip.told.startswith("100 % where wrist.tension_limit < 5")
+    assert strip.split is not None and 59.0 < strip.split.at < 62.0 and strip.leaves[0].share > 0.8
+    assert strip.told.startswith("100 % where wrist.tension_limit < 6")
     frame = strips_frame([strip])
     held = np.array([each == "reproduced" for each in strip.verdicts])
     assert frame["reproduced"][0] == held.mean() and frame["reproduced_low"][0] < held.mean()

@@ -166,5 +166,7 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "hunting": pytest.approx(math.nan, nan_ok=True),
         "observer_consistency": pytest.approx(math.nan, nan_ok=True),
         "outside_domain": 0.25,
+        "substeps": 1.0,
+        "drift": 0.0,
         "range_untracked": 0.0,
     }

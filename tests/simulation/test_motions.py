@@ -53,7 +53,7 @@ def recorded(file: Path, horizon: float = 3.0, **given: object) -> Motion:
 @pytest.mark.parametrize("kind", [each for each in REFERENCES if each != "recording"])
 def test_a_kind_of_reference_is_one_of_steps_where_its_angle_jumps(kind: str) -> None:
     """By more than a degree within a tenth of a millisecond, from rest at 0; on none of the others."""
-    path = {"tips": ((0.078, 0.014), (0.079, 0.01)), "inverse": "closed-form"}
+    path: dict[str, object] = {"tips": ((0.078, 0.014), (0.079, 0.01)), "inverse": "closed-form"}
     targets: dict[str, dict[str, object]] = {"multi-step": {"angles_deg": (10.0, -5.0)}, "tip-path": path}
     given = Reference.model_validate({"kind": kind} | targets.get(kind, {}))
     theta = motion(given, WIDE, 3.0, 1e-4).theta_ref

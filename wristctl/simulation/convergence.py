@@ -60,7 +60,7 @@ def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
 
 def agree(one: Outcome, other: Outcome) -> Mask:
     """Rollouts that tell the same in both, (count,): RMSE and error at the end, and whether and when they failed."""
-    same = (one.failed == other.failed) & (np.abs(one.until - other.until) <= RELATIVE * other.until)
+    same: Mask = (one.failed == other.failed) & (np.abs(one.until - other.until) <= RELATIVE * other.until)
     for name, share in (("rmse", HALF), ("steady_state", HALF * AT_THE_END)):
         coarse, fine = one.metrics[name], other.metrics[name]
         same &= (np.abs(coarse - fine) <= share * tolerance(fine)) | (np.isnan(coarse) & np.isnan(fine))
