@@ -21,7 +21,7 @@ CODE = Code(
     branch="main",
     dirty=False,
     tree_sha256="t",
-    foreign={"code/pd.py": "f", "code/gains.py": "h"},
+    foreign={"code/pd.py": "f" * 64, "code/gains.py": "b" * 64},
 )
 ENVIRONMENT = Environment(
     python="3.11.7", os="Linux-6.1", machine="x86_64", cpu="cpu", cores=2, threads={"OMP_NUM_THREADS": "1"},
@@ -55,7 +55,7 @@ def _fingerprint(
         {"environment": ENVIRONMENT.model_copy(update={"settings": {"OPENBLAS_CORETYPE": "generic"}})},
         {"environment": ENVIRONMENT.model_copy(update={"settings": {}})},
         {"code": CODE.model_copy(update={"foreign": CODE.foreign | {"code/gains.py": "other"}})},
-        {"code": CODE.model_copy(update={"foreign": {"code/pd.py": "f"}})},
+        {"code": CODE.model_copy(update={"foreign": {"code/pd.py": "f" * 64}})},
         {"code": CODE.model_copy(update={"foreign": {}})},
         {"environment": ENVIRONMENT.model_copy(update={"threads": {"OMP_NUM_THREADS": "2"}})},
         {"environment": ENVIRONMENT.model_copy(update={"packages": {"numpy": "2.1", "scipy": "1.15"}})},
