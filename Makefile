@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-rig test-statistics worlds clean venv mutants coverage installed
+	test-rig test-statistics converge worlds clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -75,6 +75,11 @@ installed: .venv/dev
 # A sweep over each kind of leaf beside a batch of as many gains, 6 min.
 bench-sweeps: .venv/run
 	$(BIN)/python benchmarks/sweeps.py
+
+# Drawn settings and the shipped comparisons at shorter integration steps: docs/convergence.md, some ten minutes; fails
+# where numbers change that are not marked.
+converge: .venv/run
+	$(BIN)/python docs/convergence.py
 
 bench-peers: .venv/run
 	$(BIN)/python benchmarks/peers/run.py --out results/$$(date -u +%Y%m%dT%H%M%SZ)-peers

@@ -44,7 +44,8 @@ class Loop(Section):
     control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
     substeps: int | None = choice(
         None,
-        "integration steps in a period; null: of 1 ms at most for elastic tendons (0.5 ms above 50 kN/m), else one",
+        "integration steps in a period; null: as many as its numbers take, of 1 ms at most for elastic tendons (0.5 ms "
+        "above 50 kN/m)",
         ge=1,
         le=1000,
     )
