@@ -161,7 +161,11 @@ def judged(study: Study, policy: Learnt) -> Measured:
     rmse = np.sqrt(np.mean((theta - wanted) ** 2, axis=1))
     left = oscillations(theta, wanted, np.arange(len(theta)), step)
     rests = np.ptp(wanted[:, -round(1.0 / step) :], axis=1) == 0.0
-    found = {"rmse": rmse[None], "oscillation": np.where(failed, np.nan, left)[None]}
+    found = {
+        "rmse": rmse[None],
+        "oscillation": np.where(failed, np.nan, left)[None],
+        "drift": np.zeros((1, len(cases))),
+    }
     return Measured(found, failed[None], np.ones((1, len(cases))), rests)
 
 

@@ -68,10 +68,9 @@ def rollout(
     what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
     ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
     (count,) are the entropies of the cameras' noise; all meet the same where none is given. Where another thread sets
-    `stop`, the outcome comes soon and is of no use. Where a loop's `substeps` are null and its integration step
-    turns out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`), unless
-    `converge` is false. Raises what
-    a plain law has raised; such rollouts run one by one.
+    `stop`, the outcome comes soon and is of no use. Where a loop's `substeps` are null and its integration step turns
+    out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`), unless `converge`
+    is false. Raises what a plain law has raised; such rollouts run one by one.
     """
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
@@ -94,7 +93,7 @@ def rollout(
                 numbers, motion = np.unique(own.motion, return_inverse=True)
                 followed, own = [motions[number] for number in numbers], own._replace(motion=motion)
             parts.append(_run(controller, gains[group], followed, there, own, start, record, threads, so_far, stop))
-        return Outcome.joined(parts, np.arange(len(rollouts)))
+        return parts[0] if len(parts) == 1 else Outcome.joined(parts, np.arange(len(rollouts)))
 
     outcome = run(everyone, 1, progress)
     if stop.is_set() or not converge:
