@@ -60,7 +60,7 @@ def chatter(variation: ArrayLike, tension_range: ArrayLike) -> Array:
     """How often tensions go from limit to limit and back [1/s], where that is faster than any wrist follows; else 0.
 
     `variation` [N/s] is that of both sides, the metric `chattering`. `tension_range` [N] is the wrist's, from
-    pretension to limit, also where a loop's tensions have no limit.
+    pretension to limit, also where a loop's tensions have no limit. What lies near: docs/chattering.md.
     """
     rate = np.asarray(variation, float) / (4.0 * np.asarray(tension_range, float))  # two sides, to and fro
     return np.where(rate > FASTEST, rate, 0.0)
