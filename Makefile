@@ -88,12 +88,14 @@ bench-peers: .venv/run
 bench-all: .venv/run
 	$(BIN)/python benchmarks/all.py
 
-# How accurate tendon loops are, what friction does to each law, and where presets come to rest: docs/accuracy.md,
-# docs/friction.md, docs/margins.md; fails where a preset swings.
+# How accurate tendon loops are, what friction does to each law, where presets come to rest, and how fast tensions cross
+# their range: docs/accuracy.md, docs/friction.md, docs/margins.md, docs/chattering.md; fails where a preset swings, or
+# where what is said to chatter is not far from all else.
 worlds: .venv/run
 	-$(BIN)/python docs/accuracy.py
 	$(BIN)/python docs/friction.py
 	$(BIN)/python docs/margins.py
+	$(BIN)/python docs/chattering.py
 
 # Every command killed, refused and interrupted at all points, crowds of processes, 20,000 runs, a run of every kind
 # repeated, other surroundings and processors.

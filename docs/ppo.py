@@ -160,13 +160,9 @@ def judged(study: Study, policy: Learnt) -> Measured:
     theta, wanted, step = np.array(courses).T, np.array(references).T, family.loop.control_period
     rmse = np.sqrt(np.mean((theta - wanted) ** 2, axis=1))
     left = oscillations(theta, wanted, np.arange(len(theta)), step)
-    rests = np.ptp(wanted[:, -round(1.0 / step) :], axis=1) == 0.0
-    found = {
-        "rmse": rmse[None],
-        "oscillation": np.where(failed, np.nan, left)[None],
-        "drift": np.zeros((1, len(cases))),
-    }
-    return Measured(found, failed[None], np.ones((1, len(cases))), rests)
+    nothing, rests = np.zeros((1, len(cases))), np.array([case.rests for case in cases])
+    found = {"rmse": rmse[None], "oscillation": np.where(failed, np.nan, left)[None], "drift": nothing}
+    return Measured(found, failed[None], nothing + 1.0, rests)
 
 
 class Row(NamedTuple):

@@ -126,6 +126,26 @@ def test_a_row_that_swings_in_one_of_three_repetitions_is_unreliable() -> None:
     assert found.standing.unreliable == [1] and found.standing.swings[1].times == 1 and found.swing[1] == 0.02
 
 
+@pytest.mark.parametrize("redrawn", [False, True])
+def test_a_row_that_chatters_in_one_cell_is_unreliable_and_counted_by_itself(redrawn: bool) -> None:
+    """Of eight motions in the last, or of twelve repetitions in the fourth."""
+    if redrawn:
+        rows = [
+            ComparedRow("a", "move 0", "none", label, "x", repeated(f"{label}/x", [1e-3] * 12)) for label in ("a", "b")
+        ]
+        chattering = np.where(np.arange(12) == 3, 232.0 * 100.0, 1.0)
+    else:
+        rows, chattering = compared("a/x", [1e-3] * 8) + compared("b/x", [1e-5] * 8), np.array([232.0 * 100.0])
+    once = rows[-1].repeated
+    slams = replace(once, metrics={**once.metrics, "chattering": chattering}, tension_range=58.0)
+    rows[-1] = replace(rows[-1], repeated=slams)
+    (found,) = stand(rows)
+    assert found.standing.unreliable == [1] and found.standing.swings[1].times == 1 and found.swing[1] == 0.0
+    assert found.chatter == pytest.approx([0.0, 100.0]) and found.unsound["chatters"].tolist() == [0, 1]
+    assert found.unsound["limit cycle"].tolist() == found.unsound["not converged"].tolist() == [0, 0]
+    assert standings_frame([found]).set_index("row")["chatter"].to_dict() == pytest.approx({"a/x": 0.0, "b/x": 100.0})
+
+
 def test_more_repetitions_than_motions_are_what_is_compared() -> None:
     """Two motions tell nothing; twelve repetitions of both do, each by the mean over the motions."""
     rng = np.random.default_rng(0)

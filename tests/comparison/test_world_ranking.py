@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
+from wristctl.comparison.class_standing import of_ranking
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.world_ranking import (
     RANKED,
@@ -21,6 +22,7 @@ from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.simulation.cases import Measured
 from wristctl.studies.compare import Compared
+from wristctl.studies.compare_answer import answer_lines
 from wristctl.studies.findings import Findings
 from wristctl.studies.rank import answer
 
@@ -62,7 +64,7 @@ def test_a_law_that_is_best_until_it_swings_is_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), swings=(7,)), row("calm/x", hard(2, 0.5)))
     assert found.rows[found.standing.groups[0][0]].label == "calm/x"
     assert found.standing.group(1) is None and found.standing.order[-1] == 1
-    assert "calm/x is best" in answer(found) and "wild/x (swings in 1 of 40)" in answer(found)
+    assert "calm/x is best" in answer(found) and "wild/x (swings or chatters in 1 of 40)" in answer(found)
 
 
 def test_a_law_that_fails_anywhere_is_kept_and_never_called_best() -> None:
@@ -75,7 +77,9 @@ def test_a_law_that_fails_anywhere_is_kept_and_never_called_best() -> None:
 
 def test_where_everything_swings_nothing_is_best() -> None:
     found = ranking("made-up", FAMILY, [row("feedforward/default", hard(), swings=(0,))], 0)
-    assert answer(found) == ("On made-up nothing can be relied on: every row fails or swings in some of 40 worlds.")
+    assert answer(found) == (
+        "On made-up nothing can be relied on: every row fails, swings or chatters in some of 40 worlds."
+    )
 
 
 SETTINGS = (
@@ -101,6 +105,22 @@ def test_in_real_loops_an_observer_beats_none_and_what_is_too_fast_swings_or_fai
         assert found.rows[0].rmse[world] == pytest.approx(np.exp(np.log(rmse).mean()), rel=1e-12)
     assert found.means[0].value == pytest.approx(np.exp(np.log(found.rows[0].rmse).mean()))
     assert sorted(zip(own["world"], own["motion"], strict=True)) == [(w, m) for w in range(10) for m in (0, 1)]
+
+
+def test_a_row_that_chatters_in_a_world_stands_with_those_that_swing_and_is_named_so() -> None:
+    """Wrists of 120 mm of all springs, three worlds."""
+    study = load_study([], [
+        "families={long: {draw: {plant.stiffness: x0.9..1.1}, references: [{duration: 0.5}], horizon: 2.6}}",
+        "wrist.length=0.12", "compare.worlds={family: long, draws: 3}",
+        "compare.rows=[{controller: super-twisting}, {controller: ct-dob, gains: stepper}]",
+    ])  # fmt: skip
+    (found,) = rank(study)
+    known = of_ranking(found)
+    slams, sound = known.labels.index("super-twisting/default"), known.labels.index("ct-dob/stepper")
+    assert found.rows[slams].swings.all() and not found.rows[sound].swings.any()
+    assert found.standing.fate(slams) == "unreliable" and 300.0 < known.chatter[slams] < 600.0
+    assert known.unsound["chatters"][[slams, sound]].tolist() == [3, 0] and known.chatter[sound] == 0.0
+    assert "chatters: super-twisting " in " ".join(" ".join(answer_lines([known])).split())
 
 
 def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> None:
@@ -172,8 +192,8 @@ def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() 
     rows = [row("feedforward/default", hard()), row("a/x", hard(1, 0.1), swings=(3,))]
     kept, gone = (ranking("made-up", FAMILY, rows, 0, tolerated) for tolerated in (0.01, 0.0))
     assert kept.standing.groups[0] == [1] and gone.standing.unreliable == [1]
-    assert "a/x (swings in 1: 2.5 % [0.063, 13]) is best" in answer(kept)
-    assert "Not to be relied on: a/x (swings in 1 of 40)" in answer(gone)
+    assert "a/x (swings or chatters in 1: 2.5 % [0.063, 13]) is best" in answer(kept)
+    assert "Not to be relied on: a/x (swings or chatters in 1 of 40)" in answer(gone)
     lines = {line["row"]: line for line in ranking_frame(kept).to_dict("records")}
     assert (lines["a/x"]["lost"], lines["a/x"]["fate"]) == (1 / 40, "ranked")
     assert lines["a/x"]["lost_low"] < 0.01 < lines["a/x"]["lost_high"]

@@ -19,6 +19,8 @@ from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.records import InputRun, Run, start_run
+from wristctl.records.manifest import OVERVIEW
+from wristctl.records.overview import Overview
 from wristctl.report.compare_figures import rmse_map, variation_dots
 from wristctl.report.comparison_page import several_page
 from wristctl.report.page import page
@@ -120,6 +122,15 @@ def test_a_browser_shows_the_page_without_an_error_or_a_request(
     assert browser.run("return document.documentElement.scrollWidth") <= width, "nothing but tables scrolls sideways"
     ground = browser.run("return getComputedStyle(document.body).backgroundColor")
     assert (max(map(int, re.findall(r"\d+", ground))) < 64) == dark
+
+
+@pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
+def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_path: Path, width: int) -> None:
+    with start_run("train", Study(), "", tmp_path, [], page=lambda path, man: page(Run(path), man)) as live:
+        live.file(OVERVIEW).write_text(Overview(["hardly moves, and why " * 20]).text())
+    browser.open(Run(live.path).file("report.html"), width, False)
+    wide = "const a = document.querySelector('#answer pre'); return a.scrollWidth - a.clientWidth"
+    assert browser.run(wide) <= 0
 
 
 def test_a_table_sorts_by_number_and_back(browser: Any, compared: Run) -> None:

@@ -84,8 +84,25 @@ def test_the_answer_begins_the_page_and_figures_follow_in_reading_order(tmp_path
     assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "alone"]
 
 
+def badge(run: Run) -> tuple[str, str]:
+    """Classes and words of the badge at the top of the page."""
+    ((classes, words),) = re.findall(r'<span class="(state.*?)">(.*?)</span>', page_of(run))
+    return classes, words
+
+
+def test_the_badge_is_the_verdict_and_ok_only_where_nothing_is_wrong(tmp_path: Path) -> None:
+    run = made(tmp_path, {"rmse": 1.0})
+    (run.path / OVERVIEW).write_text(Overview().text())
+    assert badge(run) == ("state ok", "ok")
+    (run.path / OVERVIEW).write_text(Overview(marks=["does not arrive", "chatters"]).text())
+    classes, words = badge(run)
+    assert "ok" not in classes.split() and words == "does not arrive, chatters"
+    run.manifest.state = "failed"
+    assert badge(run) == ("state failed", "failed"), "what was not done has no verdict"
+
+
 @pytest.mark.parametrize(
-    "content", ["", "[]", "{", '{"answer": 3, "captions": [1], "cards": {"a": 1}}', '{"answer": [1]}']
+    "content", ["", "[]", "{", '{"answer": 3, "captions": [1], "cards": {"a": 1}}', '{"answer": [1], "marks": [2]}']
 )
 def test_an_overview_that_cannot_be_read_costs_nothing(tmp_path: Path, content: str) -> None:
     run = made(tmp_path, {"rmse": 1.0})

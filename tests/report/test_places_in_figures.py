@@ -42,8 +42,8 @@ def stand(rows: list[ComparedRow]) -> ClassStanding:
 @pytest.mark.parametrize(
     ("moves", "expected"),
     [
-        (MOVES, ["best, or tied with it", "behind it", "fails or limit-cycles", "does not arrive", "not physical"]),
-        (3, ["too few to tell", "fails or limit-cycles", "does not arrive", "not physical"]),
+        (MOVES, ["best, or tied with it", "behind it", "fails, swings or chatters", "does not arrive", "not physical"]),
+        (3, ["too few to tell", "fails, swings or chatters", "does not arrive", "not physical"]),
     ],
 )
 def test_the_figure_of_the_answer_marks_each_row_by_what_becomes_of_it(moves: int, expected: list[str]) -> None:

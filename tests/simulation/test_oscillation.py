@@ -14,7 +14,16 @@ from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.closed_loop import simulate
-from wristctl.simulation.oscillation import LIMIT_CYCLE, hunting, oscillation, oscillation_frequency, oscillations
+from wristctl.simulation.oscillation import (
+    FASTEST,
+    LIMIT_CYCLE,
+    at_rest,
+    chatter,
+    hunting,
+    oscillation,
+    oscillation_frequency,
+    oscillations,
+)
 from wristctl.simulation.reference import motion
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.rollout import rollout
@@ -78,7 +87,46 @@ def test_only_what_is_left_at_rest_is_called_a_limit_cycle() -> None:
         for each in (still, turning)
     ]
     assert fates[0].startswith("LIMIT CYCLE: +-0.23 deg at 25 Hz")
-    assert fates[1].startswith("RIPPLE: +-0.") and "friction at the turns" in fates[1]
+    assert fates[1].startswith("RIPPLE: +-0.24 deg at 25 Hz")
+
+
+def marked(theta: Array, theta_ref: Array) -> Repeated:
+    done = course(theta, theta_ref)
+    return Repeated.once(Simulation(done, {"oscillation": oscillation(done)}, False, 5.0))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("time_constant", [0.05, 0.27, 0.5, 1.0, 3.0])
+def test_the_tail_of_a_move_of_any_time_constant_is_no_limit_cycle_and_a_swing_on_it_is(
+    time_constant: float, side: float
+) -> None:
+    """An error of 11 deg is left when the reference comes to rest, 2 s before the end."""
+    reference = side * 0.05 * np.minimum(TIME, 3.0)
+    tail = side * 0.2 * np.exp(-np.maximum(TIME - 3.0, 0.0) / time_constant)
+    slow = marked(reference + tail, reference)
+    assert slow.swing == 0.0 and "LIMIT CYCLE" not in slow.fate and "RIPPLE" not in slow.fate
+    for frequency in (2.0, 3.3, 5.0, 12.0, 20.0):
+        swinging = marked(reference + tail + side * 3e-3 * np.sin(2.0 * np.pi * frequency * TIME), reference)
+        assert swinging.swing == pytest.approx(3e-3, rel=0.15) and "limit cycle" in swinging.marks
+
+
+@pytest.mark.parametrize(("rest", "long"), [(1.0, False), (1.9, False), (2.0, True), (4.0, True)])
+def test_a_swing_is_a_limit_cycle_only_where_the_reference_has_rested_for_two_seconds(rest: float, long: bool) -> None:
+    reference = 0.1 * np.minimum(TIME, 5.0 - rest)
+    done = marked(reference + 4e-3 * np.sin(2.0 * np.pi * 5.0 * TIME), reference)
+    assert at_rest(done.first.trajectory) == long == (done.swing > 0.0) == ("limit cycle" in done.marks)
+    assert done.fate.startswith("LIMIT CYCLE" if long else "RIPPLE")
+    brief = course(np.zeros(1900), np.zeros(1900))
+    assert not at_rest(brief), "a course of 1.9 s"
+
+
+def test_feedforward_behind_a_tip_path_does_not_swing() -> None:
+    """It has no feedback; within the second after the path, what is left of the move looks like a swing."""
+    path = ["simulate.controller=feedforward", "simulate.gains=default",
+            "simulate.reference={kind: tip-path, inverse: closed-form}"]  # fmt: skip
+    short, longer = simulate(load_study([], path)), simulate(load_study([], [*path, "simulate.horizon=6"]))
+    assert short.metrics["oscillation"][0] > LIMIT_CYCLE and short.swing == 0.0 and short.marks == []
+    assert longer.metrics["oscillation"][0] < 0.1 * LIMIT_CYCLE and longer.fate == ""
 
 
 def test_what_was_before_the_last_second_does_not_count() -> None:
@@ -110,6 +158,53 @@ def test_hunting_is_what_a_long_hold_shows_and_one_second_cannot(period: float) 
     assert np.isnan(hunting(short)), "19 s of rest"
     lost = np.where(time < 60.0, moved, np.nan)
     assert np.isnan(hunting(replace(done, theta=lost)))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_hunting_is_looked_for_in_the_last_half_of_the_hold_and_not_of_the_course(side: float) -> None:
+    """The last move is at 25 of 60 s, and dies out within 7 s of it: after the middle of the course."""
+    time: Array = np.arange(60_000.0) * 1e-3
+    reference: Array = np.where(time >= 25.0, side * 0.5, 0.0)
+    settling = reference - side * 0.1 * np.exp(-np.maximum(time - 25.0, 0.0)) * (time >= 25.0)
+    nothing: Array = np.zeros(len(time))
+    done = replace(course(nothing, nothing), time=time, theta=settling, theta_ref=reference)
+    assert hunting(done) < 1e-6
+    slow = 2e-3 * np.sin(2.0 * np.pi * time / 8.0)
+    assert hunting(replace(done, theta=settling + slow)) == pytest.approx(2e-3, rel=0.2)
+
+
+def test_tensions_chatter_where_they_cross_their_range_faster_than_a_wrist_follows() -> None:
+    """Tensions of both sides that go between 2 and 60 N so many times a second."""
+    rates = np.array([0.0, 12.0, FASTEST, 38.0, 500.0, np.nan])
+    found = chatter(4.0 * 58.0 * rates, 58.0)
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.0, 38.0, 500.0, 0.0])
+    assert chatter([4.0 * 58.0 * 30.0] * 2, [58.0, 100.0]).tolist() == pytest.approx([30.0, 0.0]), "each wrist's own"
+
+
+@pytest.mark.parametrize(("often", "marks"), [(1, []), (2, ["chatters"]), (3, ["chatters"])])
+def test_of_several_repetitions_the_middle_one_says_whether_a_loop_chatters(often: int, marks: list[str]) -> None:
+    once, rates = marked(np.full(5000, 0.5), np.full(5000, 0.5)), np.where(np.arange(3) >= 3 - often, 300.0, 2.0)
+    metrics = {"oscillation": np.zeros(3), "chattering": 4.0 * 58.0 * rates}
+    done = replace(once, metrics=metrics, failed=np.zeros(3, bool), until=np.full(3, 5.0), tension_range=58.0)
+    assert done.marks == marks and done.chatter == (300.0 if marks else 0.0)
+    assert ("CHATTERS" in done.fate) == bool(marks) and ("300 times a second" in done.fate) == bool(marks)
+
+
+@pytest.mark.parametrize("law", ["super-twisting", "smc-tracking"])
+@pytest.mark.parametrize("direction", ["ulnar", "radial"])
+def test_laws_that_slam_the_tendons_of_a_longer_wrist_are_marked(law: str, direction: str) -> None:
+    row = [f"simulate.controller={law}", "simulate.gains=default", f"simulate.direction={direction}"]
+    longer = simulate(load_study([], [*row, "wrist.length=0.12"]))
+    assert 300.0 < longer.chatter < 500.0 and longer.marks == ["chatters"] and longer.swing == 0.0
+    assert simulate(load_study([], row)).marks == []
+    free = simulate(load_study([], [*row, "wrist.length=0.12", "simulate.loop.limits=false"]))
+    assert "chatters" in free.marks and free.chatter > longer.chatter, "a loop without limits goes by the wrist's"
+
+
+def test_what_chattered_by_its_integration_step_alone_does_not_chatter() -> None:
+    row = ["simulate.controller=ct-dob", "simulate.gains=stepper", "wrist.length=0.12"]
+    assert simulate(load_study([], row)).marks == []
+    assert simulate(load_study([], [*row, "simulate.loop.substeps=1"])).marks == ["chatters", "not converged"]
 
 
 def test_of_a_wrist_that_has_failed_or_had_no_second_it_is_not_known() -> None:

@@ -30,6 +30,8 @@ def stands(
     away: tuple[str, ...] = (),
     strained: tuple[str, ...] = (),
     motions: int = 12,
+    chatters: tuple[str, ...] = (),
+    unconverged: tuple[str, ...] = (),
 ) -> ClassStanding:
     """Rows on so many motions, each its RMSE times what all share."""
     errors = RMSE if rmse is None else rmse
@@ -40,11 +42,15 @@ def stands(
     swing = np.array([0.05 if label in swings else 0.0 for label in labels])
     peak = np.array([70.0 if label in strained else 0.0 for label in labels])
     short = np.array([motions if label in away else 0 for label in labels])
-    swinging = np.repeat(swing[:, None] > 0.0, motions, axis=1)
+    slams = np.array([300.0 if label in chatters else 0.0 for label in labels])
+    drifts = np.array([label in unconverged for label in labels])
+    holds = {"limit cycle": swing > 0.0, "chatters": slams > 0.0, "not converged": drifts}
+    swinging = np.repeat(np.any(list(holds.values()), axis=0)[:, None], motions, axis=1)
     return ClassStanding(
         name, f"{motions} motions", labels, ["a"], scores,
         standing(scores, swinging, 0, short=short > 0, unphysical=peak > 0.0),
-        [geometric_mean(each, 0) for each in penalised(scores)], swing, peak, short, motions,
+        [geometric_mean(each, 0) for each in penalised(scores)], swing, peak, short, motions, slams,
+        {name: motions * each for name, each in holds.items()},
     )  # fmt: skip
 
 
@@ -61,7 +67,7 @@ def test_the_paper_is_answered_by_name() -> None:
     """What becomes of printed gains in each class adds up to all classes."""
     said = " ".join(answer_lines([stands(away=("smc/printed",)), stands("pushed", swings=("pid/printed",))]))
     assert "smc does not arrive in 1, has a place in 1 of 2 classes" in said
-    assert "pid has a place in 1, fails or swings in 1" in said
+    assert "pid has a place in 1, fails, swings or chatters in 1" in said
     assert "the paper's order (least RMSE first: smc, mrac, pid, gvsc, nc) holds in 0 of 2 classes" in said
     order = dict(
         zip(("smc/tuned", "mrac/default", "pid/tuned", "gvsc/default", "nc/default"), (1, 2, 3, 4, 5), strict=True)
@@ -78,8 +84,17 @@ def test_limit_cycles_failures_and_short_ends_are_named_with_how_often() -> None
     assert "limit cycle: pid/printed +-2.9 deg; does not arrive: smc/printed; no tendon bears it: gvsc 70 N" in lost
     scores, swings = one.scores.copy(), np.zeros(one.scores.shape, bool)
     scores[4, :5], swings[4, 3:8] = np.inf, True
-    half = replace(one, scores=scores, standing=standing(scores, swings, 0), swing=np.full(11, 0.05))
+    counts = {"limit cycle": np.full(11, 3), "chatters": np.zeros(11, int), "not converged": np.zeros(11, int)}
+    half = replace(one, scores=scores, standing=standing(scores, swings, 0), swing=np.full(11, 0.05), unsound=counts)
     assert "fails: gvsc 5/12 (+-2.9 deg in 3/12)" in " ".join(answer_lines([half])), "each motion once"
+
+
+def test_rows_that_chatter_or_have_not_converged_stand_in_no_place_and_are_named_so() -> None:
+    one = stands(swings=("smc/printed",), chatters=("pid/printed", "smc/printed"), unconverged=("gvsc/default",))
+    said = " ".join(" ".join(answer_lines([one])).split())
+    assert "limit cycle: smc/printed +-2.9 deg (chatters 300/s in 12/12)" in said
+    assert "chatters: pid/printed 300/s; not converged: gvsc" in said and "+-0 deg" not in said
+    assert {one.standing.fate(one.labels.index(row)) for row in ("pid/printed", "gvsc/default")} == {"unreliable"}
 
 
 def test_rows_that_tie_are_joined() -> None:

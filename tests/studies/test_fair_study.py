@@ -153,6 +153,18 @@ def test_a_unit_that_fails_is_named_and_its_row_left_out(
     assert np.array_equal(rows["pid-ff/tuned"].rmse, before["pid-ff/tuned"].rmse)
 
 
+def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_motion(study: Study) -> None:
+    """Of the stored metrics alone: three worlds, the wrist's motions, three noises each."""
+    (unit,) = judge_unit.judge_units(study, "rig", "pd-ff", {"Kp": 4.0, "Kd": 0.2}, 3, 3)
+    pieces = judge_unit.judged(unit.spec)
+    still = {"oscillation": 0.0 * pieces["rmse"], "drift": 0.0 * pieces["rmse"], "chattering": 0.0 * pieces["rmse"]}
+    slams = {"chattering": still["chattering"].copy()}
+    slams["chattering"][1, -1, :2] = slams["chattering"][2, 0, 0] = 4.0 * 58.0 * 26.0
+    row = judge_unit.row_of("one", [pieces | still | slams], 58.0)
+    assert row.swings.tolist() == [False, True, False] and (row.measured.chatter > 0.0).sum() == 3
+    assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
+
+
 def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     gains = {"Kp": 4.0, "Kd": 0.2}
     (whole,) = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)
@@ -160,16 +172,18 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
     monkeypatch.setattr(judge_unit, "_ROLLOUTS", 12)
     parts = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)
     assert [each.spec["worlds"] for each in parts] == [3, 3, 3, 1]
-    rows = [judge_unit.row_of("one", [judge_unit.judged(each.spec) for each in units]) for units in ([whole], parts)]
+    rows = [
+        judge_unit.row_of("one", [judge_unit.judged(each.spec) for each in units], 58.0) for units in ([whole], parts)
+    ]
     assert np.array_equal(rows[0].rmse, rows[1].rmse) and np.array_equal(rows[0].swings, rows[1].swings)
-    first = judge_unit.row_of("one", [judge_unit.judged(whole.spec)], noises=1)
-    assert np.array_equal(first.rmse, judge_unit.row_of("one", [judge_unit.judged(single.spec)]).rmse), (
+    first = judge_unit.row_of("one", [judge_unit.judged(whole.spec)], 58.0, noises=1)
+    assert np.array_equal(first.rmse, judge_unit.row_of("one", [judge_unit.judged(single.spec)], 58.0).rmse), (
         "noise 0 is the same, alone or not"
     )
     assert not np.array_equal(first.rmse, rows[0].rmse)
     pieces = judge_unit.judged(whole.spec)
     for motion in range(pieces["rmse"].shape[1]):
-        alone = judge_unit.row_of("one", [pieces], [motion])
+        alone = judge_unit.row_of("one", [pieces], 58.0, [motion])
         assert alone.rmse == pytest.approx(np.exp(np.log(pieces["rmse"][:, motion]).mean(axis=1)))
         assert alone.measured.failed.shape == (1, 20)
 

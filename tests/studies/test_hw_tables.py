@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from wristctl.simulation.repetitions import Simulation
 from wristctl.studies import hw_tables
 from wristctl.studies.counting import watched
 from wristctl.studies.findings import Findings
+from wristctl.studies.hw_run import Performed
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.session import Session
 from wristctl.studies.unattended import Unattended
@@ -149,3 +151,21 @@ def test_one_row_of_controllers_needs_no_name_in_its_metrics(tmp_path: Path, ask
         during.setitem(globals(), "trials", lambda: alone)
         _, findings, _ = tables(tmp_path, "rows: [{controller: smc, gains: printed}]")
     assert {"rmse", "pushed_rmse", "pushed_recovery"} <= set(findings.metrics) and "recovery" not in findings.metrics
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("short", "fast"), [(0, 0), (1, 0), (0, 2), (2, 1)])
+def test_trials_that_do_not_arrive_or_chatter_are_the_verdict_on_the_run(short: int, fast: int, side: float) -> None:
+    """Of those that ended well; the stopped one is told by itself."""
+    table, ok = trials(), np.array([outcome == "ok" for *_, outcome in FACTS])
+    table["steady_state"], table["chattering"] = np.where(ok, 0.01, 9.0), np.where(ok, 100.0, 1e9)
+    last = np.flatnonzero(ok)[::-1]
+    table.loc[last[:short], "steady_state"] = 0.21 * np.radians(30.0)
+    table.loc[last[:fast], "chattering"] = 4.0 * 58.0 * 30.0
+    one = repeated("twin").first
+    course = replace(one.trajectory, theta_ref=side * one.trajectory.theta_ref)
+    study = wristctl.load_study(None)
+    twins = {number: replace(one, trajectory=course) for number in table["trial"]}
+    done = Performed(study, Findings(0), [], table, twins)
+    expected = {"does not arrive": short, "chatters": fast}
+    assert done.marks == [f"{mark}: {count} of 5 trials" for mark, count in expected.items() if count]

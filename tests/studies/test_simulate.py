@@ -20,6 +20,7 @@ from wristctl.simulation import closed_loop
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import COLUMNS
+from wristctl.studies import answer_lines
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.simulate import SIMULATE, Simulated
 
@@ -54,6 +55,25 @@ def test_of_one_rollout_every_metric_is_told(simulate: Simulate) -> None:
     assert known_of(done.findings, "rmse", "settling") == [("rad", "lower", 1), ("s", "lower", 1)]
     assert list(done.figures) == ["angle", "error", "tensions", "sliding", "motion"] and not done.failed
     np.testing.assert_array_equal(done.frame()["theta"], once.first.trajectory.theta)
+
+
+@pytest.mark.parametrize(
+    ("settings", "verdict"),
+    [
+        (["simulate.controller=feedforward"], "ok"),
+        (["simulate.controller=super-twisting", "wrist.length=0.12"], "chatters"),
+        (["simulate.controller=feedforward", "simulate.loop.plant.stiffness=x2"], "does not arrive"),
+    ],
+)
+def test_the_badge_of_a_loops_page_is_its_verdict(settings: list[str], verdict: str, tmp_path: Path) -> None:
+    base = ["simulate.gains=default", "simulate.horizon=2.5"]
+    done = wristctl.simulate(wristctl.load_study(None, *base, *settings), out=tmp_path)
+    assert done.run is not None and done.run.state == "ok" and done.run.manifest.exit_code == 0
+    text = done.run.file("report.html").read_text()
+    assert f">{verdict}</span>" in text and ('class="state ok"' in text) == (verdict == "ok")
+    assert (verdict in done.tables[0].title.lower()) == (verdict != "ok")
+    assert all(len(line) <= answer_lines.COLUMNS for line in done.summary), "no line is cut off at a page's edge"
+    assert bool(done.summary) == (verdict == "does not arrive")
 
 
 def test_of_repetitions_medians_are_told_with_their_interval(simulate: Simulate) -> None:

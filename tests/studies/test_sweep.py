@@ -13,6 +13,7 @@ import wristctl
 from wristctl.config.errors import UserError
 from wristctl.config.study import Study
 from wristctl.simulation import swept_loops
+from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.studies.simulate import Simulated
 
 FAST = (
@@ -129,7 +130,37 @@ def test_a_point_where_the_wrist_fails_is_told_and_stays_in_the_table() -> None:
     study = wristctl.load_study(None, *FAST, "simulate.gains={Kp: 5.0, Ki: 1.0, Kd: 0.1}", "simulate.horizon=1.0")
     done = wristctl.simulate(swept(study, "wrist.range_deg=31,50", "simulate.loop.plant.payload=0,3"))
     assert done.frame()["failed"].tolist() == [False, True, False, True]
-    assert "2 of 4 rollouts left their range" in str(done)
+    assert done.frame()["fate"].tolist() == ["", "failed", "", "failed"]
+    assert "2 of 4 rollouts: failed" in str(done) and done.marks == ["failed: 2 of 4"]
+
+
+def test_a_sweep_says_of_each_point_what_simulate_says_of_it() -> None:
+    """Loops that are sound, chatter, do not arrive, swing and do not converge, to either side."""
+    keys = {
+        "simulate.controller": ("super-twisting", "feedforward"),
+        "simulate.reference.angle_deg": ("-30", "30"),
+        "simulate.loop.control_period": ("0.001", "0.005"),
+        "simulate.loop.plant.stiffness": ("x1", "x2"),
+    }
+    base = ("simulate.controller=feedforward", "simulate.gains=default", "wrist.length=0.12", "simulate.horizon=3.0")
+    study = wristctl.load_study(None, *base)
+    done = wristctl.simulate(swept(study, *(f"{key}={','.join(values)}" for key, values in keys.items())))
+    seen = set()
+    for row in done.frame().to_dict("records"):
+        point = [f"{key}={row[key]}" for key in keys]
+        alone = wristctl.simulate(wristctl.load_study(None, *base, *point))
+        assert row["fate"] == ", ".join(alone.repeated.marks), point
+        seen.update(alone.repeated.marks)
+    assert {"chatters", "does not arrive", "limit cycle", "not converged"} <= seen and "" in set(done.frame()["fate"])
+    assert any(mark.startswith("chatters: ") for mark in done.marks) and "rollouts: chatters" in str(done)
+    assert "fate" in done.tables[0].columns
+
+
+def test_the_tail_of_a_move_is_no_limit_cycle_in_a_sweep_either() -> None:
+    path = "simulate.reference={kind: tip-path, inverse: closed-form}"
+    study = wristctl.load_study(None, "simulate.controller=feedforward", "simulate.gains=default", path)
+    table = wristctl.simulate(swept(study, "simulate.horizon=5,6")).frame()
+    assert table["oscillation"][0] > LIMIT_CYCLE and table["fate"].tolist() == ["", ""]
 
 
 def test_a_search_and_a_comparison_are_done_at_every_point() -> None:

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import wristctl
 import wristctl.tuning
 from tests.values import changeable
+from wristctl.arrays import Array
 from wristctl.config.control import Objective
 from wristctl.config.errors import UserError
 from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.seeds import stream
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.draws import Draws
 from wristctl.simulation.metrics import METRICS
-from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.simulation.oscillation import FASTEST, LIMIT_CYCLE
 from wristctl.simulation.reference import motion
 from wristctl.tuning.gains_file import read_gains, write_gains
-from wristctl.tuning.objective import Judge
+from wristctl.tuning.objective import Judge, marks_of
 from wristctl.tuning.search import (
     Search,
     Tried,
@@ -157,6 +162,50 @@ def test_cases_that_swing_cost_the_root_of_their_share() -> None:
         assert weighed(judge, swinging=1.0).value(measured)[0] == pytest.approx(still + cost)
         moving = replace(measured, rests=np.array([True, False, True, True]))
         assert judge.value(moving)[0] == pytest.approx(still)
+
+
+@pytest.mark.parametrize("times", [0, 1, 4])
+def test_cases_that_chatter_cost_as_those_that_swing(times: int) -> None:
+    """On a moving reference too; a case that does both costs once."""
+    rates = np.where(np.arange(4) >= 4 - times, 1.01, 0.99) * FASTEST
+    judge, measured = made_up((0, 1, 2, 3), rmse=[0.1] * 4, oscillation=[0.0] * 4, chattering=[*(232.0 * rates)])
+    still, slams = judge.value(measured)[0], replace(measured, tension_range=58.0, rests=np.zeros(4, bool))
+    judge = weighed(judge, swinging=1.0)
+    assert judge.value(slams)[0] == pytest.approx(still + np.sqrt(times / 4.0))
+    both = {"oscillation": 2.0 * LIMIT_CYCLE * (rates > FASTEST)[None]}
+    swings = replace(slams, metrics=slams.metrics | both, rests=np.ones(4, bool))
+    assert judge.value(swings)[0] == judge.value(slams)[0]
+
+
+def test_what_gains_do_on_the_cases_is_counted_by_mark() -> None:
+    """A law that chatters on a long wrist, on all of three cases; on a shorter one it does nothing of the kind."""
+    settings = ["loops={one: {}}", "horizon=2.5", "scenarios=[{loop: one, reference: {duration: 0.5}},"
+                " {loop: one, reference: {angle_deg: -20}}, {loop: one, reference: {kind: step}}]"]  # fmt: skip
+    law = controller("super-twisting")
+    gains = np.array(law.values(law.presets["default"]))
+    for length, marks in ((0.08, {}), (0.12, {"chatters": 3})):
+        study = load_study([], [*settings, f"wrist.length={length}"], "tune")
+        assert marks_of(law, gains, tuning_cases(study)[0], study.wrist) == marks
+
+
+def test_a_search_tells_of_which_controllers_the_best_gains_chatter_and_how_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judged = []
+
+    def counted(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters) -> dict[str, int]:
+        judged.append((law.name, dict(zip(law.gains, gains.tolist(), strict=True)), len(cases)))
+        return {"limit cycle": 1, "chatters": 2} if law.name == "pd-ff" else {}
+
+    monkeypatch.setattr("wristctl.tuning.objective.marks_of", counted)
+    small = ["tune.controllers=[pid-ff, pd-ff]", "tune.iterations=1", "tune.candidates=2"]
+    done = wristctl.tune(load_study([], [*small, *(f"tune.{each}" for each in SETTINGS[:1] + SETTINGS[3:])]))
+    assert done.lost == {"pid-ff": {}, "pd-ff": {"limit cycle": 1, "chatters": 2}}
+    assert judged == [(name, done.gains[name], 2) for name in ("pid-ff", "pd-ff")], "the best gains on all cases"
+    columns = done.tables[0].columns
+    fates = {row[0]: row[list(columns).index("fate")] for row in done.tables[0].rows}
+    assert fates == {"pid-ff": "", "pd-ff": "limit cycle in 1 of 2 cases, chatters in 2 of 2 cases"}
+    assert len(done.marks) == 1 and "pd-ff" in done.marks[0] and "chatters" in done.marks[0]
 
 
 def test_a_failure_costs_more_than_anything_and_the_more_the_earlier_it_is() -> None:

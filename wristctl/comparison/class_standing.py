@@ -26,7 +26,7 @@ from wristctl.comparison.tie_groups import Standing, standing
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.config.control import CompareSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest
+from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter
 from wristctl.simulation.repetitions import Repeated
 
 if TYPE_CHECKING:
@@ -63,6 +63,11 @@ class ClassStanding:
     """In how many motions each row stays within its range and does not arrive, (R,)."""
     motions: int
     """How many motions there are."""
+    chatter: Array
+    """How often a row's tensions go from limit to limit and back where it chatters, at most, (R,) [1/s]; else 0."""
+    unsound: dict[str, NDArray[np.int_]]
+    """In how many of the W each row, where it does not fail, is in a limit cycle, chatters, or has not converged, (R,)
+    each."""
     jumps: bool = False
     """Whether they are steps."""
 
@@ -107,17 +112,24 @@ def _standing(name: str, results: Sequence[ComparedRow], jumps: bool) -> ClassSt
     scores = np.exp([np.mean(row, axis=0) if redrawn else [each.mean() for each in row] for row in logs])
     ripples = [[_ripple(each) for each in row] for row in table]
     ripple = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in ripples])
+    tensions = [[_chatter(each) for each in row] for row in table]
+    slams = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in tensions])
     drift = [[each.metrics.get("drift", np.zeros(len(each.failed))) for each in row] for row in table]
     drifts = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in drift]) > 0.0
+    unsound: dict[str, NDArray[np.bool_]] = {
+        "limit cycle": ripple > 0.0,
+        "chatters": slams > 0.0,
+        "not converged": drifts,
+    }
     away = np.array([sum(not each.arrives and not each.failed.any() for each in row) for row in table])
     peak = np.array([max(each.beyond for each in row) for row in table])
     what = "repetition" if redrawn else "motion"
     return ClassStanding(
         name, f"{scores.shape[1]} {what}{'s' * (scores.shape[1] > 1)}", labels,
         list(dict.fromkeys(loop for loop, _ in cells)), scores,
-        standing(scores, (ripple > 0.0) | drifts, _STREAM, short=away > 0, unphysical=peak > 0.0),
+        standing(scores, np.any(list(unsound.values()), axis=0), _STREAM, short=away > 0, unphysical=peak > 0.0),
         [geometric_mean(each, _STREAM) for each in penalised(scores)],
-        ripple.max(axis=1), peak, away, len(cells), jumps,
+        ripple.max(axis=1), peak, away, len(cells), slams.max(axis=1), _counted(unsound, scores), jumps,
     )  # fmt: skip
 
 
@@ -133,14 +145,36 @@ def _ripple(repeated: Repeated) -> Array:
     return np.where((oscillation > LIMIT_CYCLE) & at_rest(repeated.first.trajectory), oscillation, 0.0)
 
 
+def _chatter(repeated: Repeated) -> Array:
+    """How often each repetition's tensions go from limit to limit and back, where it chatters [1/s]; else 0."""
+    return chatter(repeated.metrics.get("chattering", np.zeros(len(repeated.failed))), repeated.tension_range)
+
+
+def _counted(unsound: dict[str, NDArray[np.bool_]], scores: Array) -> dict[str, NDArray[np.int_]]:
+    """Of what holds (R, W) how often it does where a row does not fail, (R,)."""
+    return {name: (holds & np.isfinite(scores)).sum(axis=1) for name, holds in unsound.items()}
+
+
 def of_ranking(found: WorldRanking) -> ClassStanding:
     """The same of a ranking over worlds."""
-    swings = [row.measured.metrics["oscillation"] * row.measured.swings for row in found.rows]
-    none = np.zeros(len(found.rows))
+    every, none = [row.measured for row in found.rows], np.zeros(len(found.rows))
+    swings, slams = (
+        [each.metrics["oscillation"] * each.limit_cycles for each in every],
+        [each.chatter for each in every],
+    )
+    cases = {
+        "limit cycle": [each.limit_cycles for each in every],
+        "chatters": [each > 0.0 for each in slams],
+        "not converged": [each.unconverged for each in every],
+    }
+    shape = len(every), found.worlds, -1
+    worlds = {name: np.asarray(np.reshape(each, shape).any(axis=2)) for name, each in cases.items()}
+    scores = np.array([row.rmse for row in found.rows])
     return ClassStanding(
         found.name, f"{found.worlds} worlds", [row.label for row in found.rows], [],
-        np.array([row.rmse for row in found.rows]), found.standing, found.means,
-        np.array([np.nanmax(each, initial=0.0) for each in swings]), none, none.astype(int), found.motions, found.jumps,
+        scores, found.standing, found.means, np.array([np.nanmax(each, initial=0.0) for each in swings]),
+        none, none.astype(int), found.motions, np.array([each.max(initial=0.0) for each in slams]),
+        _counted(worlds, scores), found.jumps,
     )  # fmt: skip
 
 
@@ -170,6 +204,7 @@ def standings_frame(found: Sequence[ClassStanding]) -> pd.DataFrame:
                     "motions": each.motions,
                     "does_not_arrive": int(each.away[row]),
                     "swing": each.swing[row],
+                    "chatter": each.chatter[row],
                     "peak": each.peak[row],
                 }
             )

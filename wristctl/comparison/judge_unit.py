@@ -14,7 +14,7 @@ from wristctl.config.study import Study
 from wristctl.control.table import controller
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
 from wristctl.work.unit import Unit
 
 _ROLLOUTS = 8_000
@@ -71,13 +71,15 @@ def judged(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 def row_of(
     label: str,
     pieces: Sequence[Mapping[str, np.ndarray]],
+    tension_range: float,
     motions: Sequence[int] | None = None,
     noises: int | None = None,
 ) -> RankedRow:
     """A row of a ranking from its ranges of worlds in order; of these motions and so many of the noises, or of all.
 
-    It swings in a world where it does in the middle one of its noises, on any motion that rests, or where a motion
-    depends on the integration step however short.
+    It swings in a world where it does in the middle one of its noises, on any motion that rests, where it chatters on
+    any in the middle one, or where a motion depends on the integration step however short. `tension_range` is the
+    wrist's, from pretension to limit [N].
     """
     chosen = slice(None) if motions is None else list(motions)
     whole = {name: np.concatenate([each[name] for each in pieces])[:, chosen, :noises] for name in pieces[0]}
@@ -85,7 +87,9 @@ def row_of(
     rmse = np.where(failed, np.inf, whole["rmse"])
     scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))
     left = np.median(np.where(np.isnan(whole["oscillation"]), 0.0, whole["oscillation"]), axis=2)
-    swings = ((left > LIMIT_CYCLE) & whole["rests"][:, :, 0]).any(axis=1) | (whole["drift"] > 0.0).any(axis=(1, 2))
+    chatters = chatter(np.median(whole["chattering"], axis=2), tension_range) > 0.0
+    unsound = ((left > LIMIT_CYCLE) & whole["rests"][:, :, 0]) | chatters | (whole["drift"] > 0.0).any(axis=2)
     metrics = {name: whole[name].reshape(1, -1) for name in RANKED}
-    measured = Measured(metrics, failed.reshape(1, -1), whole["lasted"].reshape(1, -1), whole["rests"].ravel())
-    return RankedRow(label, scores, swings, measured)
+    lasted, rests = whole["lasted"].reshape(1, -1), whole["rests"].ravel()
+    measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range)
+    return RankedRow(label, scores, unsound.any(axis=1), measured)

@@ -1,4 +1,4 @@
-"""Shares of worlds: how often a law fails or swings, and how often it is how near to the best."""
+"""Shares of worlds: how often a law fails, swings or chatters, and how often it is how near to the best."""
 
 from __future__ import annotations
 

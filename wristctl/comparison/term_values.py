@@ -21,7 +21,7 @@ class TermValue(NamedTuple):
     given: str
     times: GeometricMean
     swings: tuple[int, int]
-    """In how many worlds each of the two fails or swings."""
+    """In how many worlds each of the two fails, swings or chatters."""
 
     @property
     def told(self) -> str:

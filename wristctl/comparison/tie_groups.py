@@ -29,13 +29,13 @@ class Standing(NamedTuple):
     short: list[int]
     """Rows that stay within their range and do not arrive, from best to worst."""
     unreliable: list[int]
-    """Rows that are shown to fail or swing in more than the tolerated share of worlds, the rarest first."""
+    """Rows that are shown to fail, swing or chatter in more than the tolerated share of worlds, the rarest first."""
     lost: list[Share]
-    """Worlds in which each row fails or swings."""
+    """Worlds in which each row fails, swings or chatters."""
     failures: list[Share]
     """Of each row."""
     swings: list[Share]
-    """Of each row, where it does not fail."""
+    """Of each row, where it does not fail: those in which it swings, chatters or has not converged."""
     floor: float
     """The smallest ratio of scores that the ranked rows are told apart by as a rule; nan for fewer than two."""
 
@@ -71,10 +71,10 @@ def standing(
 ) -> Standing:
     """Order rows of positive scores (R, W) over the same worlds, less being better.
 
-    A row fails where its score is inf or nan and is in a limit cycle where `swings` (R, W). It is unreliable, however
-    good its scores, where its share of such worlds is shown to exceed the `tolerated` one: where the 95 % interval of
-    that share lies above it. Else a failure counts as the score `failure`. What is below `floor` is equal. Rows (R,)
-    that are `short` or `unphysical` are not ranked either.
+    A row fails where its score is inf or nan, and swings, chatters or has not converged where `swings` (R, W). It is
+    unreliable, however good its scores, where its share of such worlds is shown to exceed the `tolerated` one: where
+    the 95 % interval of that share lies above it. Else a failure counts as the score `failure`. What is below `floor`
+    is equal. Rows (R,) that are `short` or `unphysical` are not ranked either.
 
     Two rows or more of fewer worlds than LEAST_PAIRS are not told apart, nor called a tie.
     """

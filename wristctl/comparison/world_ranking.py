@@ -52,7 +52,7 @@ class RankedRow(NamedTuple):
     rmse: Array
     """Geometric mean over the motions [rad]; inf where one failed."""
     swings: NDArray[np.bool_]
-    """Whether it swings by more than 0.1 deg where any motion rests."""
+    """Whether on any motion it swings by more than 0.1 deg at rest, chatters, or depends on the integration step."""
     measured: Measured
 
 
@@ -142,7 +142,7 @@ def ranking(
     tolerated: float = 0.0,
     steps: bool | None = None,
 ) -> WorldRanking:
-    """The ranking of rows that were measured on the same worlds, of which each may fail or swing in a share.
+    """The ranking of rows that were measured on the same worlds, of which each may fail, swing or chatter in a share.
 
     They were on those motions of the family that are steps, where `steps`, or on its others; of a family of one kind
     that need not be said.

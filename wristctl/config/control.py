@@ -49,7 +49,7 @@ class Objective(OpenSection):
     chattering: float = choice(0.02, "weight of the total variation of tension per second", ge=0)
     worst: float = choice(0.0, "weight of the worst case's terms, beside the mean's 1", ge=0)
     swinging: float = choice(
-        0.5, "times the root of the share of cases that swing by more than 0.1 deg [decades]", ge=0
+        0.5, "times the root of the share of cases that swing by more than 0.1 deg, or chatter [decades]", ge=0
     )
 
     def added(self) -> Mapping[str, Parameter]:

@@ -51,7 +51,7 @@ class FairStudySettings(Section):
     objective: Objective = Objective()
     tolerated: float = choice(
         0.01,
-        "share of the worlds in which a row may fail or swing; shown to do so in more, it is not recommended",
+        "share of the worlds in which a row may fail, swing or chatter; shown to do so in more, it is not recommended",
         ge=0,
         lt=1,
     )

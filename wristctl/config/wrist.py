@@ -40,6 +40,11 @@ class WristParameters(Section):
         return self
 
     @property
+    def tension_range(self) -> float:
+        """From pretension to the largest tension of a tendon [N]."""
+        return self.tension_limit - self.pretension
+
+    @property
     def tendon_offset(self) -> float:
         """Distance c of a pair's tendons from the neutral line, r / sqrt(2) [m]."""
         return self.tendon_radius / math.sqrt(2.0)

@@ -22,6 +22,8 @@ class Overview:
     """Names of metrics."""
     captions: dict[str, str] = field(default_factory=dict)
     """What each figure shows, by its name and in reading order; also of those that were not drawn."""
+    marks: list[str] = field(default_factory=list)
+    """Why a run that was done is no good, in a word or two each; empty where it is sound."""
 
     def text(self) -> str:
         """As the file holds it."""
@@ -37,12 +39,13 @@ def read_overview(folder: Path) -> Overview:
         found = {}
     if not isinstance(found, dict):
         return Overview()
-    answer, cards, captions = (found.get(name) for name in ("answer", "cards", "captions"))
+    answer, cards, captions, marks = (found.get(name) for name in ("answer", "cards", "captions", "marks"))
     return Overview(
         _texts(answer),
         found["figure"] if isinstance(found.get("figure"), str) else "",
         _texts(cards),
         {name: text for name, text in captions.items() if isinstance(text, str)} if isinstance(captions, dict) else {},
+        _texts(marks),
     )
 
 

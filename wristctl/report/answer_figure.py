@@ -34,7 +34,7 @@ _MARKS: dict[str, dict[str, Any]] = {
     "not physical": {"marker": "^", "color": GREY, "markersize": 5.5},
 }
 """By what becomes of a row."""
-_SHOWN = {"ranked": "behind it", "unreliable": "fails or limit-cycles"}
+_SHOWN = {"ranked": "behind it", "unreliable": "fails, swings or chatters"}
 
 
 def answer_figure(found: Sequence[ClassStanding]) -> Figure:

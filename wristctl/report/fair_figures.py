@@ -110,7 +110,7 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
 def pareto(found: WorldRanking) -> Figure:
     """RMSE beside what it costs in tension and in work: a line joins the rows that no other beats in both.
 
-    Rows that fail or swing too often, hollow, are left out where they lie far off.
+    Rows that fail, swing or chatter too often, hollow, are left out where they lie far off.
     """
     made, ((left, right),) = figure(1, 2, height=4.6, sharey=True)
     rmse = np.degrees([each.value for each in found.means])
@@ -118,7 +118,7 @@ def pareto(found: WorldRanking) -> Figure:
         _front(axes, medians(found, metric), rmse, found)
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
-    made.suptitle(f"{found.name}: error and its price; hollow rows fail or swing", fontsize=10.0)
+    made.suptitle(f"{found.name}: error and its price; hollow rows fail, swing or chatter", fontsize=10.0)
     legend_below(made, 4)
     return made
 

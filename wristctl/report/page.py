@@ -46,6 +46,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         heading=run.id,
         manifest=manifest,
         command=command_of(manifest.kind),
+        verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
         answer=overview.answer,
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),

@@ -47,7 +47,7 @@ def ranking_intervals(found: WorldRanking) -> Figure:
 def _why(found: WorldRanking, at: int) -> str:
     """Why a row has no place."""
     fate = found.standing.fate(at)
-    return "fails or swings" if fate == "unreliable" else fate
+    return "fails, swings or chatters" if fate == "unreliable" else fate
 
 
 def world_profiles(found: WorldRanking) -> Figure:

@@ -5,6 +5,7 @@ A case is a world with a motion and its noise. Whatever is tried meets the same 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -22,7 +23,7 @@ from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.energy import energy
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.oscillation import LIMIT_CYCLE, WINDOW, oscillations
+from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter, oscillations
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.rollout import How, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
@@ -48,9 +49,9 @@ class Case(NamedTuple):
     def rests(self) -> bool:
         """Whether the reference rests long enough to settle and then to show a swing.
 
-        On a moving one friction's kinks look like swings.
+        On a moving one friction's kinks and the move's tail look like swings.
         """
-        return self.motion.rest <= self.motion.horizon - 2.0 * WINDOW
+        return self.motion.rest <= self.motion.horizon - REST
 
 
 @dataclass(frozen=True)
@@ -63,18 +64,38 @@ class Measured:
     """Share of the horizon that each stayed in its range."""
     rests: NDArray[np.bool_]
     """Of each case, (C,)."""
+    tension_range: float = math.inf
+    """The wrist's, from pretension to limit [N]; inf: whether it chatters is not known."""
+
+    @property
+    def limit_cycles(self) -> NDArray[np.bool_]:
+        """Where the reference rests and the wrist does not, (P, C)."""
+        found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
+        return found
+
+    @property
+    def chatter(self) -> Array:
+        """How often tensions go from limit to limit and back, where it chatters, else 0, (P, C) [1/s]."""
+        if math.isinf(self.tension_range):
+            return np.zeros(self.failed.shape)
+        return chatter(self.metrics["chattering"], self.tension_range)
+
+    @property
+    def unconverged(self) -> NDArray[np.bool_]:
+        """Where the motion depends on the integration step, (P, C)."""
+        found: NDArray[np.bool_] = self.metrics["drift"] > 0.0
+        return found
 
     @property
     def swings(self) -> NDArray[np.bool_]:
-        """Where the reference rests and the wrist does not, or its motion depends on the integration step, (P, C)."""
-        found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
-        return found | (self.metrics["drift"] > 0.0)
+        """Where any of these holds, and nobody can rely on the rest, (P, C)."""
+        return self.limit_cycles | (self.chatter > 0.0) | self.unconverged
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
         """The same of cases that are some of the motions of their world, which are so many."""
         own = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
         metrics = {name: values[:, own] for name, values in self.metrics.items()}
-        return Measured(metrics, self.failed[:, own], self.lasted[:, own], self.rests[own])
+        return Measured(metrics, self.failed[:, own], self.lasted[:, own], self.rests[own], self.tension_range)
 
 
 def measure(
@@ -88,9 +109,9 @@ def measure(
 ) -> Measured:
     """Run gains (P, g) of a law on all the cases; with `converge` at integration steps that are short enough.
 
-    `drift` is always among the metrics.
+    `chattering` and `drift` are always among the metrics.
     """
-    shape, metrics = (len(gains), len(cases)), list(dict.fromkeys([*metrics, "drift"]))
+    shape, metrics = (len(gains), len(cases)), list(dict.fromkeys([*metrics, "chattering", "drift"]))
     found = {name: np.empty(shape) for name in metrics}
     failed, lasted = np.empty(shape, bool), np.empty(shape)
     done = 0
@@ -107,7 +128,8 @@ def measure(
             done += len(rows) * len(there)
             if progress is not None:
                 progress(done / failed.size)
-    return Measured(found, failed, np.clip(lasted, 0.0, 1.0), np.array([case.rests for case in cases]))
+    rests, lasted = np.array([case.rests for case in cases]), np.clip(lasted, 0.0, 1.0)
+    return Measured(found, failed, lasted, rests, wrist.tension_range)
 
 
 def _recorded(metrics: Sequence[str]) -> How:

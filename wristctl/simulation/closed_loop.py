@@ -75,7 +75,7 @@ def repeat(
             plant = plant_of(wrist, loops[k].plant)
             row = lane % rows
             found[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
-    return [each.repeated(wrist.tension_limit) for each in found]
+    return [each.repeated(wrist) for each in found]
 
 
 def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:

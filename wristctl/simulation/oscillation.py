@@ -1,4 +1,4 @@
-"""Does a loop come to rest, or does it swing or hunt: what is left where the reference rests, and how fast it moves.
+"""Does a loop come to rest, or does it swing, hunt or chatter: what is left at rest, and what its tensions do.
 
 Half the peak-to-peak of the angle over the last second, its trend removed. Of a reference that never rests it is the
 error's, over the last second or the last two of its periods, with all up to four times its frequency removed.
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
 from wristctl.simulation.trajectory import Trajectory
@@ -20,6 +20,10 @@ LIMIT_CYCLE = np.deg2rad(0.1)
 """Half peak-to-peak [rad] above which a loop is said to swing."""
 WINDOW = 1.0
 """[s]"""
+REST = 2.0 * WINDOW
+"""Rest [s] from which a swing is the loop's own: one to settle, in which a move's tail dies out, and one to look at."""
+FASTEST = 25.0
+"""No wrist follows what is faster [1/s]."""
 LONG_HOLD = 20.0
 """Rest [s] that shows whether a loop hunts."""
 _HARMONICS = 4.0
@@ -27,8 +31,8 @@ _STILL = 1e-9
 """[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
 _FIRST = np.zeros(1, np.int64)
-_ENOUGH = 0.02
-"""Between samples that show how fast a reference goes [s]: no wrist follows 25 Hz."""
+_ENOUGH = 0.5 / FASTEST
+"""Between samples that show how fast a reference goes [s]."""
 
 
 def oscillation(course: Trajectory) -> float:
@@ -47,8 +51,19 @@ def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step
 
 
 def at_rest(course: Trajectory) -> bool:
-    """Whether the reference rests over the last second, so that what is left there is a swing of the loop's own."""
-    return bool(np.ptp(course.theta_ref[-round(WINDOW / _step(course)) :]) == 0.0)
+    """Whether the reference rests for the last 2 s, so that what is left at the end is a swing of the loop's own."""
+    samples = round(REST / _step(course))
+    return len(course.theta_ref) >= samples and bool(np.ptp(course.theta_ref[-samples:]) == 0.0)
+
+
+def chatter(variation: ArrayLike, tension_range: ArrayLike) -> Array:
+    """How often tensions go from limit to limit and back [1/s], where that is faster than any wrist follows; else 0.
+
+    `variation` [N/s] is that of both sides, the metric `chattering`. `tension_range` [N] is the wrist's, from
+    pretension to limit, also where a loop's tensions have no limit. What lies near: docs/chattering.md.
+    """
+    rate = np.asarray(variation, float) / (4.0 * np.asarray(tension_range, float))  # two sides, to and fro
+    return np.where(rate > FASTEST, rate, 0.0)
 
 
 def hunting(course: Trajectory) -> float:

@@ -9,10 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
 from wristctl.simulation.arrival import arrives
-from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, oscillation_frequency
+from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter, oscillation_frequency
 from wristctl.simulation.trajectory import Trajectory
 
+MARKS = ("failed", "does not arrive", "limit cycle", "chatters", "not physical", "not converged")
+"""Why a loop is no good."""
+STRAIN = 1.01
+"""Times its limit that a tension may be: what a spool's steps and a swing of the wrist may add."""
 _DRAWN = 64
 """Repetitions of which the errors are kept."""
 
@@ -42,6 +47,8 @@ class Repeated:
     """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
     bears: float = math.inf
     """Largest tension that a tendon bears [N]."""
+    tension_range: float = math.inf
+    """That less the least one [N]."""
 
     @classmethod
     def once(cls, done: Simulation) -> Repeated:
@@ -59,18 +66,23 @@ class Repeated:
 
     @property
     def fate(self) -> str:
-        """In words what became of it: failed, short, swings, ripples, pulls harder than tendons can; else empty."""
+        """In words why it is no good, or may be: its marks with their numbers, and ripples; else empty."""
         return "; ".join(each for each in (self._end, self._strain, self._accuracy) if each)
 
     @property
-    def beyond(self) -> float:
-        """Largest tension, where it is above what a tendon bears, else 0 [N].
+    def marks(self) -> list[str]:
+        """Why it is no good, in a word or two each; empty where it is sound."""
+        if self.failure:
+            return [MARKS[0]]
+        holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
+        return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
 
-        1 % more is what a spool's steps and a swing of the wrist may add to the limit.
-        """
+    @property
+    def beyond(self) -> float:
+        """Largest tension, where it is above what a tendon bears, else 0 [N]."""
         known = self.metrics.get("peak_tension", np.empty(0))
         most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
-        return most if most > 1.01 * self.bears else 0.0
+        return most if most > STRAIN * self.bears else 0.0
 
     @property
     def swing(self) -> float:
@@ -79,10 +91,17 @@ class Repeated:
 
     @property
     def _ripple(self) -> float:
-        """The same also where the reference turns, and friction's kinks look like swings."""
+        """The same also where the reference has not rested, and a move's tail or friction looks like a swing."""
         known = self.metrics.get("oscillation", np.empty(0))
         ripple = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
         return ripple if ripple > LIMIT_CYCLE else 0.0
+
+    @property
+    def chatter(self) -> float:
+        """How often tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
+        known = self.metrics.get("chattering", np.empty(0))
+        variation = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        return float(chatter(variation, self.tension_range))
 
     @property
     def drift(self) -> float:
@@ -113,8 +132,10 @@ class Repeated:
         short = [] if self.arrives else ["DOES NOT ARRIVE"]
         if self._ripple > 0.0:
             found = f"+-{np.degrees(self._ripple):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
-            turning = f"RIPPLE: {found} (a swing, or friction at the turns)"
+            turning = f"RIPPLE: {found} (a swing, friction, or the move's tail)"
             short.append(f"LIMIT CYCLE: {found}" if self.swing > 0.0 else turning)
+        if self.chatter > 0.0:
+            short.append(f"CHATTERS: tensions go from limit to limit and back {self.chatter:.0f} times a second")
         return "; ".join(short)
 
     def labelled(self, label: str) -> Repeated:
@@ -142,9 +163,10 @@ class Gathered:
         if len(self._errors) < _DRAWN:
             self._errors.append(done.trajectory.error)
 
-    def repeated(self, bears: float) -> Repeated:
-        """All of them; `bears` is the largest tension that a tendon bears [N]."""
+    def repeated(self, wrist: WristParameters) -> Repeated:
+        """All of them; `wrist` says what its tendons bear."""
         assert self._first is not None
         metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
         failed, until = np.array(self._failed), np.array(self._until)
-        return Repeated(self._first, metrics, failed, until, np.array(self._errors), bears)
+        errors, tensions = np.array(self._errors), (wrist.tension_limit, wrist.tension_range)
+        return Repeated(self._first, metrics, failed, until, errors, *tensions)

@@ -16,14 +16,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
 from wristctl.seeds import Entropy
+from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.cases import AT_ONCE, at_most, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion, toward
+from wristctl.simulation.repetitions import MARKS, STRAIN
 from wristctl.simulation.rollout import rollout, structure
 from wristctl.simulation.worlds import loop_facing, loops_of
 
@@ -125,6 +128,28 @@ def _run(chosen: Sequence[SweptLoop]) -> tuple[Outcome, NDArray[np.int64], float
         record="briefly",
     )  # fmt: skip
     return outcome, which, float(first.motion.time[1])
+
+
+def fates(loops: Sequence[SweptLoop], found: SweptMetrics) -> list[str]:
+    """The marks of each loop, with commas; empty where it is sound. Where its reference never rests it may be short."""
+    metrics, wrists = found.metrics, [each.wrist for each in loops]
+    goals = [each.motion.goals for each in loops]
+    rests = np.array([each.rest <= 0.9 * each.horizon for each in goals])
+    long = np.array([each.rest <= each.horizon - REST for each in goals])
+    moves = np.array([np.abs(each.motion.theta_ref).max() for each in loops])
+    limits = np.array([each.tension_limit for each in wrists])
+    holds = (
+        found.failed,
+        rests & (metrics["steady_state"] > SHORT * moves),
+        long & (metrics["oscillation"] > LIMIT_CYCLE),
+        chatter(metrics["chattering"], [each.tension_range for each in wrists]) > 0.0,
+        metrics["peak_tension"] > STRAIN * limits,
+        metrics["drift"] > 0.0,
+    )
+    return [
+        MARKS[0] if failed else ", ".join(mark for mark, one in zip(MARKS[1:], others, strict=True) if one)
+        for failed, *others in zip(*holds, strict=True)
+    ]
 
 
 def _judged(names: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> SweptMetrics:

@@ -66,8 +66,8 @@ class Compared(StudyResult):
         """That nothing in a ranking can be relied on."""
         if any(len(found.standing.unreliable) < len(found.rows) for found in self.rankings) or not self.rankings:
             return None
-        where = str(self.findings.run.path) if self.findings.run else ""
-        return UserError("every row fails or swings in some world", where, "other gains, or milder worlds", exit_code=3)
+        what, where = "every row fails, swings or chatters in some world", self.findings.run
+        return UserError(what, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
 
     @property
     def answer(self) -> list[str]:

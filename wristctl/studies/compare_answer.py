@@ -37,7 +37,7 @@ def answer_lines(found: Sequence[ClassStanding]) -> list[str]:
     names, rest = _names(found), deg(LIMIT_CYCLE)
     head = [
         "RMSE [deg], geometric mean [95 % interval], best first; = not told apart from the best of its place;",
-        f"no place: fails, limit-cycles (> {rest} deg at rest), is short, not physical; without n/m: in all",
+        f"no place: fails, limit-cycles (> {rest} deg at rest), chatters, is short, not physical; no n/m: in all",
     ]
     end = [*wrapped(_printed(found), 2), *wrapped(_papers_places(found, names), 2), *wrapped(_papers_order(found), 1)]
     end.append(_WHERE)
@@ -116,15 +116,16 @@ def _lost(each: ClassStanding, names: dict[str, str]) -> list[str]:
     def among(times: int, count: int) -> str:
         return "" if times == count else f" {times}/{count}"
 
-    unreliable: dict[str, list[str]] = {"fails": [], "limit cycle": []}
+    unreliable: dict[str, list[str]] = {"fails": [], **{kind: [] for kind in each.unsound}}
     for row in stands.unreliable:
-        fails, swings = stands.failures[row], stands.swings[row]
-        also = f" (+-{deg(each.swing[row])} deg in {swings.times}/{swings.n})" if swings.times else ""
-        if fails.times:
-            unreliable["fails"].append(f"{called[row]}{among(fails.times, fails.n)}{also}")
-        else:
-            told = f"{called[row]} +-{deg(each.swing[row])} deg{among(swings.times, swings.n)}"
-            unreliable["limit cycle"].append(told)
+        sizes = {"limit cycle": f" +-{deg(each.swing[row])} deg", "chatters": f" {two(each.chatter[row])}/s"}
+        n, times = stands.lost[row].n, {"fails": stands.failures[row].times}
+        times |= {kind: int(counts[row]) for kind, counts in each.unsound.items()}
+        first, *others = [kind for kind, count in times.items() if count]
+        shown = {kind: f"{kind}{sizes.get(kind, '')}".removeprefix("limit cycle ") for kind in others}
+        also = ", ".join(f"{what} in {times[kind]}/{n}" for kind, what in shown.items())
+        told = f"{called[row]}{sizes.get(first, '')}{among(times[first], n)}"
+        unreliable[first].append(told + f" ({also})" * bool(also))
     kinds = unreliable | {
         "does not arrive": [f"{called[row]}{among(int(each.away[row]), motions)}" for row in stands.short],
         "no tendon bears it": [f"{called[row]} {each.peak[row]:.2g} N" for row in stands.unphysical],
@@ -159,7 +160,7 @@ def _printed(found: Sequence[ClassStanding]) -> list[str]:
     said: list[str] = []
     for label in dict.fromkeys(label for each in found for label in each.labels if label.endswith(f"/{PRINTED}")):
         own = [each.standing.fate(each.labels.index(label)) for each in found if label in each.labels]
-        words = {"unreliable": "fails or swings", "ranked": "has a place"}
+        words = {"unreliable": "fails, swings or chatters", "ranked": "has a place"}
         kinds = [f"{words.get(fate, fate)} in {times}" for fate, times in Counter(own).items()]
         begin, classes = ("", "") if said else ("printed gains: ", f" of {len(own)} classes")
         said.append(f"{begin}{label.split('/')[0]} {', '.join(kinds)}{classes}")

@@ -30,7 +30,7 @@ def answer(
     if names:
         said.append(
             "What a term buys: RMSE without it over RMSE with it, above 1 the better; undecided where the interval "
-            "holds 1; lost are the worlds in which the law fails or swings, without -> with it."
+            "holds 1; lost are the worlds in which the law fails, swings or chatters, without -> with it."
         )
     said += [_term(name, [value for value in terms if value.term == name]) for name in names]
     said += [_shift(each, varied) for each in shifts]
@@ -92,7 +92,7 @@ def _floor(found: WorldRanking) -> str:
 
 
 def _seldom(found: WorldRanking) -> str:
-    """The ranked rows that fail or swing in some world, with their shares."""
+    """The ranked rows that fail, swing or chatter in some world, with their shares."""
     stands = found.standing
     some = [at for at in stands.order if stands.fate(at) != "unreliable" and stands.lost[at].times]
     each = [f"{found.rows[at].label} in {percent(stands.lost[at])}" for at in some]
@@ -100,7 +100,7 @@ def _seldom(found: WorldRanking) -> str:
 
 
 def _lost(found: WorldRanking) -> str:
-    """Every row that fails or swings too often to stand, by how often."""
+    """Every row that fails, swings or chatters too often to stand, by how often."""
     by_count: dict[int, list[str]] = {}
     for at in found.standing.unreliable:
         by_count.setdefault(found.standing.lost[at].times, []).append(found.rows[at].label)
@@ -109,14 +109,15 @@ def _lost(found: WorldRanking) -> str:
 
 
 def _legend(found: WorldRanking) -> str:
-    from wristctl.simulation.oscillation import LIMIT_CYCLE
+    from wristctl.simulation.oscillation import FASTEST, LIMIT_CYCLE
 
     sound = [share.high for share in found.standing.swings if not share.times]
     still = f", though none in {found.worlds} can be {100.0 * min(sound):.2g} %" if sound else ""
     return (
         "RMSE is the geometric mean over worlds, with its 95 % interval. A world is a wrist and a rig drawn anew, on "
-        "which no gains were searched or chosen. A law is lost where the wrist leaves its range, or swings by more "
-        f"than {_deg(LIMIT_CYCLE)} deg at rest; one that is shown to be lost in more worlds than is tolerated (its "
+        "which no gains were searched or chosen. A law is lost where the wrist leaves its range, swings by more "
+        f"than {_deg(LIMIT_CYCLE)} deg at rest, or where its tensions go from limit to limit and back more than "
+        f"{FASTEST:g} times a second; one that is shown to be lost in more worlds than is tolerated (its "
         f"share's 95 % interval lies above) stands nowhere{still}. Rows that are not told apart from the lowest "
         "are with 95 % all that are as good (model confidence set); two of them may be told apart from each other."
     )

@@ -63,7 +63,7 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
             continue
         family_of = study.families[family]
         for steps, motions in kinds_of(family_of).items():
-            rows = [row_of(place.label, pieces, motions) for place, pieces in own.items()]
+            rows = [row_of(place.label, pieces, study.wrist.tension_range, motions) for place, pieces in own.items()]
             one = ranking(family, family_of, rows, laws.index(YARDSTICK), study.study.tolerated, steps)
             found[one.name] = one
     return found
@@ -75,14 +75,14 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
     from wristctl.comparison.order_shifts import order_shift
     from wristctl.comparison.world_ranking import kinds_of
 
-    found = []
+    found, width = [], study.wrist.tension_range
     for variant, way in study.study.variants.items():
         after = {place: each for place, each in judged.items() if place.variant == variant}
         before = {place: judged.get(place._replace(variant=way.beside or BASE)) for place in after}
         pairs = [(place, known, after[place]) for place, known in before.items() if known is not None]
         rows = [
             [
-                row_of(place.label, pieces, next(iter(kinds_of(study.families[place.family]).values())), noises=1)
+                row_of(place.label, pieces, width, next(iter(kinds_of(study.families[place.family]).values())), 1)
                 for place, pieces in side
             ]
             for side in ([(p, b) for p, b, _ in pairs], [(p, a) for p, _, a in pairs])

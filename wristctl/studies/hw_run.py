@@ -39,6 +39,23 @@ class Performed(StudyResult):
     twins: dict[int, Simulation]
     """by the trial's number"""
 
+    @property
+    def marks(self) -> list[str]:
+        """In how many of the trials that ended well the wrist does not arrive, or tensions chatter."""
+        import numpy as np
+
+        from wristctl.simulation.arrival import SHORT
+        from wristctl.simulation.oscillation import chatter
+        from wristctl.simulation.trajectory import rests
+
+        done = self.trials[self.trials["outcome"] == "ok"]
+        courses = [self.twins[number].trajectory for number in done["trial"]]
+        most = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
+        short = int((done["steady_state"].to_numpy(float) > SHORT * most).sum())
+        chatters = int((chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range) > 0.0).sum())
+        counts = {"does not arrive": short, "chatters": chatters}
+        return [f"{mark}: {count} of {len(done)} trials" for mark, count in counts.items() if count]
+
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
         return self.trials

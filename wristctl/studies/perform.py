@@ -111,6 +111,7 @@ def perform(
     try:
         found = work(session)
         findings.overview.answer[:] = found.summary
+        findings.overview.marks[:] = found.marks
     except UserError as error:
         run.console(f"error: {error}")
         raise

@@ -78,7 +78,7 @@ def _none_ranked(found: WorldRanking) -> str:
     if untold := found.standing.untold:
         names = ", ".join(found.rows[at].label for at in untold)
         return f" {found.worlds} worlds are too few to tell {names} apart: {LEAST_PAIRS} or more.{_unreliable(found)}"
-    return f" nothing can be relied on: every row fails or swings in some of {found.worlds} worlds."
+    return f" nothing can be relied on: every row fails, swings or chatters in some of {found.worlds} worlds."
 
 
 def _unreliable(found: WorldRanking) -> str:
@@ -88,12 +88,12 @@ def _unreliable(found: WorldRanking) -> str:
 
 def _fate(found: WorldRanking, at: int) -> str:
     failures, swings = found.standing.failures[at], found.standing.swings[at]
-    told = [f"fails in {failures.times}"] * bool(failures.times) + [f"swings in {swings.times}"] * bool(swings.times)
-    return " and ".join(told)
+    counts = {"fails": failures.times, "swings or chatters": swings.times}
+    return " and ".join(f"{what} in {times}" for what, times in counts.items() if times)
 
 
 def _seldom(found: WorldRanking, at: int) -> str:
-    """How often a row fails or swings that is not shown to do so too often; empty where it never does."""
+    """How often a row fails, swings or chatters that is not shown to do so too often; empty where it never does."""
     lost = found.standing.lost[at]
     return f" ({_fate(found, at)}: {percent(lost)})" if lost.times else ""
 

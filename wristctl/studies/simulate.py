@@ -58,7 +58,14 @@ class Simulated(StudyResult):
     @property
     def summary(self) -> list[str]:
         """Why a loop does not arrive, and what does; empty where it does."""
-        return [self.short_of] if self.short_of else []
+        from wristctl.studies.answer_lines import in_lines
+
+        return in_lines(self.short_of) if self.short_of else []
+
+    @property
+    def marks(self) -> list[str]:
+        """What became of the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
+        return self.repeated.marks
 
     @property
     def remark(self) -> bool:

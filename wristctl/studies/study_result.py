@@ -51,6 +51,11 @@ class StudyResult(ABC):
         return answer if isinstance(answer, list) else ()
 
     @property
+    def marks(self) -> list[str]:
+        """Why a result is no good, in a word or two each: the verdict on the run's page; empty where it is sound."""
+        return []
+
+    @property
     def remark(self) -> bool:
         """Whether the summary only introduces the tables, which are printed all the same."""
         return False

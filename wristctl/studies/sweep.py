@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -45,6 +46,11 @@ class Swept(StudyResult):
     def frame(self) -> pd.DataFrame:
         """A row for each point and repetition: what was set, and every metric."""
         return self.table
+
+    @property
+    def marks(self) -> list[str]:
+        """Of how many rollouts which is no good."""
+        return [f"{mark}: {count} of {len(self.table)}" for mark, count in _fates(self.table).items()]
 
     @property
     def fault(self) -> UserError | None:
@@ -146,7 +152,7 @@ def _swept(session: Session, command: str) -> Swept:
     table = pd.concat(parts, ignore_index=True)
     keys = {axis.key: [points[at][number] for at in table["point"]] for number, axis in enumerate(axes)}
     table = pd.concat([pd.DataFrame(keys), table], axis=1)
-    metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until"}]
+    metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until", "fate"}]
     findings.table(
         "data/sweep.csv", table, {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
     )
@@ -160,7 +166,7 @@ def _swept(session: Session, command: str) -> Swept:
             findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, said, figure_units)
     title = _answer(command, table, axes, said, _units(said, known_units))
     findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
-    heads = [*keys, *(["failed"] if "failed" in table else []), *said]
+    heads = [*keys, *(["fate"] if "fate" in table else []), *said]
     lines = [tuple(each) for each in table[heads].head(_SHOWN).itertuples(index=False)]
     more = f" The first {_SHOWN} of {len(table)} rows; data/sweep.csv has all." if len(table) > _SHOWN else ""
     return Swept(study, findings, [Table(title + more, heads, lines)], table, done.poisoned)
@@ -183,7 +189,7 @@ def _units(metrics: Sequence[str], known: dict[str, str]) -> dict[str, str]:
 
     of_table = {name: METRICS[name].unit or "1" for name in metrics if name in METRICS}
     return (
-        {"point": "1", "repetition": "1", "failed": "1", "until": "s"}
+        {"point": "1", "repetition": "1", "failed": "1", "until": "s", "fate": "1"}
         | of_table
         | {k: v or "1" for k, v in known.items()}
     )
@@ -217,9 +223,19 @@ def _answer(
             for row in (least, most)
         ]
         text += f": {said[0]} is least, {ends[0]}, and most, {ends[1]}"
-    if "failed" in table and table["failed"].any():
-        text += f"; {int(table['failed'].sum())} of {len(table)} rollouts left their range"
+    for fate, count in _fates(table).items():
+        text += f"; {count} of {len(table)} rollouts: {fate}"
     return f"{text}."
+
+
+def _fates(table: pd.DataFrame) -> dict[str, int]:
+    """How many rollouts have which mark; a rollout may have several."""
+    if "fate" not in table:
+        return {}
+    from wristctl.simulation.repetitions import MARKS
+
+    counts = Counter(mark for fate in table["fate"] for mark in fate.split(", ") if mark)
+    return {mark: counts[mark] for mark in MARKS if counts[mark]}
 
 
 def _told(value: Any) -> str:

@@ -48,22 +48,27 @@ def _plain(values: Sequence[Any]) -> list[Any]:
 
 
 def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Closed loops at the points as lanes: metrics by name, and which failed, a row for each point and repetition."""
+    """Closed loops at the points as lanes: metrics by name, which failed, and in words why a loop is no good.
+
+    A row for each point and repetition.
+    """
     import numpy as np
 
-    from wristctl.simulation.swept_loops import SweptLoop, run_swept, swept_loops
+    from wristctl.simulation.swept_loops import SweptLoop, fates, run_swept, swept_loops
 
-    places = list[tuple[int, int]]()
+    places, every = list[tuple[int, int]](), list[SweptLoop]()
 
     def loops() -> Iterator[SweptLoop]:
         for point, study in enumerate(_studies(spec)):
             for repetition, each in enumerate(swept_loops(study)):
                 places.append((point, repetition))
+                every.append(each)
                 yield each
 
     found = run_swept(loops())
     point, repetition = np.array(places).T
     rows = {"point": point, "repetition": repetition, "failed": found.failed, "until": found.until}
+    rows |= {"fate": np.array(fates(every, found))}
     return rows | {f"metric {name}": values for name, values in found.metrics.items()}
 
 

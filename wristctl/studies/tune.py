@@ -46,6 +46,14 @@ class Tuned(StudyResult):
 
     searches: dict[str, Search]
     """by controller"""
+    lost: dict[str, dict[str, int]]
+    """by controller, on how many of the cases that its best gains were chosen by they fail, swing, chatter or do not
+    converge; empty where they never do"""
+
+    @property
+    def marks(self) -> list[str]:
+        """Of which controllers the best gains fail, swing, chatter or do not converge in some case."""
+        return [f"{name}: {', '.join(known)}" for name, known in self.lost.items() if known]
 
     @property
     def gains(self) -> dict[str, dict[str, float]]:
@@ -112,7 +120,12 @@ def planned_search(
 
 def tune(session: Session) -> Tuned:
     """Search for gains by rollouts, a whole swarm as one batch."""
+    import numpy as np
+
+    from wristctl.control.table import controller
     from wristctl.report.truth_table import truth_tables
+    from wristctl.tuning.objective import marks_of
+    from wristctl.tuning.search import tuning_cases
 
     study = identified(session.study, "tune", session.inputs)
     loops = judged_loops(study, study.tune).values()
@@ -120,14 +133,24 @@ def tune(session: Session) -> Tuned:
     warn_if_coarse(loops)
     network = network_for(session.inputs, study.wrist, loops)
     found = search_all(session, study, network)
+    searched, chosen = tuning_cases(study, network)
+    cases = chosen or searched
+    lost = {
+        name: marks_of(controller(name), np.array(list(each.gains.values())), cases, study.wrist)
+        for name, each in found.items()
+    }
+    fates = {
+        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in known.items())
+        for name, known in lost.items()
+    }
     rows = [
-        (name, result.objective, result.finalists[0].origin, result.evaluations, _told(result.gains))
+        (name, result.objective, fates[name], result.finalists[0].origin, result.evaluations, _told(result.gains))
         for name, result in sorted(found.items(), key=lambda each: each[1].objective)
     ]
-    columns = ("controller", "objective", "found by", "evaluations", "gains")
+    columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
     tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    return Tuned(session.study, session.findings, tables, found)
+    return Tuned(session.study, session.findings, tables, found, lost)
 
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:

@@ -20,13 +20,26 @@ _FAILED = 3.0
 """Decades that a case counts where the wrist left its range at its very end, and one more where it did at once."""
 
 
+def marks_of(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters) -> dict[str, int]:
+    """On how many cases gains (g,) fail, swing, chatter, or do not converge, by mark; without those of none."""
+    found = measure(law, gains[None], cases, wrist, ["oscillation"])
+    holds = {
+        "failed": found.failed,
+        "limit cycle": found.limit_cycles & ~found.failed,
+        "chatters": (found.chatter > 0.0) & ~found.failed,
+        "not converged": found.unconverged & ~found.failed,
+    }
+    counts = {mark: int(each.sum()) for mark, each in holds.items()}
+    return {mark: count for mark, count in counts.items() if count}
+
+
 class Judge:
     """The objective of gains of any law on the same cases; the yardstick runs on them once.
 
     A case's value is the weighted sum of log10((metric + floor) / (the yardstick's + floor)); where it fails it is
     3 to 4 decades. The objective is the mean over all cases, plus a weight times the worst cell (a case with its
-    repetitions), plus one times the square root of the share of cases that swing at rest: steep at the first of them,
-    since no ranking relies on gains that ever swing, and never the same for two that swing more and less.
+    repetitions), plus one times the square root of the share of cases that swing at rest, chatter or do not converge:
+    steep at the first of them, since no ranking relies on such gains, and never the same for two that do more and less.
     """
 
     def __init__(self, cases: Sequence[Case], wrist: WristParameters, weights: Objective) -> None:
