@@ -13,6 +13,7 @@ from wristctl.studies.compare_outputs import loop_tables, step_table, units
 from wristctl.studies.compare_pictures import draw
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
+    check_family_reach,
     check_inverses,
     check_reach,
     check_row,
@@ -101,11 +102,13 @@ def plan(study: Study, inputs: Inputs) -> str:
             with under(f"compare.rows.{number}"):
                 check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
     if settings.tuning is not None:
+        check_family_reach(study, settings.tuning.worlds.family)
         with under("compare.tuning"):
             searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist, inputs)}\n"
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
+    check_family_reach(study, settings.worlds.family)
     if not settings.worlds.family:
         check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):

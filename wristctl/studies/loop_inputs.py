@@ -60,6 +60,15 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
             raise error.at(where.format(number) + error.where.removeprefix("reference")) from error
 
 
+def check_family_reach(study: Study, name: str) -> None:
+    """The same for the motions of a family, at both ends of what each is drawn from; an unknown one has none."""
+    family = study.families.get(name, Family())
+    for share in (0.0, 1.0 - 1e-12):
+        shares = dict.fromkeys(family.draw, share)
+        motions = [family.motion(number, shares) for number in range(len(family.references))]
+        check_reach(motions, study.wrist, f"families.{name}.references.{{}}")
+
+
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
     """UserError where a reference goes through a network and none is among the inputs."""
     if "network" in inverses and "network" not in inputs:

@@ -16,6 +16,7 @@ from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
+    check_family_reach,
     check_inverses,
     check_reach,
     family_of,
@@ -67,9 +68,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.report.truth_table import truth_told
 
     with under("tune"):
-        wrist = identified(study, "tune", inputs).wrist
-        told = truth_told(wrist, judged_loops(study, study.tune))
-        return planned_search(study.tune, study.families, wrist, inputs) + told
+        known = identified(study, "tune", inputs)
+        told = truth_told(known.wrist, judged_loops(study, study.tune))
+        planned = planned_search(study.tune, study.families, known.wrist, inputs)
+    check_family_reach(known, study.tune.worlds.family)
+    return planned + told
 
 
 def planned_search(
