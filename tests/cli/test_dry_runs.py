@@ -65,6 +65,17 @@ def test_the_shipped_tip_path_is_for_wrists_of_any_length(call: Call, length: fl
     assert code == 0 and "kind: tip-path" in out and not err
 
 
+def test_a_search_beyond_the_tendons_is_refused_unless_forced(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("wrist: {stiffness: 6.0, length: 0.12}\n")
+    asked = ("tune", "mine.yaml", "--set", "scenarios=[{reference: {angle_deg: -30}}]")
+    for dry in ((), ("--dry-run",)):
+        code, _, err = call(*asked, *dry)
+        assert code == 2 and "tune.scenarios - fix: a tension_limit of 106 N" in err and err.count("\n") == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["mine.yaml"]
+    assert call(*asked, "--dry-run", "--force")[0] == 0
+    assert call(*asked, "--dry-run", "--set", "wrist.tension_limit=106")[0] == 0
+
+
 def test_a_dry_run_says_which_values_a_leaf_may_have(call: Call) -> None:
     said = {
         ("simulate", "level"): "ideal, lagged, tendon", ("simulate", "kind"): "step, minimum-jerk, sine, multi-step",

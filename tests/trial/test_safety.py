@@ -129,5 +129,6 @@ def test_the_third_lapsed_rate_within_a_second_stops() -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", ["torque_wanted", "torque", "plus", "minus"])
 def test_what_a_law_wants_is_never_sent_where_it_is_no_number(name: str, value: float) -> None:
+    no_number: dict[str, Any] = {name: value}
     with pytest.raises(SafetyStop, match="torque is not a number"):
-        MONITOR.answer(ANSWER._replace(**{name: value}))
+        MONITOR.answer(ANSWER._replace(**no_number))

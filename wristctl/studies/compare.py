@@ -25,6 +25,7 @@ from wristctl.studies.loop_inputs import (
     tuned_on,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_outside_conditions
+from wristctl.studies.out_of_reach import asked_by, warn_out_of_reach
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rank import ranked
 from wristctl.studies.session import Session
@@ -140,6 +141,7 @@ def compare(session: Session) -> Compared:
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
     warn_outside_conditions(settings.rows, loops)
+    warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
     network = network_for(session.inputs, study.wrist, loops)
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)

@@ -26,6 +26,7 @@ from wristctl.studies.loop_inputs import (
     network_for,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
+from wristctl.studies.out_of_reach import asked_by, refuse_out_of_reach, warn_out_of_reach
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
 from wristctl.studies.study_result import StudyResult
@@ -121,6 +122,7 @@ def tune(session: Session) -> Tuned:
     loops = judged_loops(study, study.tune).values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
     warn_if_coarse(loops)
+    warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     network = network_for(session.inputs, study.wrist, loops)
     found = search_all(session, study, network)
     rows = [
@@ -239,5 +241,6 @@ TUNE = sweepable(
             EarlierRun("from_identified", kind="identify", optional=True),
             EarlierRun("resume", kind="tune", optional=True, unfinished=True),
         ),
+        doubts=refuse_out_of_reach,
     )
 )
