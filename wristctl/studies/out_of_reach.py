@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from wristctl.wrist.holding import Shortfall
 
 log = logging.getLogger(__name__)
-_PERIOD = 1e-2
-"""Between samples of a motion whose largest angle is looked for [s]."""
 
 
 class AskedMotion(NamedTuple):
@@ -105,6 +103,7 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
 
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
+    from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion, toward
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.holding import shortfall
@@ -113,7 +112,7 @@ def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
         return None
     seen, loop = loop_facing(wrist, asked.loop, asked.direction)
     reference = by_angles(toward(asked.reference, asked.direction))
-    theta = motion(reference, seen, asked.horizon, _PERIOD).theta_ref
+    theta = motion(reference, seen, asked.horizon, sample_period(loop.control_period)).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
     return shortfall(plant_of(seen, loop.plant), low, high, loop.disturbances.load)
 
