@@ -16,9 +16,24 @@ def test_a_dry_run_writes_nothing(call: Call, tmp_path: Path, command: str) -> N
     assert code == 0 and f"{command}:" in out and not list(tmp_path.iterdir())
 
 
+TIPS = "{kind: tip-path, inverse: closed-form, tips: [[0.12, 0.0], [0.078, 0.014]]}"
+FAMILY = ("--set", f"families.f={{references: [{{}}, {TIPS}]}}")
+DRAWN = ("--set", "families.f={draw: {reference.angle_deg: 10..60}}")
+LONG = ("--set", "wrist.length=0.12", "--set")
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (("simulate", *LONG, f"reference={TIPS}"), "simulate.reference.tips - fix"),
+        (("analyse", *LONG, f"simulate.reference={TIPS}"), "simulate.reference.tips - fix"),
+        (("tune", *LONG, f"scenarios=[{{}}, {{reference: {TIPS}}}]"), "tune.scenarios.1.reference.tips - fix"),
+        (("compare", *LONG, f"references=[{{}}, {TIPS}]"), "compare.references.1.tips - fix"),
+        (("hw-run", *LONG, f"reference={TIPS}"), "hw-run.reference.tips - fix"),
+        (("tune", *LONG, "worlds.family=f", *FAMILY), "families.f.references.1.tips - fix"),
+        (("compare", *LONG, "worlds.family=f", *FAMILY), "families.f.references.1.tips - fix"),
+        (("compare", *LONG, "tuning={worlds: {family: f}}", *FAMILY), "families.f.references.1.tips - fix"),
+        (("tune", "--set", "worlds.family=f", *DRAWN), "families.f.references.0.angle_deg - fix"),
         (("simulate", "--set", "reference.angle_deg=170"), "simulate.reference.angle_deg - fix: ask for less"),
         (("simulate", "--set", "reference={tip: [0.09, 0.2], inverse: closed-form}"), "simulate.reference.tip - fix"),
         (("simulate", "--set", "reference.inverse=network"), "simulate.reference.inverse - fix: --network RUN"),
@@ -42,6 +57,23 @@ def test_a_dry_run_refuses_what_the_command_would(
 ) -> None:
     code, _, err = call(*arguments, "--dry-run")
     assert code == 2 and said in err and "Traceback" not in err and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("length", [0.05, 0.12])
+def test_the_shipped_tip_path_is_for_wrists_of_any_length(call: Call, length: float) -> None:
+    code, out, err = call("compare", "controllers", "--dry-run", "--set", f"wrist.length={length}")
+    assert code == 0 and "kind: tip-path" in out and not err
+
+
+def test_a_search_beyond_the_tendons_is_refused_unless_forced(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("wrist: {stiffness: 6.0, length: 0.12}\n")
+    asked = ("tune", "mine.yaml", "--set", "scenarios=[{reference: {angle_deg: -30}}]")
+    for dry in ((), ("--dry-run",)):
+        code, _, err = call(*asked, *dry)
+        assert code == 2 and "tune.scenarios - fix: a tension_limit of 106 N" in err and err.count("\n") == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["mine.yaml"]
+    assert call(*asked, "--dry-run", "--force")[0] == 0
+    assert call(*asked, "--dry-run", "--set", "wrist.tension_limit=106")[0] == 0
 
 
 def test_a_dry_run_says_which_values_a_leaf_may_have(call: Call) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.cli.conftest import Call
 from wristctl.records import Run, list_runs, open_run
@@ -42,6 +44,19 @@ def test_simulate_leaves_a_trajectory_metrics_and_pictures(call: Call) -> None:
     assert parts.to_numpy() == pytest.approx(course["theta"], abs=1e-15)
     drawn = {file.name for file in (run.path / "figures").iterdir()}
     assert drawn == {f"{name}.{kind}" for name in ("angle", "error", "tensions", "motion") for kind in ("png", "svg")}
+
+
+def test_the_tuning_that_is_advised_is_of_the_users_own_wrist(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("wrist: {length: 0.1}\n")
+    typed = ("--controller", "pid-ff", "--set", "loop.plant_segments=1", "--set", "wrist.stiffness=0.7", "--seed", "4")
+    code, out, _ = call("simulate", "mine.yaml", *typed, "--set", "horizon=0.02", "--set", "reference.kind=step")
+    assert code == 0
+    line = next(each for each in out.splitlines() if "wristctl tune" in each)
+    words = shlex.split(line[line.index("wristctl tune") :])
+    code, out, _ = call(*words[1:], "--dry-run", "--json")
+    shown = yaml.safe_load(json.loads(out)["config"])
+    assert code == 0 and "pid-ff" in shown["tune"]["controllers"] and shown["seed"] == 4
+    assert (shown["wrist"]["length"], shown["wrist"]["stiffness"]) == (0.1, 0.7)
 
 
 def test_analyse_takes_the_loop_of_simulate_and_begins_with_its_margins(call: Call) -> None:

@@ -241,3 +241,10 @@ def test_the_page_states_the_observation_in_its_order() -> None:
     page = " ".join((ROOT / "docs" / "gym.md").read_text().split())
     (stated,) = re.findall(r"\*\*Observation\*\*.*?: (`theta`.*?)\. It is", page)
     assert re.findall(r"`(\w+)`", stated) == [each.name for each in OBSERVED]
+
+
+def test_an_episode_with_a_tip_out_of_the_wrists_reach_does_not_begin() -> None:
+    asked = "simulate.reference={tip: [0.078, 0.014], inverse: closed-form}"
+    with pytest.raises(UserError, match="120 mm"):
+        WristEnv(load_study([], [asked, "wrist.length=0.12"])).reset()
+    WristEnv(load_study([], [asked])).reset()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,8 +15,9 @@ from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
+from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.reference import motion
+from wristctl.simulation.reference import motion, reference_name
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.kinematics import arc_path, arc_tip, chain_tip, exact_arc
 from wristctl.wrist.segments import segments
@@ -34,20 +37,20 @@ def test_minimum_jerk_starts_and_ends_at_rest_and_derivatives_agree() -> None:
     np.testing.assert_allclose(np.gradient(m.rate_ref, m.time)[1:-1], m.acceleration_ref[1:-1], atol=2e-3)
 
 
-@given(st.floats(-0.8, 0.8), st.floats(0.05, 0.12), st.sampled_from(["step", "minimum-jerk", "sine"]))
+@given(st.floats(-0.8, 0.8), st.floats(0.0793, 0.0807), st.sampled_from(["step", "minimum-jerk", "sine"]))
 def test_the_wanted_angle_is_the_closed_form_inverse_of_the_wanted_tip(angle: float, length: float, kind: str) -> None:
     x, y = (float(v) for v in arc_tip(np.array(angle), length))
     m = evaluated(kind=kind, tip=(x, y), inverse="closed-form", duration=0.7, frequency=0.8)
     np.testing.assert_allclose(exact_arc(m.tip_desired)[0], m.theta_ref, rtol=0.0, atol=1e-15)
 
 
-def test_a_tip_target_is_reached_whatever_its_stretch() -> None:
-    tip = arc_tip(np.array(0.4), 0.084)
+def test_a_tip_target_is_reached_and_its_stretch_is_kept() -> None:
+    tip = arc_tip(np.array(0.4), 0.0806)
     m = evaluated(tip=tuple(float(v) for v in tip), inverse="closed-form")
     assert m.final == pytest.approx(0.4, abs=1e-14)
     np.testing.assert_allclose(m.tip_desired[-1], tip, atol=1e-16)
     np.testing.assert_allclose(m.tip_desired[0], [WRIST.length, 0.0], atol=1e-16)
-    np.testing.assert_allclose(exact_arc(m.tip_desired[-1]), [0.4, 0.084], rtol=1e-13)
+    np.testing.assert_allclose(exact_arc(m.tip_desired[-1]), [0.4, 0.0806], rtol=1e-13)
 
 
 def test_impossible_references_are_refused() -> None:
@@ -96,7 +99,7 @@ def test_multi_step_holds_each_angle_for_its_duration() -> None:
 
 
 def test_tip_path_visits_its_tips_and_rests_at_each() -> None:
-    tips = tuple(tuple(float(v) for v in arc_tip(np.array(a), r)) for a, r in ((0.4, 0.082), (-0.2, 0.079)))
+    tips = tuple(tuple(float(v) for v in arc_tip(np.array(a), r)) for a, r in ((0.4, 0.0805), (-0.2, 0.0797)))
     m = evaluated(kind="tip-path", tips=tips, duration=0.8, inverse="closed-form")
     np.testing.assert_allclose(m.tip_desired[[800, 1600]], tips, atol=1e-15)
     np.testing.assert_allclose(m.theta_ref[[800, 1600]], [0.4, -0.2], atol=1e-14)
@@ -112,6 +115,62 @@ def test_every_target_of_a_path_must_be_within_reach() -> None:
         evaluated(kind="tip-path", tips=((0.078, 0.014), (0.0, 0.08)), inverse="closed-form")
     with pytest.raises(ValidationError, match="needs inverse"):
         Reference(kind="tip-path")
+
+
+@pytest.mark.parametrize("inverse", ["closed-form", "network"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("length", [0.0808, 0.0793])
+def test_a_tip_is_refused_farther_than_a_hundredth_of_the_length_from_what_an_arc_reaches(
+    length: float, side: float, inverse: str
+) -> None:
+    """A longer wrist does not reach the same tip, nor does a shorter one; the last of several tips counts as well."""
+    wrist = WristParameters(length=length)
+    on, off = (arc_tip(np.array(side * 0.5), each) for each in (length, length + np.sign(0.08 - length) * 0.0009))
+    near = Reference(tip=tuple(arc_tip(np.array(side * 0.5), 0.08)), inverse="closed-form")
+    assert motion(near, wrist, 2.0, 0.1).final == pytest.approx(side * 0.5)
+    tips = tuple(on.tolist()), tuple(off.tolist())
+    for asked in (Reference(tip=tips[1], inverse=inverse), Reference(kind="tip-path", tips=tips, inverse=inverse)):  # type: ignore[arg-type]
+        with pytest.raises(UserError) as refused:
+            motion(asked, wrist, 1.0, 0.1, lambda path: pytest.fail("evaluated"))
+        assert refused.value.where == ("reference.tips" if asked.tip is None else "reference.tip")
+        named = np.array(re.findall(r"-?0\.\d{5}", refused.value.fix), np.float64)
+        curve = arc_tip(np.linspace(-0.87, 0.87, 20_001), length)
+        assert np.hypot(*(named - off)) == pytest.approx(np.hypot(*(curve - off).T).min(), abs=1e-5)
+        assert exact_arc(named)[1] == pytest.approx(length, abs=1e-5)
+
+
+def test_the_nearest_tip_to_one_beyond_the_range_is_at_its_end() -> None:
+    with pytest.raises(UserError) as refused:
+        evaluated(tip=(0.02, -0.06), inverse="closed-form")
+    named = np.array(re.findall(r"-?0\.\d{5}", refused.value.fix), np.float64)
+    np.testing.assert_allclose(named, arc_tip(np.array(-np.deg2rad(50.0)), 0.08), atol=1e-5)
+
+
+def test_a_tip_path_without_tips_is_one_of_wrists_of_any_length() -> None:
+    """And on the default wrist that of millimetres, to the last bit, with the noise of that name."""
+    path = Reference(kind="tip-path", inverse="closed-form")
+    metres = Reference(
+        kind="tip-path", inverse="closed-form", tips=((0.078, 0.014), (0.076, 0.021), (0.079, -0.010), (0.076, 0.021))
+    )
+    for ours, theirs in ((path, metres), (path.mirrored(), metres.mirrored())):
+        assert ours.in_metres(0.08).tips == theirs.tips and theirs.in_metres(0.12) is theirs
+        assert scenario_of(ours, "ulnar") == scenario_of(theirs, "ulnar")
+        known = motion(theirs, WRIST, 4.0, 1e-2)
+        assert motion(ours, WRIST, 4.0, 1e-2).theta_ref.tobytes() == known.theta_ref.tobytes()
+        for length in (0.03, 0.12):
+            scaled = motion(ours, WristParameters(length=length), 4.0, 1e-2)
+            np.testing.assert_allclose(scaled.theta_ref, known.theta_ref, atol=1e-14)
+            np.testing.assert_allclose(scaled.tip_desired / length, known.tip_desired / 0.08, atol=1e-14)
+            with pytest.raises(UserError, match="where an arc"):
+                motion(theirs, WristParameters(length=length), 4.0, 1e-2)
+    other = Reference(kind="tip-path", inverse="closed-form", tip_ratios=((0.97, -0.2), (0.99, 0.1)))
+    np.testing.assert_allclose(
+        motion(other, WristParameters(length=0.1), 2.0, 1e-3).tip_desired[[1000, -1]],
+        [[0.097, -0.02], [0.099, 0.01]], atol=1e-8,
+    )  # fmt: skip
+    assert len({reference_name(each) for each in (path, path.mirrored(), metres, other)}) == 4
+    with pytest.raises(ValidationError, match="not both"):
+        Reference(kind="tip-path", inverse="closed-form", tips=((0.08, 0.0),), tip_ratios=((1.0, 0.0),))
 
 
 @pytest.mark.parametrize(
@@ -131,7 +190,8 @@ def test_a_mirrored_reference_is_the_same_motion_to_the_other_side(reference: Re
         np.testing.assert_allclose(getattr(other, name), -getattr(one, name), atol=1e-12)
     np.testing.assert_allclose(other.tip_desired, one.tip_desired * [1.0, -1.0], atol=1e-15)
     assert other.goals.move == pytest.approx(-one.goals.move) and (other.begin, other.rest) == (one.begin, one.rest)
-    assert reference.mirrored().mirrored() in (reference, reference.model_copy(update={"angle_deg": reference.end_deg}))
+    twice, same = (each.in_metres(0.08) for each in (reference.mirrored().mirrored(), reference))
+    assert twice in (same, same.model_copy(update={"angle_deg": reference.end_deg}))
 
 
 def test_a_motion_is_worked_out_once_and_cannot_be_changed() -> None:

@@ -16,6 +16,7 @@ from wristctl.config.control import Row
 from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.simulation import worlds
+from wristctl.studies.fair_study import FAIR_STUDY
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import Inputs
 from wristctl.studies.loop_inputs import (
@@ -150,3 +151,11 @@ def test_a_reference_out_of_reach_is_named_by_its_place(tmp_path: Path) -> None:
         with pytest.raises(UserError) as caught:
             check_reach([Reference(), wrong], WRIST, "compare.references.{}")
         assert caught.value.where == where
+
+
+def test_the_study_of_all_laws_refuses_a_tip_that_a_familys_wrist_does_not_reach() -> None:
+    asked = "{references: [{}, {kind: tip-path, inverse: closed-form, tips: [[0.12, 0.0], [0.078, 0.014]]}]}"
+    given = wristctl.load_study(None, "wrist.length=0.12", "families.good={}", f"families.f={asked}")
+    with pytest.raises(UserError) as caught:
+        FAIR_STUDY.plan(given, Inputs())
+    assert caught.value.where == "families.f.references.1.tips"

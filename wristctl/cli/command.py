@@ -22,7 +22,7 @@ from wristctl.cli.trust_code import asked_to_trust
 from wristctl.config.errors import UserError
 from wristctl.config.explain import located
 from wristctl.config.keys import section_keys
-from wristctl.config.load import read_study
+from wristctl.config.load import read_study, whole_key
 from wristctl.config.plausible import check_sizes
 from wristctl.config.trust import asking
 from wristctl.studies.in_python import check_executor
@@ -102,6 +102,8 @@ def _perform(
         try:
             prepared = prepare(procedure, study, options.out, files=files)
             plan = prepared.plan()
+            if procedure.doubts and not options.force:
+                procedure.doubts(prepared.study, prepared.inputs)
         except UserError as error:
             raise located(error, origins) from error
         if options.dry_run:
@@ -109,10 +111,12 @@ def _perform(
         if procedure.in_units:
             check_executor(executor)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
+        overrides = [whole_key(each, procedure.kind) for each in (*(options.override or ()), *seed)]
+        typed = [*map(str, files), *(word for each in overrides for word in ("--set", each))]
         show, run = partial(progress, console, quiet=options.quiet), None
         try:
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
-                found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor)
+                found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
         except KeyboardInterrupt:
             told = f"; what was found is in {run.path}" if run else ""
             if run and any(each.leaf == "resume" for each in procedure.needs):

@@ -42,7 +42,11 @@ class Options:
     seed: Annotated[int | None, typer.Option("--seed", help="Root of every random stream.")] = None
     force: Annotated[
         bool,
-        typer.Option("--force", help="Go on with lengths hardly meant in metres; hw-run: with gains that may swing."),
+        typer.Option(
+            "--force",
+            help="Go on with lengths hardly meant in metres; tune: beyond what tendons hold; hw-run: with gains that "
+            "may swing.",
+        ),
     ] = False
     trust_code: TrustCode = False
     out: Out = Path("results")

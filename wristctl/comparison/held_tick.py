@@ -16,6 +16,7 @@ import numpy as np
 from wristctl.config.unstated import PaperSetting
 from wristctl.control.smc import SMC
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.holding import shortfall
 from wristctl.wrist.segments import segments
 
 
@@ -34,11 +35,8 @@ def overshoot_of_a_tick(setting: PaperSetting, gains: str = "exchanged") -> floa
 
 def holds(setting: PaperSetting) -> bool:
     """Whether the tendons can hold 30 deg toward the reference's side."""
-    wrist, loop = setting.wrist, setting.loop
     theta = math.radians(setting.reference.end_deg)
-    load = float(terms(segments(wrist, 1), [theta], [0.0]).bias[0]) + wrist.stiffness * theta
-    most = 2.0 * wrist.tendon_offset * (wrist.tension_limit - wrist.pretension)
-    return not loop.limits or abs(load) <= most
+    return not setting.loop.limits or shortfall(setting.wrist, theta, theta) is None
 
 
 def arrives_by_rule(setting: PaperSetting, gains: str = "exchanged") -> bool:

@@ -106,16 +106,20 @@ def _whole(document: Document, file: Path | None) -> Document:
     return Document(placed(_found_from(document.data, folder), file), document.lines)
 
 
+def whole_key(key: str, command: str | None) -> str:
+    """A dotted key, or an override that begins with one, with the section in which a command looks for it."""
+    first = key.partition("=")[0].partition(".")[0]
+    return f"{home_of(command, first)}.{key}" if command and first in section_keys(command) else key
+
+
 def _override(text: str, command: str | None) -> Document:
     dotted, equals, value = text.partition("=")
     where = Setting(text)
     if not equals or not dotted:
         raise UserError("an override is key=value", where, ("for example ", Setting("wrist.length=0.09")))
-    keys = dotted.split(".")
+    keys = whole_key(dotted, command).split(".")
     own, top = section_keys(command), keys_of(Study)
-    if command and keys[0] in own:
-        keys.insert(0, home_of(command, keys[0]))
-    elif keys[0] not in top:
+    if keys[0] not in top:
         raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*own, *top])))
     try:
         data = parse_yaml(value, "").data

@@ -28,6 +28,10 @@ STIFF = 50e3
 """Stiffness [N/m] beyond which tendons take half that step."""
 
 
+_TIP_RATIOS = ((0.975, 0.175), (0.95, 0.2625), (0.9875, -0.125), (0.95, 0.2625))
+"""Where a tip-path goes whose tips are not given, as multiples of the wrist's length."""
+
+
 def longest_step(actuator: Actuator) -> float:
     """The integration step [s] that is short enough for elastic tendons of an actuator's stiffness."""
     return LONGEST_STEP if actuator.tendon_stiffness <= STIFF else 0.5 * LONGEST_STEP
@@ -80,8 +84,15 @@ class Reference(OpenSection):
     angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
     angles_deg: tuple[float, ...] = quantity((20.0, -10.0, 30.0), "deg", "angles of a multi-step", min_length=1)
-    tips: tuple[tuple[float, float], ...] = quantity(
-        ((0.078, 0.014), (0.076, 0.021), (0.079, -0.010), (0.076, 0.021)), "m", "tips of a tip-path", min_length=1
+    tips: tuple[tuple[float, float], ...] | None = quantity(
+        None, "m", "tips of a tip-path, instead of tip_ratios", min_length=1
+    )
+    tip_ratios: tuple[tuple[float, float], ...] | None = quantity(
+        None,
+        "",
+        "the same as multiples of the wrist's length; where no target is given (0.975, 0.175), (0.95, 0.2625), "
+        "(0.9875, -0.125), (0.95, 0.2625)",
+        min_length=1,
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine, a chirp's at first", "assumed", gt=0)
@@ -97,6 +108,23 @@ class Reference(OpenSection):
         """The wanted angle at the end [deg], where it is no tip."""
         return 30.0 if self.angle_deg is None else self.angle_deg
 
+    @property
+    def _by_ratios(self) -> bool:
+        return self.kind == "tip-path" and self.tips is None
+
+    @property
+    def end_ratios(self) -> tuple[tuple[float, float], ...]:
+        """The tips of a tip-path as multiples of the wrist's length, where they are not in metres."""
+        return _TIP_RATIOS if self.tip_ratios is None else self.tip_ratios
+
+    def in_metres(self, length: float) -> Reference:
+        """The reference with the tips of a tip-path in metres, on a wrist of this length [m]."""
+        if not self._by_ratios:
+            return self
+        millimetres = 1e3 * length  # 0.175 of 80 mm are 14 mm to the last bit; 0.175 of 0.08 m are not 0.014 m
+        tips = tuple((x * millimetres / 1e3, y * millimetres / 1e3) for x, y in self.end_ratios)
+        return self.model_copy(update={"tips": tips, "tip_ratios": None})
+
     def added(self) -> Mapping[str, Parameter]:
         """What a kind from elsewhere adds."""
         parameters: Mapping[str, Parameter] = REFERENCES[self.kind].parameters
@@ -111,7 +139,8 @@ class Reference(OpenSection):
                 "angle_deg": -self.end_deg if self.tip is None else None,
                 "tip": None if self.tip is None else (self.tip[0], -self.tip[1]),
                 "angles_deg": tuple(-angle for angle in self.angles_deg),
-                "tips": tuple((x, -y) for x, y in self.tips),
+                "tips": None if self.tips is None else tuple((x, -y) for x, y in self.tips),
+                "tip_ratios": tuple((x, -y) for x, y in self.end_ratios) if self._by_ratios else None,
             }
         )
 
@@ -119,6 +148,8 @@ class Reference(OpenSection):
     def _one_target(self) -> Self:
         if self.angle_deg is not None and self.tip is not None:
             raise ValueError("give angle_deg or tip, not both")
+        if self.tips is not None and self.tip_ratios is not None:
+            raise ValueError("give tips or tip_ratios, not both")
         if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
             raise ValueError("a tip target needs inverse: network or closed-form")
         if (self.kind == "recording") != (self.file is not None):

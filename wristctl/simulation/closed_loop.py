@@ -31,6 +31,7 @@ from wristctl.wrist.kinematics import Inverse
 
 _TOGETHER = 64
 """Rollouts that are recorded at once."""
+_LENGTH = WristParameters().length
 
 
 def repeat(
@@ -138,8 +139,8 @@ def _sides(outcome: Outcome, name: str, index: int) -> Array:
 
 
 def scenario_of(reference: Reference, direction: DirectionName) -> str:
-    """The name that a scenario's noise goes by: its reference and direction."""
-    return f"{reference_name(reference)}, {direction}"
+    """The name that a scenario's noise goes by: its reference, on a wrist of the default length, and direction."""
+    return f"{reference_name(reference.in_metres(_LENGTH))}, {direction}"
 
 
 def equilibrium(loop: Loop) -> Start:

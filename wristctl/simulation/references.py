@@ -38,6 +38,12 @@ def _target(reference: Reference) -> str:
     return f"{reference.end_deg:g} deg" if reference.tip is None else f"tip {_millimetres(reference.tip)} mm"
 
 
+def _tips(reference: Reference) -> str:
+    if reference.tips is not None:
+        return " ".join(map(_millimetres, reference.tips))
+    return " ".join(f"{100.0 * x:.3g}, {100.0 * y:.3g}" for x, y in reference.end_ratios) + " % of the length"
+
+
 STEP = ReferenceKind(
     "a jump to an angle or a tip position",
     course=_step,
@@ -70,8 +76,6 @@ TIP_PATH = ReferenceKind(
     "smooth moves of `duration` through tip positions",
     course=_minimum_jerk,
     rest=lambda reference, begin, horizon: begin + reference.duration,
-    described=lambda reference: (
-        f"tip path {reference.duration:g} s {' '.join(_millimetres(tip) for tip in reference.tips)}"
-    ),
+    described=lambda reference: f"tip path {reference.duration:g} s {_tips(reference)}",
     targets="tips",
 )

@@ -21,7 +21,15 @@ from wristctl.studies.analyse_words import (
     step_table,
 )
 from wristctl.studies.inputs import EarlierRun, Inputs
-from wristctl.studies.loop_inputs import check_inverses, check_row, identified, inverses_of, network_for, tuned_gains
+from wristctl.studies.loop_inputs import (
+    check_inverses,
+    check_reach,
+    check_row,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_gains,
+)
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_outside_conditions
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
@@ -87,6 +95,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     settings, chosen = study.analyse, study.simulate
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_reach([chosen.reference], identified(study, "analyse", inputs).wrist, "reference")
         check_inverses(inverses_of([chosen.reference]), inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)

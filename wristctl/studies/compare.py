@@ -14,6 +14,7 @@ from wristctl.studies.compare_outputs import STANDING_UNITS, loop_tables, step_t
 from wristctl.studies.compare_pictures import draw
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
+    check_family_reach,
     check_inverses,
     check_reach,
     check_row,
@@ -25,6 +26,7 @@ from wristctl.studies.loop_inputs import (
     tuned_on,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_outside_conditions
+from wristctl.studies.out_of_reach import asked_by, warn_out_of_reach
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.rank import ranked
 from wristctl.studies.session import Session
@@ -106,11 +108,13 @@ def plan(study: Study, inputs: Inputs) -> str:
             with under(f"compare.rows.{number}"):
                 check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
     if settings.tuning is not None:
+        check_family_reach(study, settings.tuning.worlds.family)
         with under("compare.tuning"):
             searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist, inputs)}\n"
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
+    check_family_reach(study, settings.worlds.family)
     if not settings.worlds.family:
         check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):
@@ -142,6 +146,7 @@ def compare(session: Session) -> Compared:
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
     warn_outside_conditions(settings.rows, loops)
+    warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
     network = network_for(session.inputs, study.wrist, loops)
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)

@@ -27,7 +27,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.comparison.judge_unit import noises_of
     from wristctl.control.table import controller
     from wristctl.simulation.size import check_size
-    from wristctl.studies.loop_inputs import check_inverses, check_row, family_of, inverses_of
+    from wristctl.studies.loop_inputs import check_family_reach, check_inverses, check_row, family_of, inverses_of
     from wristctl.tuning.search import check_optimiser, check_tunable
 
     settings = study.study
@@ -62,6 +62,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         for family in families.values():
             check_size([family.loop], family.horizon)
             check_inverses(inverses_of(family.references), inputs)
+    for name in families:
+        check_family_reach(study, name)
     searches = sum(unit.size for unit in search_units(study).values())
     each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
     judged = each * budget.worlds * len(labels)

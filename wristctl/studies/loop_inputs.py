@@ -50,14 +50,32 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
     from wristctl.simulation.reference import motion
 
     for number, reference in enumerate(references):
-        tips = reference.tip is not None or reference.kind == "tip-path"
-        plain = reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
         try:
-            motion(plain, wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
+            motion(by_angles(reference), wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
         except UserError as error:
             if not error.where.startswith("reference"):  # in a file
                 raise
             raise error.at(where.format(number) + error.where.removeprefix("reference")) from error
+
+
+def by_angles(reference: Reference) -> Reference:
+    """The reference without a network: the angles that one arc has."""
+    tips = reference.tip is not None or reference.kind == "tip-path"
+    return reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
+
+
+def ends_of_family(family: Family) -> list[Reference]:
+    """The motions of a family with all that is drawn of them at its lower end, then at its upper end."""
+    ends = [dict.fromkeys(family.draw, share) for share in (0.0, 1.0 - 1e-12)]
+    return [family.motion(number, shares) for shares in ends for number in range(len(family.references))]
+
+
+def check_family_reach(study: Study, name: str) -> None:
+    """As `check_reach` for the motions of a family, at both ends of what is drawn; an unknown family has none."""
+    motions = ends_of_family(study.families.get(name, Family()))
+    half = len(motions) // 2
+    for own in (motions[:half], motions[half:]):
+        check_reach(own, study.wrist, f"families.{name}.references.{{}}")
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:

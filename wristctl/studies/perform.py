@@ -98,6 +98,7 @@ def perform(
     show: ShowProgress,
     operator: Operator,
     executor: str = "serial",
+    typed: Sequence[str] = (),
 ) -> Found:
     """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
     work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
@@ -105,7 +106,7 @@ def perform(
         study = with_files(
             study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name
         )
-    session = Session(study, prepared.inputs, findings, show, operator, executor)
+    session = Session(study, prepared.inputs, findings, show, operator, executor, typed)
     if run is None:
         return work(session)
     try:

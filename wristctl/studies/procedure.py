@@ -28,6 +28,8 @@ class Procedure(Generic[Found]):
     needs: tuple[EarlierRun, ...] = ()
     in_units: bool = False
     """Whether it works in units, which other processes and machines may do."""
+    doubts: Callable[[Study, Inputs], None] | None = None
+    """Raises UserError for what the command does not do without `--force`."""
     sweeps: bool = False
     """Whether it can be done at many values of its settings."""
 

@@ -68,6 +68,8 @@ class Session:
     operator: Operator
     executor: str = "serial"
     """Who does units of work, as `--executor` names it: what is found does not depend on it."""
+    typed: Sequence[str] = ()
+    """The study's files and settings as the command line had them, for commands that are advised."""
 
     def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
         """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""

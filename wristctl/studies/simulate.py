@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +23,7 @@ from wristctl.studies.loop_inputs import (
     tuned_gains,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_if_outside, warn_outside_conditions
+from wristctl.studies.out_of_reach import OutOfReach, asked_by, warn_out_of_reach
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult
@@ -119,6 +122,7 @@ def simulate(session: Session) -> Simulated:
     warn_if_it_buckles(findings, wrist, [settings.loop])
     warn_if_coarse([settings.loop])
     warn_outside_conditions([settings], [settings.loop])
+    beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
     network = network_for(session.inputs, wrist, [settings.loop])
     with session.progress("compiling and simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
@@ -147,27 +151,37 @@ def simulate(session: Session) -> Simulated:
             caption = "How the motion comes to the law's sliding surface: phase plane, and sigma over time"
             findings.figure("sliding", sliding, course, law.surface, gains, caption=caption)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
-    short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network)
+    short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
     return Simulated(session.study, findings, tables, repeated, failed, short_of)
 
 
-def _short_of(session: Session, study: Study, repeated: Repeated, network: Inverse | None) -> str:
-    """Why the loop does not arrive, and which of its law's presets do: they are tried on the very same loop."""
+def _short_of(
+    session: Session, study: Study, repeated: Repeated, network: Inverse | None, beyond: Sequence[OutOfReach]
+) -> str:
+    """Why the loop does not arrive, and what may help.
+
+    Beyond what tendons hold that is other tendons or another motion; else those of its law's presets that arrive: they
+    are tried on the very same loop.
+    """
     from wristctl.control.table import controller
     from wristctl.simulation.arrival import why_not
     from wristctl.simulation.closed_loop import simulate as run_simulation
 
     chosen = study.simulate
     limit = study.wrist.tension_limit if chosen.loop.limits else math.inf
+    short = f"does not arrive: {why_not(repeated.first.trajectory, limit)}"
+    if beyond:
+        return f"{short}; {beyond[0].what}: no gains can help; {beyond[0].fix}"
     arriving = []
     with session.progress("trying the law's other gains"):
         for preset in controller(chosen.controller).presets:
             other = chosen.model_copy(update={"gains": preset, "repetitions": 1})
             if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": other}), network).arrives:
                 arriving.append(preset)
-    tune = f"wristctl tune --set controllers=[{chosen.controller}]"
-    fix = f"try --gains {' or '.join(arriving)}" if arriving else f"no preset of the law does here: {tune}"
-    return f"does not arrive: {why_not(repeated.first.trajectory, limit)}; {fix}"
+    if arriving:
+        return f"{short}; try --gains {' or '.join(arriving)}"
+    tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
+    return f"{short}; no preset of the law does here: {tune}"
 
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:

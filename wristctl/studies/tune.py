@@ -16,6 +16,7 @@ from wristctl.report.printed_table import Table
 from wristctl.studies.findings import Findings
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.loop_inputs import (
+    check_family_reach,
     check_inverses,
     check_reach,
     family_of,
@@ -25,6 +26,7 @@ from wristctl.studies.loop_inputs import (
     network_for,
 )
 from wristctl.studies.loop_warnings import warn_if_coarse, warn_if_it_buckles
+from wristctl.studies.out_of_reach import asked_by, refuse_out_of_reach, warn_out_of_reach
 from wristctl.studies.procedure import Procedure
 from wristctl.studies.session import Done, Session
 from wristctl.studies.study_result import StudyResult
@@ -75,9 +77,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.report.truth_table import truth_told
 
     with under("tune"):
-        wrist = identified(study, "tune", inputs).wrist
-        told = truth_told(wrist, judged_loops(study, study.tune))
-        return planned_search(study.tune, study.families, wrist, inputs) + told
+        known = identified(study, "tune", inputs)
+        told = truth_told(known.wrist, judged_loops(study, study.tune))
+        planned = planned_search(study.tune, study.families, known.wrist, inputs)
+    check_family_reach(known, study.tune.worlds.family)
+    return planned + told
 
 
 def planned_search(
@@ -131,6 +135,7 @@ def tune(session: Session) -> Tuned:
     loops = judged_loops(study, study.tune).values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
     warn_if_coarse(loops)
+    warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     network = network_for(session.inputs, study.wrist, loops)
     found = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
@@ -259,5 +264,6 @@ TUNE = sweepable(
             EarlierRun("from_identified", kind="identify", optional=True),
             EarlierRun("resume", kind="tune", optional=True, unfinished=True),
         ),
+        doubts=refuse_out_of_reach,
     )
 )
