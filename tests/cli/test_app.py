@@ -135,9 +135,9 @@ def test_a_run_is_labelled_by_the_last_study_file(
 def test_quiet_and_verbose_reach_the_messages_and_the_operator(probe: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Any] = []
 
-    def watched(prepared: Any, run: Any, show: Any, operator: Any, executor: str) -> Any:
+    def watched(prepared: Any, run: Any, show: Any, operator: Any, *others: Any) -> Any:
         seen.append((operator.quiet, operator.flags, operator.console.stderr))
-        return perform(prepared, run, show, operator, executor)
+        return perform(prepared, run, show, operator, *others)
 
     monkeypatch.setattr(command, "perform", watched)
     assert "sampling" in probe("gen-data", "-v").stderr and probe("gen-data", "-q").stderr == ""

@@ -60,10 +60,11 @@ class Simulated(StudyResult):
 
     @property
     def summary(self) -> list[str]:
-        """Why a loop does not arrive, and what does; empty where it does."""
+        """Why a loop does not arrive, and what does, a command on a line of its own; empty where it arrives."""
         from wristctl.studies.answer_lines import in_lines
 
-        return in_lines(self.short_of) if self.short_of else []
+        why, *command = self.short_of.split("\n")
+        return [*in_lines(why), *command]
 
     @property
     def marks(self) -> list[str]:
@@ -181,7 +182,7 @@ def _short_of(
     if arriving:
         return f"{short}; try --gains {' or '.join(arriving)}"
     tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
-    return f"{short}; no preset of the law does here: {tune}"
+    return f"{short}; no preset of the law does here:\n{tune}"
 
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
