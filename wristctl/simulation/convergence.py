@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import MOST_SUBSTEPS, Loop
 from wristctl.simulation.outcome import Outcome
 
 FINER = (2, 4, 8, 16, 32, 64)
@@ -52,10 +52,26 @@ def _swinging(outcome: Outcome) -> Mask:
     return keep
 
 
+def _most(outcome: Outcome, kinked: Mask) -> Array:
+    """Sum of the steps' estimated errors beyond which each is in doubt, (count,) [rad]."""
+    most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
+    return most
+
+
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
-    return (outcome.step_error > most) | (kinked & _swinging(outcome))
+    return (outcome.step_error > _most(outcome, kinked)) | (kinked & _swinging(outcome))
+
+
+def steps_for(outcome: Outcome, kinked: Mask) -> Rollouts:
+    """Integration steps in a control period at which rollouts in doubt are likely not to be, (count,).
+
+    Twice as many times as the sum of their errors is too large, since that falls more slowly than the step where the
+    torque jumps; a power of two, as those that are tried.
+    """
+    times = 2.0 * outcome.step_error / _most(outcome, kinked)
+    times = np.clip(np.nan_to_num(times, nan=np.inf), FINER[0], FINER[-1])
+    return np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
 
 
 def agree(one: Outcome, other: Outcome) -> Mask:
