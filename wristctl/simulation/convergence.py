@@ -71,7 +71,8 @@ def steps_for(outcome: Outcome, kinked: Mask) -> Rollouts:
     """
     times = 2.0 * outcome.step_error / _most(outcome, kinked)
     times = np.clip(np.nan_to_num(times, nan=np.inf), FINER[0], FINER[-1])
-    return np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
+    steps: Rollouts = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
+    return steps
 
 
 def agree(one: Outcome, other: Outcome) -> Mask:

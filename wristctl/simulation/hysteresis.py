@@ -261,7 +261,9 @@ def dead_bands(own: Strokes) -> list[DeadBand]:
         slid = path > _FULLY * np.array([every[at][0].presliding for at in which])
         below, above = done.theta[:, -1].reshape(2, -1).tolist()
         return [
-            DeadBand(*every[at], *exact[at].tolist(), below[k], above[k], bool(slid[k]), lasts / steps)
+            DeadBand(
+                *every[at], float(exact[at, 0]), float(exact[at, 1]), below[k], above[k], bool(slid[k]), lasts / steps
+            )
             for k, at in enumerate(which.tolist())
         ]
 
