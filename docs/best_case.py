@@ -265,7 +265,7 @@ def _orderings(shares: Any) -> str:
         "",
         "## In which share of the settings its orderings hold",
         "",
-        f"{int(shares['draws'].iloc[0])} settings drawn, less those that did not converge; mrac, gvsc and nc are laws of our own.",
+        f"{int(shares['draws'].iloc[0])} draws, less those that did not converge; mrac, gvsc and nc are our own laws.",
         "",
         "| claim | holds in | 95 % | by what decides most |",
         "|---|---|---|---|",
