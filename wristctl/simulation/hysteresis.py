@@ -262,9 +262,10 @@ def dead_bands(own: Strokes) -> list[DeadBand]:
         below, above = done.theta[:, -1].reshape(2, -1).tolist()
         return [
             DeadBand(
-                *every[at], float(exact[at, 0]), float(exact[at, 1]), below[k], above[k], bool(slid[k]), lasts / steps
+                every[at][0], every[at][1], float(exact[at, 0]), float(exact[at, 1]),
+                below[k], above[k], bool(slid[k]), lasts / steps,
             )
             for k, at in enumerate(which.tolist())
-        ]
+        ]  # fmt: skip
 
     return _converged(run, len(every), max(2, round(lasts / settings.step)))
