@@ -24,7 +24,7 @@ from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
-from wristctl.simulation.convergence import has_kinks, in_doubt, steps_for
+from wristctl.simulation.convergence import has_kinks, in_one_go
 from wristctl.simulation.kernel import Span, drive_in, gather_lanes, run_blocks
 from wristctl.simulation.observer import sense
 from wristctl.simulation.rollout import outcome_of, worlds_of
@@ -113,8 +113,7 @@ class SteppedLoops:
         """Loops whose integration step may be too long for the torques so far, and the steps in a control period that
         are likely to be enough, (count,) each."""
         outcome = outcome_of(self._batch, self.count, self._loop)
-        doubtful = in_doubt(outcome, self._kinked)
-        return doubtful, np.where(doubtful, steps_for(outcome, self._kinked), outcome.steps)
+        return in_one_go(outcome, self._kinked)
 
     def look(self) -> Sight:
         """What laws see now, before they answer, and what is true."""
