@@ -72,11 +72,13 @@ def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
     """Of rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
 
     Where tensions swing the estimate may be as small as a third of what else puts a loop in doubt and the loop be off;
-    a quarter is the limit there. The steps are twice as many times as the sum of errors is too large, since that falls
-    more slowly than the step where the torque jumps; a power of two, as those that are tried.
+    a quarter is the limit there. The steps are twice as many times as the sum of errors is too large, and more where
+    tensions swing, since that falls more slowly than the step where the torque jumps; a power of two, as those that are
+    tried.
     """
-    excess = outcome.step_error / _most(outcome, kinked) * np.where(_swinging(outcome, kinked), SWINGING, 1.0)
-    times = np.clip(np.nan_to_num(2.0 * excess, nan=np.inf), FINER[0], FINER[-1])
+    swinging = np.where(_swinging(outcome, kinked), SWINGING, 1.0)
+    excess = swinging * outcome.step_error / _most(outcome, kinked)
+    times = np.clip(np.nan_to_num(2.0 * swinging * excess, nan=np.inf), FINER[0], FINER[-1])
     steps = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
     doubtful: Mask = ~(excess <= 1.0)
     return doubtful, np.where(doubtful, steps, outcome.steps)
