@@ -126,7 +126,8 @@ PAGE = """\
 
 The paper leaves open what its simulation assumed (C10). Is there any setting, within what it leaves open
 (`experiments/unknowns.yaml`), in which all three numbers of a row of T2 come out at once? A setting counts only where
-the same wrist follows -30, +-15 and +-20 deg within 1.5 deg too. `python docs/best_case.py` writes this page.
+the same wrist follows -30, +-15 and +-20 deg within 1.5 deg too, and where its numbers do not depend on the integration
+step. `python docs/best_case.py` writes this page.
 
 {answer}
 
@@ -225,7 +226,7 @@ def _together(shares: Any) -> str:
     own = [] if shares is None else shares[shares["claim"].str.startswith("R-together")].to_dict("records")
     said = [
         f"- {row['claim'].removeprefix('R-together-')}: all three within {FACTOR} in {100 * row['reproduced']:.1f} % "
-        f"of {row['draws']} drawn settings "
+        f"of the {row['draws'] - row['not_converged']} of {row['draws']} drawn settings that converged "
         f"(95 %: {100 * row['reproduced_low']:.1f} to {100 * row['reproduced_high']:.1f})"
         for row in own
     ]
@@ -278,7 +279,7 @@ def _orderings(shares: Any) -> str:
         "",
         "## In which share of the settings its orderings hold",
         "",
-        f"{int(shares['draws'].iloc[0])} settings drawn from the whole box; mrac, gvsc and nc are laws of our own.",
+        f"{int(shares['draws'].iloc[0])} draws, less those that did not converge; mrac, gvsc and nc are our own laws.",
         "",
         "| claim | holds in | 95 % | by what decides most |",
         "|---|---|---|---|",

@@ -11,6 +11,7 @@ what a law sees, behind a camera the observer's estimate and never the plant's t
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,6 +37,7 @@ except ModuleNotFoundError as error:
 __all__ = ["OBSERVED", "SCALE", "WristEnv", "WristVectorEnv"]
 
 Box = gymnasium.spaces.Box
+log = logging.getLogger(__name__)
 
 
 class Observed(NamedTuple):
@@ -89,6 +91,7 @@ class _Episodes:
         self.action_space = Box(-1.0, 1.0, (1,), np.float64)
         self.observation_space = Box(-_BOUND, _BOUND, dtype=np.float64)
         self.loops: SteppedLoops | None = None
+        self.warned = False
 
     def begin(self, seed: int | None) -> tuple[Array, Array, Any]:
         """The next episodes, or with a seed the first under it: observations, true angles, and who has failed."""
@@ -117,6 +120,19 @@ class _Episodes:
             raise UserError("an action that is no number", "step(action)", "a finite one")
         self.loops.step(self.torque * actions)
         return self._seen()
+
+    def truth(self, theta: Array, failed: Any) -> dict[str, Any]:
+        """What `info` has of each; at an episode's end also whether its integration step is in doubt."""
+        told = {"theta": theta, "failed": failed}
+        if self.loops is None or not self.loops.done:
+            return told
+        doubtful, steps = self.loops.doubts()
+        if doubtful.any() and not self.warned:
+            self.warned = True
+            key = f"families.{self.family}.loop" if self.family else "simulate.loop"
+            what = "the angles of %d of %d episodes may depend on the integration step - %s - fix: substeps: %d"
+            log.warning(what, doubtful.sum(), self.count, key, steps.max())
+        return {**told, "in_doubt": doubtful, "substeps": steps}
 
     def _seen(self) -> tuple[Array, Array, Any, Array]:
         assert self.loops is not None
@@ -162,7 +178,9 @@ class WristEnv(gymnasium.Env[Array, Array]):
 
     Episode k under a seed (the study's where reset is given none) is repetition or case k of `split`: `learn`'s are its
     own; `judged` (`test` of a family) are those that `simulate` (`compare`) judges by. `info` has the truth: theta
-    [rad], failed. Raises UserError for an unknown family, a loop without limits, and what the study cannot be.
+    [rad], failed; at an episode's end also `in_doubt`, whether its integration step may have been too long for these
+    actions, and `substeps`, how many in a control period are likely to do. Raises UserError for an unknown family, a
+    loop without limits, and what the study cannot be.
     """
 
     def __init__(
@@ -180,17 +198,16 @@ class WristEnv(gymnasium.Env[Array, Array]):
         """The next episode, or with a seed the first under it; there are no options."""
         super().reset(seed=seed)
         observed, theta, failed = self._episodes.begin(seed)
-        return observed[0], _truth(theta, failed)
+        return observed[0], self._told(theta, failed)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold an action (1,) until the next sample; UserError for one that is no number."""
         observed, theta, failed, reward = self._episodes.step(np.asarray(action, np.float64).reshape(1))
         assert self._episodes.loops is not None
-        return observed[0], float(reward[0]), False, self._episodes.loops.done, _truth(theta, failed)
+        return observed[0], float(reward[0]), False, self._episodes.loops.done, self._told(theta, failed)
 
-
-def _truth(theta: Array, failed: Any) -> dict[str, Any]:
-    return {"theta": float(theta[0]), "failed": bool(failed[0])}
+    def _told(self, theta: Array, failed: Any) -> dict[str, Any]:
+        return {name: values[0].item() for name, values in self._episodes.truth(theta, failed).items()}
 
 
 class WristVectorEnv(VectorEnv[Array, Array, Array]):
@@ -241,8 +258,8 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _told(self, theta: Array, failed: Any) -> dict[str, Any]:
         """The truth as gymnasium has it: beside every entry, whose it is."""
-        all_, too = np.ones(self.num_envs, bool), np.ones(self.num_envs, bool)
-        return {"theta": theta, "_theta": all_, "failed": failed, "_failed": too}
+        told = self._episodes.truth(theta, failed)
+        return told | {f"_{name}": np.ones(self.num_envs, bool) for name in told}
 
 
 gymnasium.register(

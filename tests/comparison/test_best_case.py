@@ -32,7 +32,7 @@ def test_the_factor_is_that_of_the_worst_of_three_numbers_either_way() -> None:
         theta = np.where(time <= printed.settling, 0.4, 0.5 + scale * printed.steady_state)
         wanted = np.where(time <= printed.settling, 0.4, 0.5)
         factor, numbers, _ = closest(
-            Courses(theta[None], wanted[None], np.zeros(1), np.array([6.0]), 1e-3), "pid", "strict"
+            Courses(theta[None], wanted[None], np.zeros(1), np.array([6.0]), 1e-3, np.ones(1, bool)), "pid", "strict"
         )
         rmse = scale * printed.steady_state * math.sqrt(0.5)
         expected = max(max(scale, 1 / scale), max(rmse / printed.rmse, printed.rmse / rmse))
@@ -44,7 +44,7 @@ def test_what_has_just_settled_when_time_is_up_has_not_settled() -> None:
     time = np.arange(6000) * 1e-3
     for last, counts in ((5.0, True), (5.5, False)):
         theta = np.where(time <= last, 0.4, 0.5)
-        of = Courses(theta[None], np.full((1, 6000), 0.5), np.zeros(1), np.array([6.0]), 1e-3)
+        of = Courses(theta[None], np.full((1, 6000), 0.5), np.zeros(1), np.array([6.0]), 1e-3, np.ones(1, bool))
         assert np.isfinite(closest(of, "gvsc", "usual")[0][0]) == counts
         theta[-1] = np.nan
         assert np.isinf(closest(of._replace(theta=theta[None]), "gvsc", "usual")[0][0])

@@ -230,6 +230,47 @@ def test_import_is_light_and_a_missing_gymnasium_is_told() -> None:
     assert "gymnasium is not installed - wristctl.gym - fix: pip install 'wristctl[gym]'" in done.stderr
 
 
+BANG = np.where(np.arange(999) % 2 == 0, 1.0, -0.9)
+DEFAULT = ("simulate.horizon=1.0",)
+
+
+def test_an_episode_in_doubt_says_so_at_its_end_and_the_steps_that_it_names_are_enough(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Torques from limit to limit on four segments at 1 kHz, which one step a tick gets wrong."""
+
+    def ended(*settings: str) -> tuple[Array, dict[str, Any], list[str]]:
+        env = WristEnv(load_study([], [*DEFAULT, *settings]))
+        caplog.clear()
+        env.reset()
+        steps = [env.step(np.array([each])) for each in BANG]
+        assert not any("in_doubt" in each[4] or "substeps" in each[4] for each in steps[:-1])
+        return np.array([each[4]["theta"] for each in steps]), steps[-1][4], list(caplog.messages)
+
+    coarse, told, said = ended()
+    assert told["in_doubt"] and told["substeps"] > 1
+    assert len(said) == 1 and f"simulate.loop - fix: substeps: {told['substeps']}" in said[0]
+    own, enough, quiet = ended(f"simulate.loop.substeps={told['substeps']}")
+    assert not enough["in_doubt"] and enough["substeps"] == told["substeps"] and not quiet
+    fine = ended(f"simulate.loop.substeps={8 * told['substeps']}")[0]
+    off, left = (np.sqrt(np.mean((each - fine) ** 2)) for each in (coarse, own))
+    assert left < 0.1 * off and off > np.deg2rad(0.01)
+
+
+def test_of_a_vector_only_the_episodes_with_rough_actions_are_in_doubt(caplog: pytest.LogCaptureFixture) -> None:
+    env = WristVectorEnv(9, load_study([], DEFAULT))
+    for episode in range(2):
+        env.reset()
+        for each in BANG:
+            actions = np.zeros((9, 1))
+            actions[8] = each
+            *_, ended, told = env.step(actions)
+        assert ended.all() and told["_in_doubt"].all() and told["_substeps"].all()
+        assert told["in_doubt"].tolist() == [lane == 8 for lane in range(9)], episode
+        assert told["substeps"][:8].tolist() == [1] * 8 and told["substeps"][8] > 1
+    assert len(caplog.messages) == 1 and "1 of 9 episodes" in caplog.messages[0], "said once"
+
+
 def test_the_pages_example_runs_and_feedback_pays_in_it() -> None:
     (code,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "gym.md").read_text(), re.DOTALL | re.MULTILINE)
     known: dict[str, Any] = {}

@@ -157,3 +157,50 @@ def test_loops_that_a_wrist_cannot_go_through_are_refused(own: Any, wrist: Any, 
 def test_on_spools_a_wrist_that_would_buckle_on_pulls_goes_on() -> None:
     own = strokes(WRIST.model_copy(update={"hand_mass": 0.8}), HysteresisSettings(frequencies=(1.0,)))
     assert all(np.isfinite(each.course.theta).all() for each in loops(own))
+
+
+LIVELY = WristParameters(damping=1e-4)
+STIFF: dict[str, Any] = {"tendon_stiffness": 5e5, "shape": "triangle", "ranges_deg": ((0.0, 30.0),), "angles_deg": ()}
+
+
+def lively(**own: Any) -> HysteresisLoop:
+    """The loop of a wrist that hardly damps, on stiff tendons that turn with a jerk."""
+    settings = HysteresisSettings.model_validate(STIFF | {"sheaths": (3.0,), "frequencies": (0.5,)} | own)
+    return loops(strokes(LIVELY, settings))[0]
+
+
+@pytest.mark.parametrize("step", [2e-3, 1e-3])
+def test_a_loop_takes_as_many_steps_as_it_needs_and_says_how_many(step: float) -> None:
+    found, fine = lively(step=step), lively(step=1e-5)
+    assert found.step < 2e-4 and found.drift == fine.drift == 0.0
+    assert found.damped_work == pytest.approx(fine.damped_work, rel=0.02)
+    assert found.width == pytest.approx(fine.width, abs=np.radians(0.004))
+    samples = len(found.time) - 1
+    assert found.time[-1] == pytest.approx(2.0) and 2.0 / samples / found.step == pytest.approx(
+        round(2.0 / samples / found.step)
+    )
+
+
+def test_what_still_changes_at_the_shortest_step_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wristctl.simulation.hysteresis.FINER", (2,))
+    open_ = lively(step=1e-3)
+    assert open_.drift > 0.01 and open_.step == pytest.approx(5e-4)
+    monkeypatch.undo()
+    assert abs(open_.damped_work / lively(step=1e-5).damped_work - 1.0) > 0.01, "it had not settled"
+
+
+def test_a_quiet_loop_keeps_the_step_of_its_study(driven: dict[tuple[float, float], HysteresisLoop]) -> None:
+    assert {round(each.step, 9) for each in driven.values()} == {1e-3}
+    assert not any(each.drift for each in driven.values())
+
+
+def test_only_the_dead_band_that_needs_them_takes_more_steps() -> None:
+    """Beside a slow ramp's on the same wrist, the jerk of a quick one does not fade soon."""
+    slow, quick = (
+        dead_bands(strokes(LIVELY, HysteresisSettings.model_validate(
+            {**STIFF, "ramp": ramp, "angles_deg": (15.0,), "sheaths": (0.0, 3.0)}
+        )))
+        for ramp in (7.0, 1.0)
+    )  # fmt: skip
+    assert all(each.drift == 0.0 for each in (*slow, *quick))
+    assert quick[1].step < slow[1].step == pytest.approx(1e-3)

@@ -122,3 +122,33 @@ def test_a_file_that_is_no_loop_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="unknown column 'angel'"):
         wristctl.hysteresis(study(f"hysteresis.measured={tmp_path / 'wrong.csv'}"), out=tmp_path / "results")
     assert not (tmp_path / "results").exists()
+
+
+def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = ("wrist.damping=1e-4", "hysteresis.tendon_stiffness=5e5", "hysteresis.shape=triangle")
+    sound = wristctl.hysteresis(study(*own))
+    monkeypatch.setattr("wristctl.simulation.hysteresis.FINER", (2,))
+    found = wristctl.hysteresis(study(*own))
+    drifts = [each.drift for each in found.loops] + [each.drift for each in found.dead_bands]
+    open_ = [each for each in drifts if each > 0.0]
+    assert 0 < len(open_) == found.metrics["not_converged"] and sound.metrics["not_converged"] == 0.0
+    assert found.marks == [f"not converged: {len(open_)} of {len(found.loops) + len(found.dead_bands)}"]
+    assert sound.marks == [] and "NOT CONVERGED" not in str(sound)
+    table = found.tables[0]
+    told = [row[list(table.columns).index("fate")] for row in table.rows]
+    outer = [each for each in found.loops if each.case.low == 0.0]
+    assert [bool(each) for each in told] == [each.drift > 0.0 for each in outer] and any(told)
+    assert "NOT CONVERGED" in table.title
+    frame = found.frame()
+    assert frame["drift"].tolist() == [each.drift for each in found.loops] and (frame["step"] <= 1e-3).all()
+
+
+@pytest.mark.parametrize(("step", "told"), [(1e-3, False), (5e-3, True)])
+def test_a_fit_by_too_long_a_step_is_warned_of(
+    step: float, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    loop = made_loop(CABLE, 1, SHORT._replace(frequency=1.0, cycles=2.0)).loop
+    wristctl.hysteresis(
+        study(f"hysteresis.measured={written(loop, tmp_path / 'quick.csv')}", f"hysteresis.step={step}")
+    )
+    assert any("hysteresis.step: 0.0025" in said for said in caplog.messages) == told

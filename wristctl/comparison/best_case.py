@@ -1,7 +1,8 @@
 """Best case for the paper: the setting in the box that comes closest to all three numbers of a row of T2 at once.
 
 A search that asks for nothing else finds stopped clocks: wrists that sag onto gravity and rest at 30 deg whatever is
-asked of them. So a setting counts where the same wrist follows other angles too, both ways.
+asked of them. So a setting counts where the same wrist follows other angles too, both ways. One whose numbers depend on
+the integration step never counts.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def closest(of: Courses, controller: str, reading: Reading) -> tuple[Array, Arra
     with np.errstate(divide="ignore", invalid="ignore"):
         factors = np.exp(np.abs(np.log(numbers / printed)).max(axis=2))
     rests = left >= np.maximum(0.5, _LEAST_REST * of.horizons)[:, None]
-    factors = np.where(np.isfinite(factors) & rests, factors, np.inf)
+    factors = np.where(np.isfinite(factors) & rests & of.converged[:, None], factors, np.inf)
     best, every = factors.argmin(axis=1), np.arange(len(factors))
     return factors[every, best], numbers[every, best], [names[each] for each in best]
 
@@ -83,8 +84,9 @@ def follows(row: Row, settings: Sequence[PaperSetting]) -> NDArray[np.bool_]:
     kept = np.ones(len(settings), bool)
     for angle in GUARD_DEG:
         references = [each.reference.model_copy(update={"angle_deg": angle}) for each in settings]
-        error = readings(courses(row, settings, references))["steady_state"]
-        kept &= np.nan_to_num(error, nan=np.inf) < np.radians(_WITHIN_DEG)
+        of = courses(row, settings, references)
+        error = readings(of)["steady_state"]
+        kept &= of.converged & (np.nan_to_num(error, nan=np.inf) < np.radians(_WITHIN_DEG))
     return kept
 
 

@@ -37,6 +37,8 @@ class Reactions:
 
     settings: Sequence[PaperSetting]
     found: Mapping[str, Mapping[str, Array]]
+    converged: Mapping[str, NDArray[np.bool_]]
+    """Where a row's numbers do not depend on the integration step; the others tell nothing."""
 
     def values(self, unknown: str) -> list[Any]:
         """What an unknown is in each setting."""
@@ -81,21 +83,23 @@ def react(
 ) -> Reactions:
     """Every row in every setting; `mirrored` turns the references to the other side."""
     found = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
+    converged = {row.label: np.zeros(len(settings), bool) for row in rows}
     work = [(own, row) for own in _alike(settings) for row in rows]
 
     done, stop = 0, Event()
 
-    def ran(task: tuple[NDArray[np.intp], Row]) -> dict[str, Array]:
+    def ran(task: tuple[NDArray[np.intp], Row]) -> Courses:
         return _ran(task[1], [settings[each] for each in task[0]], mirrored, stop)
 
     with stoppable(cores(), stop) as pool:
-        for (own, row), read in zip(work, pool.map(ran, work), strict=True):
-            for name, each in read.items():
+        for (own, row), done_there in zip(work, pool.map(ran, work), strict=True):
+            for name, each in readings(done_there).items():
                 found[row.label][name][own] = each
+            converged[row.label][own] = done_there.converged
             done += len(own)
             if progress is not None:
                 progress(done / (len(settings) * len(rows)))
-    return Reactions(settings, found)
+    return Reactions(settings, found, converged)
 
 
 def courses(
@@ -115,13 +119,13 @@ def courses(
         [each.wrist for each in settings], record="briefly", threads=threads, stop=stop,
     )  # fmt: skip
     rests = np.array([each.rest for each in motions])
-    return Courses(out.columns("theta"), out.references[:, 0], rests, horizons, period)
+    return Courses(out.columns("theta"), out.references[:, 0], rests, horizons, period, ~out.unconverged)
 
 
-def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> dict[str, Array]:
-    """The readings (settings,) of one row."""
+def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> Courses:
+    """What one row does."""
     references = [each.reference.mirrored() if mirrored else each.reference for each in settings]
-    return readings(courses(row, settings, references, 1, stop))
+    return courses(row, settings, references, 1, stop)
 
 
 def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:

@@ -26,6 +26,8 @@ class Courses(NamedTuple):
     horizons: Array
     """How much of each counts, (N,) [s]"""
     period: float
+    converged: NDArray[np.bool_]
+    """Whose numbers do not depend on the integration step, (N,)"""
 
 
 def readings(of: Courses) -> dict[str, Array]:
@@ -35,7 +37,7 @@ def readings(of: Courses) -> dict[str, Array]:
     over the motion, last time outside +-2 % of the final reference, from the start and from when the reference rests,
     and the mean |e| of the last 10 %. What has failed, or never settles, is nan.
     """
-    theta, wanted, rests, horizons, period = of
+    theta, wanted, rests, horizons, period, _ = of
     time: Array = np.arange(theta.shape[1], dtype=np.float64) * period
     error, final = theta - wanted, wanted[:, -1:]
     inside: NDArray[np.bool_] = np.array(time[None, :] < horizons[:, None] - 0.5 * period, bool)

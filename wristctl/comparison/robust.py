@@ -34,7 +34,8 @@ class Strip:
 
     claim: Claim
     ratios: NDArray[np.float64]
-    verdicts: Sequence[VerdictName]
+    verdicts: Sequence[VerdictName | None]
+    """None where our value depends on the integration step: there is no verdict, and nothing counts it."""
     leaves: Sequence[Leaf]
     """Unknowns by what they explain of whether the claim holds."""
     split: Threshold | None
@@ -43,8 +44,13 @@ class Strip:
     """Where the claim holds by the first of them, in words."""
 
     def share(self, *verdicts: VerdictName) -> Share:
-        """Of the draws, those with one of these verdicts."""
-        return share(np.array([each in verdicts for each in self.verdicts]))
+        """Of the draws that have a verdict, those with one of these."""
+        return share(np.array([each in verdicts for each in self.verdicts if each is not None], bool))
+
+    @property
+    def uncounted(self) -> int:
+        """Draws that have none, since they did not converge."""
+        return sum(each is None for each in self.verdicts)
 
 
 def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
@@ -62,14 +68,29 @@ def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None
     for claim in own:
         if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
             continue
-        ratios, verdicts = _judged(claim, drawn, mirrored)
-        yes = np.array([each == "reproduced" for each in verdicts])
-        leaves = deciding(yes, values)
-        first = values[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
+        ratios, judged = _judged(claim, drawn, mirrored)
+        sound = _converged(claim, drawn, mirrored)
+        verdicts = [each if counts else None for each, counts in zip(judged, sound, strict=True)]
+        yes = np.array([each == "reproduced" for each in judged])[sound]
+        counted = {
+            name: [each for each, counts in zip(own, sound, strict=True) if counts] for name, own in values.items()
+        }
+        leaves = deciding(yes, counted) if sound.any() else []
+        first = counted[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
         cut = split(yes, first) if first and not isinstance(first[0], str) else None
         told = _worded(leaves[0].name, yes, first, cut) if first else ""
         found.append(Strip(claim, ratios, verdicts, leaves, cut, told))
     return found
+
+
+def _converged(claim: Claim, drawn: Reactions, mirrored: Reactions | None) -> NDArray[np.bool_]:
+    """In which draws none of the numbers that a claim is judged by depends on the integration step."""
+    rows = [drawn.converged[label] for label in (claim.label, claim.than) if label]
+    if claim.evidence == "symmetry":
+        assert mirrored is not None
+        rows.append(mirrored.converged[claim.label])
+    sound: NDArray[np.bool_] = np.logical_and.reduce(rows)
+    return sound
 
 
 def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Threshold | None) -> str:
@@ -122,12 +143,13 @@ def _together(claim: Claim, ours: Mapping[str, NDArray[np.float64]]) -> tuple[ND
 
 
 def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
-    """One row per claim: shares of the box with their 95 % intervals, and the two unknowns that decide most."""
+    """One row per claim: shares of the box's settings that converged, with 95 % intervals, and the two unknowns that
+    decide most."""
     import pandas as pd
 
     rows = []
     for each in found:
-        row: dict[str, Any] = {"claim": each.claim.id, "draws": len(each.verdicts)}
+        row: dict[str, Any] = {"claim": each.claim.id, "draws": len(each.verdicts), "not_converged": each.uncounted}
         for key, own in (
             ("reproduced", each.share("reproduced")),
             ("better", each.share("better than the paper")),
@@ -141,11 +163,12 @@ def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
 
 
 def draws_frame(drawn: Reactions) -> pd.DataFrame:
-    """Every draw: what each unknown is, and every reading of every row."""
+    """Every draw: what each unknown is, every reading of every row, and whether these have converged."""
     import pandas as pd
 
     columns: dict[str, Any] = {name: drawn.values(name) for name in drawn.settings[0].values}
     readings: Mapping[str, Any] = {
         f"{row} {name}": values for row, each in drawn.found.items() for name, values in each.items()
     }
-    return pd.DataFrame(columns | dict(readings))
+    converged: Mapping[str, Any] = {f"{row} converged": each for row, each in drawn.converged.items()}
+    return pd.DataFrame(columns | dict(readings) | dict(converged))

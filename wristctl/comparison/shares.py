@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,8 @@ class Share(NamedTuple):
 
     @property
     def value(self) -> float:
-        """The share."""
-        return self.times / self.n
+        """The share; nan of none."""
+        return self.times / self.n if self.n else math.nan
 
 
 def share(happened: NDArray[np.bool_]) -> Share:
@@ -32,6 +33,8 @@ def share(happened: NDArray[np.bool_]) -> Share:
     from scipy.special import betaincinv
 
     times, n = int(np.sum(happened)), len(happened)
+    if n == 0:
+        return Share(0, 0, math.nan, math.nan)
     low = float(betaincinv(times, n - times + 1, 0.025)) if times else 0.0
     high = float(betaincinv(times + 1, n - times, 0.975)) if times < n else 1.0
     return Share(times, n, low, high)

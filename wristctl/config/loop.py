@@ -24,6 +24,8 @@ DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 LONGEST_STEP = 1e-3
 """Integration step [s] below which elastic tendons and their friction cost no accuracy (docs/accuracy.md)."""
+MOST_SUBSTEPS = 1000
+"""Integration steps that a control period may have by hand."""
 STIFF = 50e3
 """Stiffness [N/m] beyond which tendons take half that step."""
 
@@ -51,7 +53,7 @@ class Loop(Section):
         "integration steps in a period; null: as many as its numbers take, of 1 ms at most for elastic tendons (0.5 ms "
         "above 50 kN/m)",
         ge=1,
-        le=1000,
+        le=MOST_SUBSTEPS,
     )
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")
 

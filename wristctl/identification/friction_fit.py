@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +77,16 @@ class FrictionFit:
         x = self.x.copy()
         x[EXPONENT] = 0.0
         return self.problem.expected([x])[0][0]
+
+    @property
+    def step_error(self) -> float:
+        """RMS change of what is expected when the integration step is halved, over the noise; of all quantities the
+        largest."""
+        settings = self.problem.settings
+        finely = replace(self.problem, settings=settings.model_copy(update={"step": 0.5 * settings.step}))
+        (coarse,), (fine,) = self.problem.expected([self.x]), finely.expected([self.x])
+        parts = zip(fine, coarse, self.noise, strict=True)
+        return max(float(np.sqrt(np.mean((one - other) ** 2)) / noise) for one, other, noise in parts)
 
     @property
     def leap(self) -> float:

@@ -61,10 +61,16 @@ def shares(found: Sequence[Strip], heading: str = "") -> Figure:
     panel.grid(False, axis="y")
     _beside(panel, len(found) - 0.2, "holds in", 40.0, ha="right", fontsize=8.0)
     _beside(panel, len(found) - 0.2, "by what decides most", 46.0, fontsize=8.0)
-    panel.set_xlabel(f"share of {len(found[0].verdicts)} settings", fontsize=10.0)
+    panel.set_xlabel(f"share of {counted(found)}", fontsize=10.0)
     made.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
     legend_below(made, 2)
     return made
+
+
+def counted(found: Sequence[Strip]) -> str:
+    """How many settings there are, and of which claim the most are not counted."""
+    draws, most = len(found[0].verdicts), max(each.uncounted for each in found)
+    return f"{draws} settings" + f", without up to {most} that did not converge" * bool(most)
 
 
 def _beside(panel: Axes, place: float, said: str, right: float, **style: Any) -> None:
@@ -87,6 +93,10 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
         own = np.array([each in verdicts for each in one.verdicts])
         if own.any():
             panel.plot(x[own], y[own], "o", ms=2.5, mew=0, alpha=0.6, color=colour, label=label)
+    open_ = np.array([each is None for each in one.verdicts])
+    if open_.any():
+        style = {"ms": 2.5, "mew": 0.4, "mfc": "none", "color": GREY}
+        panel.plot(x[open_], y[open_], "o", label="did not converge: not counted", **style)
     if names:
         panel.set_xticks(range(len(names)), names)
     elif x.min() > 0.0 and x.max() > 8.0 * x.min():

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import MOST_SUBSTEPS, Loop
 from wristctl.simulation.oscillation import FASTEST
 from wristctl.simulation.outcome import Outcome
 
@@ -36,6 +36,8 @@ times as much where forces have kinks, which the estimate takes for errors."""
 SWINGS = 2.0
 """How often tensions go through their whole range and back, from which a loop with kinks is in doubt [1/s]; loops
 without are where they chatter (FASTEST)."""
+SWINGING = 4.0
+"""How many times as much the estimated errors of loops that swing count where a loop cannot run again."""
 
 Rollouts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -55,10 +57,31 @@ def _swinging(outcome: Outcome, kinked: Mask) -> Mask:
     return often
 
 
+def _most(outcome: Outcome, kinked: Mask) -> Array:
+    """Sum of the steps' estimated errors beyond which each is in doubt, (count,) [rad]."""
+    most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
+    return most
+
+
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
-    return (outcome.step_error > most) | _swinging(outcome, kinked)
+    return (outcome.step_error > _most(outcome, kinked)) | _swinging(outcome, kinked)
+
+
+def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
+    """Of rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
+
+    Where tensions swing the estimate may be as small as a third of what else puts a loop in doubt and the loop be off;
+    a quarter is the limit there. The steps are twice as many times as the sum of errors is too large, and more where
+    tensions swing, since that falls more slowly than the step where the torque jumps; a power of two, as those that are
+    tried.
+    """
+    swinging = np.where(_swinging(outcome, kinked), SWINGING, 1.0)
+    excess = swinging * outcome.step_error / _most(outcome, kinked)
+    times = np.clip(np.nan_to_num(2.0 * swinging * excess, nan=np.inf), FINER[0], FINER[-1])
+    steps = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
+    doubtful: Mask = ~(excess <= 1.0)
+    return doubtful, np.where(doubtful, steps, outcome.steps)
 
 
 def agree(one: Outcome, other: Outcome) -> Mask:

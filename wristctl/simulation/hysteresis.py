@@ -1,18 +1,22 @@
-"""Loops of a wrist whose tendons have friction, and the dead band in which held spools leave it."""
+"""Loops of a wrist whose tendons have friction, and the dead band in which held spools leave it.
+
+Each is driven with half of its integration steps too, and then with 2, 4, ... times as many, until it stays what it is.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.simulation.convergence import ABSOLUTE, FINER, RELATIVE
 from wristctl.simulation.spooled import Spooled, spooled
 from wristctl.simulation.strokes import FrictionCase, Strokes
 
@@ -20,6 +24,10 @@ _HOLD = 1.5
 """How long a wrist is held at the end of a ramp [s]."""
 _FULLY = 5.0
 """Path, over presliding, after which a bristle is bent fully: to exp(-5)."""
+_LEAST_WORK = 0.01
+"""Share of the raw loop's area below which a work is compared with that share."""
+_LEAST_WIDTH = ABSOLUTE / RELATIVE
+"""Width [rad] below which an angle is compared with that."""
 
 
 class LoopCase(NamedTuple):
@@ -44,6 +52,10 @@ class HysteresisLoop:
     """What the wrist did, (T,) each."""
     exact_width: float
     """Dead band in the middle of the range, by the statics [rad]."""
+    step: float
+    """Integration step [s]."""
+    drift: float = 0.0
+    """Largest relative change of width and works with the integration step, at the shortest tried; 0: converged."""
 
     @property
     def width(self) -> float:
@@ -66,12 +78,26 @@ class HysteresisLoop:
         """What the wrist's damping took [J]."""
         return _gained(self.course.damped)
 
+    def change(self, coarse: HysteresisLoop) -> float:
+        """Largest relative change of width and works from a longer step to this one."""
+        of_width = abs(self.width - coarse.width) / max(abs(self.width), _LEAST_WIDTH)
+        least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
+        names = "friction_work", "raw_work", "damped_work"
+        pairs = [(getattr(self, name), getattr(coarse, name)) for name in names]
+        return _largest([of_width, *(abs(fine - before) / max(abs(fine), least) for fine, before in pairs)])
+
 
 def _gained(work: Array) -> float:
     return float(work[-1] - work[0])
 
 
-class DeadBand(NamedTuple):
+def _largest(changes: Sequence[float]) -> float:
+    """The largest; what is no number has changed beyond all."""
+    return max(each if math.isfinite(each) else math.inf for each in changes)
+
+
+@dataclass(frozen=True)
+class DeadBand:
     """Where held spools leave a wrist that comes from below and from above [rad]."""
 
     tendons: FrictionCase
@@ -85,6 +111,10 @@ class DeadBand(NamedTuple):
     above: float
     slid: bool
     """Whether its tendons slid far enough on both ramps that their bristles were bent fully."""
+    step: float
+    """Integration step [s]."""
+    drift: float = 0.0
+    """Largest change of an end with the integration step, over the width, at the shortest tried; 0: converged."""
 
     @property
     def exact_width(self) -> float:
@@ -95,6 +125,36 @@ class DeadBand(NamedTuple):
     def width(self) -> float:
         """As it was simulated [rad]."""
         return self.above - self.below
+
+    def change(self, coarse: DeadBand) -> float:
+        """Largest change of an end from a longer step to this one, over the width."""
+        least = max(abs(self.width), _LEAST_WIDTH)
+        return _largest([abs(self.below - coarse.below) / least, abs(self.above - coarse.above) / least])
+
+
+Found = TypeVar("Found", HysteresisLoop, DeadBand)
+
+
+def _converged(run: Callable[[NDArray[np.int64], int], list[Found]], count: int, steps: int) -> list[Found]:
+    """What `run` finds of `count` wrists, each with as many integration steps as it takes.
+
+    `run` drives some of them with so many steps in an interval of its own, `steps` or a multiple. The first number of
+    steps whose result is within 1 % (or 0.002 deg) of that with half of them is taken.
+    """
+    left, coarse = np.arange(count), max(1, steps // 2)
+    found, before = run(left, coarse), dict[int, Found]()
+    for times in (1, *FINER):
+        if times * steps == coarse:
+            continue
+        before |= zip(left.tolist(), (found[at] for at in left), strict=True)
+        for at, fine in zip(left.tolist(), run(left, times * steps), strict=True):
+            found[at] = fine
+        left = np.array([at for at in left.tolist() if found[at].change(before[at]) > RELATIVE], np.int64)
+        if not len(left):
+            break
+    for at in left.tolist():
+        found[at] = replace(found[at], drift=found[at].change(before[at]))
+    return found
 
 
 def friction_cases(settings: HysteresisSettings) -> list[FrictionCase]:
@@ -146,23 +206,29 @@ def _driven(own: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[L
     settings = own.settings
     low, high = np.array([(each.low, each.high) for each in cases]).T
     ends = own.exact([each.tendons for each in cases], 0.5 * (low + high))
-    every = math.ceil(1.0 / (frequency * settings.step * settings.samples) * (1.0 - 1e-9))
-    h = 1.0 / (frequency * settings.samples * every)
-
-    def told(time: Array, which: NDArray[np.int64]) -> Array:
-        return own.told(low[which] + (high - low)[which] * _swing(frequency * time, settings.shape)[:, None])
-
     wrists = [own.lane(each.tendons, each.low) for each in cases]
-    done = spooled(wrists, told, 3 * settings.samples * every // 2 + 1, h, every)
     cycle = np.arange(settings.samples // 2, 3 * settings.samples // 2 + 1)
-    time, swing = h * every * np.arange(0.0, settings.samples + 1), _swing(cycle / settings.samples, settings.shape)
-    return {
-        case: HysteresisLoop(
-            case, time, case.low + (case.high - case.low) * swing, Spooled(*(each[at, cycle] for each in done)),
-            float(ends[at, 1] - ends[at, 0]),
-        )
-        for at, case in enumerate(cases)
-    }  # fmt: skip
+    swing = _swing(cycle / settings.samples, settings.shape)
+
+    def run(which: NDArray[np.int64], every: int) -> list[HysteresisLoop]:
+        h = 1.0 / (frequency * settings.samples * every)
+        first, rises = low[which], (high - low)[which]
+
+        def told(time: Array, lanes: NDArray[np.int64]) -> Array:
+            return own.told(first[lanes] + rises[lanes] * _swing(frequency * time, settings.shape)[:, None])
+
+        done = spooled([wrists[at] for at in which], told, 3 * settings.samples * every // 2 + 1, h, every)
+        time = h * every * np.arange(0.0, settings.samples + 1)
+        return [
+            HysteresisLoop(
+                cases[at], time, low[at] + (high - low)[at] * swing, Spooled(*(each[lane, cycle] for each in done)),
+                float(ends[at, 1] - ends[at, 0]), h,
+            )
+            for lane, at in enumerate(which.tolist())
+        ]  # fmt: skip
+
+    every = math.ceil(1.0 / (frequency * settings.step * settings.samples) * (1.0 - 1e-9))
+    return {each.case: each for each in _converged(run, len(cases), every)}
 
 
 def _swing(phase: Array, shape: str) -> Array:
@@ -178,21 +244,28 @@ def dead_bands(own: Strokes) -> list[DeadBand]:
     every = [(case, math.radians(angle)) for case in friction_cases(settings) for angle in settings.angles_deg]
     if not every:
         return []
-    at, ends = np.array([angle for _, angle in every]), np.radians(settings.ranges_deg[0])
-    exact = own.exact([tendons for tendons, _ in every], at)
-    begin, goal = np.repeat(ends, len(every)), np.tile(at, 2)
+    angle, ends = np.array([angle for _, angle in every]), np.radians(settings.ranges_deg[0])
+    exact = own.exact([tendons for tendons, _ in every], angle)
+    lasts = settings.ramp + _HOLD
 
-    def told(time: Array, which: NDArray[np.int64]) -> Array:
-        s = np.minimum(time / settings.ramp, 1.0)[:, None]
-        return own.told(begin[which] + (goal - begin)[which] * s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+    def run(which: NDArray[np.int64], steps: int) -> list[DeadBand]:
+        begin, goal = np.repeat(ends, len(which)), np.tile(angle[which], 2)
 
-    wrists = [own.lane(tendons, float(end)) for end in ends for tendons, _ in every]
-    steps = round((settings.ramp + _HOLD) / settings.step)
-    done = spooled(wrists, told, steps + 1, settings.step, steps)
-    path = own.wrist.tendon_offset * np.abs(done.theta[:, -1] - begin).reshape(2, -1).min(axis=0)
-    slid = path > _FULLY * np.array([tendons.presliding for tendons, _ in every])
-    below, above = done.theta[:, -1].reshape(2, -1).tolist()
-    return [
-        DeadBand(tendons, angle, float(exact[k, 0]), float(exact[k, 1]), below[k], above[k], bool(slid[k]))
-        for k, (tendons, angle) in enumerate(every)
-    ]
+        def told(time: Array, lanes: NDArray[np.int64]) -> Array:
+            s = np.minimum(time / settings.ramp, 1.0)[:, None]
+            return own.told(begin[lanes] + (goal - begin)[lanes] * s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+
+        wrists = [own.lane(every[at][0], float(end)) for end in ends for at in which]
+        done = spooled(wrists, told, steps + 1, lasts / steps, steps)
+        path = own.wrist.tendon_offset * np.abs(done.theta[:, -1] - begin).reshape(2, -1).min(axis=0)
+        slid = path > _FULLY * np.array([every[at][0].presliding for at in which])
+        below, above = done.theta[:, -1].reshape(2, -1).tolist()
+        return [
+            DeadBand(
+                every[at][0], every[at][1], float(exact[at, 0]), float(exact[at, 1]),
+                below[k], above[k], bool(slid[k]), lasts / steps,
+            )
+            for k, at in enumerate(which.tolist())
+        ]  # fmt: skip
+
+    return _converged(run, len(every), max(2, round(lasts / settings.step)))

@@ -154,11 +154,14 @@ def _run(
     done = batch(controller, gains, motions, worlds, lanes, model, start, columns)
     _advance(done, kernel_of(run_blocks, model), threads or cores(), progress, stop)
     done.setup.law.check()
-    sums = to_rows(done.state.sums, count)
-    goals = to_rows(done.world.goals, count)
+    return outcome_of(done, count, loop, KeptSamples.of(done.state.record, count) if record else None)
+
+
+def outcome_of(done: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
+    """What has become of a batch's rollouts, so far as they have come."""
+    sums, goals = to_rows(done.state.sums, count), to_rows(done.world.goals, count)
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(Goals._fields, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
-    kept = KeptSamples.of(done.state.record, count) if record else None
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
     steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
     return Outcome(summary(totals), failed, until, done.course.references, steps, error, drift, kept)

@@ -24,9 +24,10 @@ from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
+from wristctl.simulation.convergence import has_kinks, in_one_go
 from wristctl.simulation.kernel import Span, drive_in, gather_lanes, run_blocks
 from wristctl.simulation.observer import sense
-from wristctl.simulation.rollout import worlds_of
+from wristctl.simulation.rollout import outcome_of, worlds_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
 from wristctl.wrist.allocation import reach
@@ -86,6 +87,7 @@ class SteppedLoops:
         lanes = Lanes(which, world, [each.stream for each in cases])
         model = PLANTS[loops[0].plant.model]
         self.count, self.sample, self.samples = count, 0, len(motions[0].time)
+        self._loop, self._kinked = loops[0], np.array([has_kinks(each) for each in loops])
         self._run: Callable[..., None] = kernel_of(run_blocks, model)
         self._look: Callable[..., None] = kernel_of(_look_blocks, model)
         self._batch = batch(GIVEN, np.zeros((count, 1)), motions, worlds, lanes, model, start, 0)
@@ -106,6 +108,12 @@ class SteppedLoops:
         span = Span(0, made.blocks, self.sample, self.sample + 1)
         self._run(made.setup, made.course, made.world, made.state, self._scratch, span)
         self.sample += 1
+
+    def doubts(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Loops whose integration step may be too long for the torques so far, and the steps in a control period that
+        are likely to be enough, (count,) each."""
+        outcome = outcome_of(self._batch, self.count, self._loop)
+        return in_one_go(outcome, self._kinked)
 
     def look(self) -> Sight:
         """What laws see now, before they answer, and what is true."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.config.audit import Claim
-from wristctl.config.errors import UserError, meant
+from wristctl.config.errors import UserError, meant, under
+from wristctl.config.loop import LOOPS
 from wristctl.config.study import Study
 from wristctl.config.wording import Argument, Call
 from wristctl.records import LiveRun, Run, start_run
@@ -57,6 +58,7 @@ class Audited(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """What will be run; no claims, or a train run that cannot show them, are errors here."""
     from wristctl.comparison.evidence import TRAININGS, conditions_of
+    from wristctl.simulation.size import Size, check_size
 
     claims = study.audit.claims
     if not claims:
@@ -67,8 +69,26 @@ def plan(study: Study, inputs: Inputs) -> str:
     shown = [f"{name}: {_name(inputs[name]) if name in inputs else 'open, for want of a run'}" for name in asked]
     rollouts = f"{len(conditions_of(claims))} comparisons on the built-in loops"
     box = study.audit.box
+    with under("audit"):
+        check_size(Size(list(LOOPS.values()), study.audit.horizon))
+        if box.unknowns:
+            with under("box"):
+                _check_box(study)
     rollouts += f", and {box.draws + sum(box.continuous)} settings drawn" * bool(box.unknowns)
     return "\n".join([f"{len(claims)} claims; {rollouts}", *shown])
+
+
+def _check_box(study: Study) -> None:
+    """UserError where the box's settings are too many; their mean is that of a few of them."""
+    from wristctl.comparison.box import CONTINUOUS, drawn_settings
+    from wristctl.comparison.robust import rows_in_box
+    from wristctl.simulation.size import Size, check_steps
+
+    box, rows = study.audit.box, len(rows_in_box(study.audit.claims))
+    few = drawn_settings(box.model_copy(update={"draws": 8}), study.wrist, study.seed)
+    each = sum(Size([own.loop], own.horizon).steps for own in few) / len(few)
+    count = box.draws + sum(box.continuous)
+    check_steps(rows * (box.draws * each + sum(box.continuous) * box.horizon / CONTINUOUS), rows * count)
 
 
 def audit(session: Session) -> Audited:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LINES = 24
 """What the first screen may take of a terminal."""
 _HEAVIEST = 5
-"""Claims of which it has both numbers."""
+"""Claims of which it has both numbers; one less where a box was drawn."""
 _MORE = "All claims with reasons: `wristctl audit ... --all`, or README.md of the run. Words: docs/index.md."
 
 
@@ -30,18 +30,19 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     """At most LINES lines; `strips` are the claims over the box, `limit` is of the wrist's tendons [N]."""
     claims = [j for j in judged if j.verdict is not None]
     loops = list(dict.fromkeys(name for j in claims for name in j.found if name))
-    table = _numbers(claims, loops)
-    first = [*_conditions(loops, limit), *_gains(claims), *_ranking(claims, loops), *_over_the_box(strips)]
-    second = [*_networks(claims), *_untested(claims), *_by_topic(claims)]
-    return [*_fitted(first, second, LINES - 1 - len(table)), *table, _MORE]
+    table = _numbers(claims, loops, _HEAVIEST - bool(strips))
+    loose, box = _by_topic(claims), _over_the_box(strips)
+    first, second = [*_conditions(loops, limit), *_gains(claims), *_ranking(claims, loops)], [*loose, *box]
+    return [*_fitted([first, second, [*_networks(claims), *_untested(claims)]], LINES - 1 - len(table)), *table, _MORE]
 
 
-def _fitted(first: Sequence[str], second: Sequence[str], room: int) -> list[str]:
-    """Two paragraphs of sentences in so many lines; what there is no room for is left out from the end, whole."""
-    lines = [line for each in (first, second) for line in in_lines(" ".join(each))]
-    if len(lines) <= room or not (first or second):
+def _fitted(paragraphs: Sequence[Sequence[str]], room: int) -> list[str]:
+    """Paragraphs of sentences in so many lines; what there is no room for is left out from the end, whole."""
+    lines = [line for each in paragraphs for line in in_lines(" ".join(each))]
+    if len(lines) <= room or not paragraphs:
         return lines
-    return _fitted(first, second[:-1], room) if second else _fitted(first[:-1], second, room)
+    *others, last = paragraphs
+    return _fitted([*others, last[:-1]] if last else others, room)
 
 
 def _conditions(loops: Sequence[str], limit: float) -> list[str]:
@@ -95,7 +96,7 @@ def _mark(found: Mapping[str, Finding]) -> str:
     there = _where(found, "reproduced")
     beyond = [name for name in there if found[name].mark]
     where = f"on {_and(beyond)} " * (len(there) > len(beyond))
-    return f" ({where}with tensions that no tendon of this wrist bears)" * bool(beyond)
+    return f" ({where}with tensions that no tendon bears)" * bool(beyond)
 
 
 def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
@@ -136,15 +137,41 @@ def _is_order(claim: Claim, less: str, more: str) -> bool:
 
 def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     """In which share of the settings that the paper may have had gains arrive, and give a whole row of T2."""
-    if not strips:
+    from wristctl.comparison.paper import FACTOR
+
+    own = {evidence: [each for each in strips if each.claim.evidence == evidence] for evidence in _IN_BOX}
+    used = [each for parts in own.values() for each in parts]
+    if not used:
         return []
-    said = {}
-    for evidence, what in (("arrival", "30 deg are reached"), ("together", "all three numbers of T2 come out at once")):
-        own = [each for each in strips if each.claim.evidence == evidence]
-        shares = [f"{each.claim.label} in {_percent(each.share('reproduced').value)}" for each in own]
-        said[what] = f"{what} with {_and(shares)}" if shares else ""
-    parts = "; ".join(filter(None, said.values()))
-    return [f"Of {len(strips[0].verdicts)} settings that the paper may have had: {parts}."] if parts else []
+    shares = {
+        evidence: _and([f"{_short(each.claim.label)} in {_share(each)}" for each in parts])
+        for evidence, parts in own.items()
+    }
+    said = []
+    if own["arrival"]:
+        resting = any(each.share("reproduced").times for each in own["arrival"])
+        also = " (also by wrists that rest there whatever is asked of them)" * resting
+        said.append(f"30 deg are reached with {shares['arrival']}{also}")
+    if own["together"]:
+        said.append(f"T2's three numbers come out at once, within a factor of {FACTOR:g}, with {shares['together']}")
+    left = sorted({each.uncounted for each in used})
+    many = f"{left[0]} to {left[-1]}" if len(left) > 1 else f"{left[0]}"
+    open_ = f" ({many} did not converge and are not counted)" * bool(left[-1])
+    return [f"Of {len(strips[0].verdicts)} settings that the paper may have had{open_} {'; '.join(said)}."]
+
+
+_IN_BOX = ("arrival", "together")
+"""Claims over the box that the first screen tells."""
+
+
+def _short(label: str) -> str:
+    return _GAINS[label][1].replace("with P1 and P2 exchanged", "exchanged") if label in _GAINS else label
+
+
+def _share(one: Strip) -> str:
+    """Share of the settings that have a verdict."""
+    held = one.share("reproduced")
+    return _percent(held.value) if held.n else "no setting that converged"
 
 
 def _networks(claims: Sequence[Judgement]) -> list[str]:
@@ -196,9 +223,9 @@ def _untested(claims: Sequence[Judgement]) -> list[str]:
     return [f"Not tested here: {', '.join(told)}."] if told else []
 
 
-def _numbers(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
+def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> list[str]:
     """The heaviest claims with the paper's number and ours, on each loop."""
-    heavy = sorted((j for j in claims if j.claim.weight and j.claim.value), key=lambda j: -j.claim.weight)[:_HEAVIEST]
+    heavy = sorted((j for j in claims if j.claim.weight and j.claim.value), key=lambda j: -j.claim.weight)[:most]
     if not heavy or not loops:
         return []
     rows = [("(*: reproduced)", "the paper", *loops)]
@@ -247,7 +274,9 @@ def _one(judged: Iterable[Judgement]) -> Judgement | None:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+    """Two digits; 0 and 100 % are none and all, and nothing else is."""
+    percent = 100.0 * share
+    return f"{min(percent, 99.0) if share < 1.0 else percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
 
 
 def _and(names: Sequence[str]) -> str:

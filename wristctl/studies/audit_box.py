@@ -55,7 +55,9 @@ def box_table(found: list[Strip]) -> Table:
         held = each.share("reproduced")
         beside = (each.share("better than the paper").value, each.share(*FAILING).value)
         second = each.leaves[1].name if each.told and len(each.leaves) > 1 else ""
-        rows.append((each.claim.id, held.value, held.low, held.high, *beside, each.told, second))
-    heads = ("claim", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
+        rows.append((each.claim.id, each.uncounted, held.value, held.low, held.high, *beside, each.told, second))
+    heads = ("claim", "not converged", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
     draws = len(found[0].verdicts) if found else 0
-    return Table(f"Shares of {draws} settings drawn from what the paper leaves open", heads, rows)
+    most = max((each.uncounted for each in found), default=0)
+    left = f"; those that did not converge, up to {most}, are not counted" * bool(most)
+    return Table(f"Shares of {draws} settings drawn from what the paper leaves open{left}", heads, rows)

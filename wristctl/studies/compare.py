@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.step_cost import StepTime
     from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.simulation.size import Size
     from wristctl.tuning.gains_file import Gains
     from wristctl.tuning.search import Search
 
@@ -97,7 +98,7 @@ class Compared(StudyResult):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
-    from wristctl.comparison.combinations import count_rollouts, refuse_tuned_scenarios
+    from wristctl.comparison.combinations import refuse_tuned_scenarios
     from wristctl.report.truth_table import truth_told
     from wristctl.simulation.size import check_size
 
@@ -118,15 +119,23 @@ def plan(study: Study, inputs: Inputs) -> str:
     if not settings.worlds.family:
         check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):
-        if settings.worlds.family:
-            family = family_of(study.families, settings.worlds.family, "worlds.family")
-            count, horizon = len(settings.rows) * settings.worlds.draws * len(family.references), family.horizon
-        else:
-            count, horizon = count_rollouts(settings), settings.horizon
+        asked = size(study)
         check_inverses(compared_inverses(study), inputs)
-        check_size(judged_loops(study, study.compare).values(), horizon)
+        check_size(asked)
     told = truth_told(study.wrist, judged_loops(study, study.compare))
-    return f"{searched}{count} rollouts of {horizon:g} s{told}"
+    return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{told}"
+
+
+def size(study: Study) -> Size:
+    """Every row on every loop and reference, or on the worlds of a family."""
+    from wristctl.comparison.combinations import count_rollouts
+    from wristctl.simulation.size import Size
+
+    settings, loops = study.compare, list(judged_loops(study, study.compare).values())
+    if settings.worlds.family:
+        family = family_of(study.families, settings.worlds.family, "worlds.family")
+        return Size(loops, family.horizon, len(settings.rows) * settings.worlds.draws * len(family.references))
+    return Size(loops, settings.horizon, count_rollouts(settings))
 
 
 def compare(session: Session) -> Compared:
@@ -200,5 +209,6 @@ COMPARE = sweepable(
         plan,
         compare,
         (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
+        size=size,
     )
 )

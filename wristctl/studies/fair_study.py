@@ -26,7 +26,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check all names, and say what it costs."""
     from wristctl.comparison.judge_unit import noises_of
     from wristctl.control.table import controller
-    from wristctl.simulation.size import check_size
+    from wristctl.simulation.size import Size, check_size, check_steps
     from wristctl.studies.loop_inputs import check_family_reach, check_inverses, check_row, family_of, inverses_of
     from wristctl.tuning.search import check_optimiser, check_tunable
 
@@ -60,13 +60,16 @@ def plan(study: Study, inputs: Inputs) -> str:
                 raise error.at(places.get(str(error.where), "optimiser")) from error
         families = {name: study.families[name] for name in families_of(study)}
         for family in families.values():
-            check_size([family.loop], family.horizon)
+            check_size(Size([family.loop], family.horizon))
             check_inverses(inverses_of(family.references), inputs)
     for name in families:
         check_family_reach(study, name)
     searches = sum(unit.size for unit in search_units(study).values())
     each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
     judged = each * budget.worlds * len(labels)
+    longest = max(Size([each.loop], each.horizon).steps for each in families.values())
+    with under("study"):
+        check_steps((searches + judged) * longest, searches + judged)
     evaluations = budget.candidates * budget.iterations
     return (
         f"{len(settings.laws)} laws with {evaluations} evaluations each on {', '.join(families)}, judged with "

@@ -27,6 +27,8 @@ FITTED = {
 _COARSE = 0.25
 """Share of the presliding by which a loop may leap between two samples at its turns."""
 
+_STEP_ERROR = 0.1
+"""Share of the noise by which what is expected may change with the integration step."""
 _TREMBLE = 0.01
 """Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble."""
 
@@ -52,6 +54,9 @@ def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
         found = fit_friction(problem_of(session.study))
     if found.autocorrelation > ALIKE:
         log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
+    if found.step_error > _STEP_ERROR:
+        told = "the fit depends on the integration step: half of it changes the model by %.2g of the noise - fix: %s"
+        log.warning(told, found.step_error, f"hysteresis.step: {0.5 * session.study.hysteresis.step:g}")
     if found.leap > _COARSE * found.presliding.value:
         leap, path = 1e6 * found.leap, 1e6 * found.presliding.value
         fix = "sample more often, or turn more softly"

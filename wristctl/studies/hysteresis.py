@@ -35,6 +35,8 @@ _LOOPS = {
     "friction_work": ("J", "what friction took in a cycle: pull at the spool less pull at the wrist, along the path"),
     "raw_work": ("J", "area of the loop of pulls at the spools along the path"),
     "damped_work": ("J", "what the wrist's damping took in a cycle"),
+    "step": ("s", "integration step that it took"),
+    "drift": ("", "largest relative change of width and works with the step, at the shortest tried; 0: converged"),
 }
 _COURSES = {
     "loop": ("", "row of loops.csv, from 0"),
@@ -60,6 +62,8 @@ _BANDS = {
     "below": ("rad", "rest after a ramp from below"),
     "above": ("rad", "rest after a ramp from above"),
     "slid": ("", "whether tendons slid far enough on both ramps to bend their bristles fully"),
+    "step": _LOOPS["step"],
+    "drift": ("", "largest change of a rest with the step, over the width, at the shortest tried; 0: converged"),
 }
 
 
@@ -72,6 +76,12 @@ class Hysteresis(StudyResult):
     loops: list[HysteresisLoop]
     dead_bands: list[DeadBand]
     fit: FrictionFit | None
+
+    @property
+    def marks(self) -> list[str]:
+        """How many loops and dead bands still change with the integration step."""
+        open_ = _still_change(self.loops, self.dead_bands)
+        return [f"not converged: {open_} of {len(self.loops) + len(self.dead_bands)}"] * bool(open_)
 
     def frame(self) -> pd.DataFrame:
         """One row per loop: friction, speed, range, the dead band in its middle, and works; SI units."""
@@ -115,7 +125,10 @@ def hysteresis(session: Session) -> Hysteresis:
         driven = loops(own, lambda share: done(round(100.0 * share)))
         bands = dead_bands(own)
     fit, answer = fit_measured(session) if settings.measured is not None else (None, None)
-    findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments)
+    shortest = min([each.step for each in driven] + [each.step for each in bands])
+    findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments)
+    open_ = _still_change(driven, bands)
+    findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
     tables = [*([answer] if answer else []), *_tables(findings, driven, bands, main_case(settings))]
     result = Hysteresis(session.study, findings, tables, driven, bands, fit)
     _write(findings, result)
@@ -144,10 +157,13 @@ def _write(findings: Findings, found: Hysteresis) -> None:
     columns = {name: np.concatenate([each[name] for each in courses]) for name in _COURSES}
     findings.table("data/courses.csv", columns, *units(_COURSES))
     if found.dead_bands:
-        rows = [each.tendons._asdict() | each._asdict() for each in found.dead_bands]
+        rows = [
+            {name: getattr(each, name, None) for name in _BANDS} | each.tendons._asdict() for each in found.dead_bands
+        ]
         findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
 
 
+_NOT_CONVERGED = "loops and dead bands that still change with the integration step"
 _MOST = 60
 """Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data."""
 
@@ -158,22 +174,26 @@ def _tables(
     """The outer loops, under what they say in words, and the dead bands."""
     first, many = driven[0].case, len(driven) + len(bands) > _MOST
     outer = [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
+    fate = ("fate",) * (_still_change(driven, bands) > 0)
     heads = ("friction", "sheath [rad]", "presliding [um]")
-    loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]")
+    loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]",
+                  "step [ms]", *fate)  # fmt: skip
     rows = [
         (*_in_um(each.case.tendons), each.case.frequency, math.degrees(each.width), math.degrees(each.exact_width),
-         *(1e3 * work for work in (each.friction_work, each.damped_work, each.raw_work)))
+         *(1e3 * part for part in (each.friction_work, each.damped_work, each.raw_work, each.step)),
+         *(_fate(each),) * len(fate))
         for each in outer
         if not many or each.case.tendons.presliding == main.presliding
     ]  # fmt: skip
     tables = [Table(_told(findings, outer, bands, main), (*heads, *loop_heads), rows)]
     if bands:
-        held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully")
+        held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully", "step [ms]", *fate)
         rests = [
-            (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid)
+            (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid,
+             1e3 * each.step, *(_fate(each),) * len(fate))
             for each in bands
             if not many or each.tendons.presliding == main.presliding
-        ]
+        ]  # fmt: skip
         tables.append(Table("Where ramps leave the wrist", (*heads, *held), rests))
     return tables
 
@@ -202,7 +222,22 @@ def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[D
         worst = max(abs(each.width / each.exact_width - 1.0) for each in slid)
         meaning = "largest relative error of a simulated dead band against the roots of the statics"
         findings.metric("root_error", worst, "", "lower", len(slid), meaning=meaning)
+    if open_ := _still_change(outer, bands):
+        lines.append(f"NOT CONVERGED: {open_} of {len(outer) + len(bands)} change with the integration step")
     return f"{case}: " + ";\n".join(lines)
+
+
+def _still_change(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand]) -> int:
+    """How many change with the integration step."""
+    return sum(each.drift > 0.0 for each in driven) + sum(each.drift > 0.0 for each in bands)
+
+
+def _fate(found: HysteresisLoop | DeadBand) -> str:
+    """By how much it still changes with the integration step; empty where it does not."""
+    if found.drift == 0.0:
+        return ""
+    by = f"by {100.0 * found.drift:.2g} % " if math.isfinite(found.drift) else ""
+    return f"NOT CONVERGED: changes {by}with the integration step"
 
 
 def _in_um(case: FrictionCase) -> tuple[float, float, float]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from wristctl.config.keys import SUBJECTS
 from wristctl.config.study import Study
 from wristctl.studies.inputs import EarlierRun, Inputs
 from wristctl.studies.session import Session
 from wristctl.studies.study_result import StudyResult
+
+if TYPE_CHECKING:
+    from wristctl.simulation.size import Size
 
 Found = TypeVar("Found", bound=StudyResult)
 
@@ -30,8 +33,13 @@ class Procedure(Generic[Found]):
     """Whether it works in units, which other processes and machines may do."""
     doubts: Callable[[Study, Inputs], None] | None = None
     """Raises UserError for what the command does not do without `--force`."""
-    sweeps: bool = False
-    """Whether it can be done at many values of its settings."""
+    size: Callable[[Study], Size] | None = None
+    """The rollouts that it asks for, where it can be done at many values of its settings."""
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it can be done at many values of its settings."""
+        return self.size is not None
 
     def section(self, study: Study) -> Any:
         """The section of a study that names what it reads."""

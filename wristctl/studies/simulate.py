@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.simulation.repetitions import Repeated
+    from wristctl.simulation.size import Size
     from wristctl.simulation.trajectory import Trajectory
     from wristctl.wrist.kinematics import Inverse
 
@@ -90,18 +91,26 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     settings = study.simulate
     from wristctl.report.truth_table import truth_told
-    from wristctl.simulation.draws import is_random
     from wristctl.simulation.size import check_size
 
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
         check_inverses(inverses_of([settings.reference]), inputs)
-        check_size([settings.loop], settings.horizon)
+        check_size(size(study))
 
-    times = settings.repetitions if is_random(settings.loop) else 1
+    times = size(study).rollouts
     told = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
     return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{told}"
+
+
+def size(study: Study) -> Size:
+    """One rollout, or as many as there are repetitions of what is drawn."""
+    from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import Size
+
+    chosen = study.simulate
+    return Size([chosen.loop], chosen.horizon, chosen.repetitions if is_random(chosen.loop) else 1)
 
 
 def simulate(session: Session) -> Simulated:
@@ -222,5 +231,6 @@ SIMULATE = sweepable(
             EarlierRun("tuned", kind="tune", optional=True),
             EarlierRun("from_identified", kind="identify", optional=True),
         ),
+        size=size,
     )
 )

@@ -66,21 +66,31 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
     """The procedure, which does what it does at every point where the study has a sweep."""
 
     def plan(study: Study, inputs: Inputs) -> str:
+        from wristctl.simulation.size import check_steps
+
         if not study.sweep:
             return procedure.plan(study, inputs)
         base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
         points = points_of(axes)
         for each in points[:_CHECKED]:
             study_at(base, axes, each)
+        assert procedure.size is not None
+        sizes = []
         for each in _corners(axes):
             said = procedure.plan(study_at(base, axes, each), Inputs())
+            sizes.append(procedure.size(study_at(base, axes, each)))
+        steps, rollouts = (sum(each) / len(sizes) for each in zip(*((a.steps, a.rollouts) for a in sizes), strict=True))
+        try:
+            check_steps(len(points) * steps, len(points) * rollouts)
+        except UserError as error:
+            raise error.at(Argument("sweep", metavar="KEY=VALUES")) from error
         return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {said}"
 
     @wraps(procedure.perform)
     def perform(session: Session) -> Found | Swept:
         return _swept(session, procedure.kind) if session.study.sweep else procedure.perform(session)
 
-    found: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True, sweeps=True)
+    found: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True)
     return cast(Procedure[Found], found)
 
 

@@ -35,6 +35,7 @@ from wristctl.studies.sweep import sweepable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.simulation.size import Size
     from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
@@ -93,7 +94,6 @@ def planned_search(
     that none of the inputs is.
     """
     from wristctl.control.table import controller
-    from wristctl.simulation.draws import is_random
     from wristctl.simulation.size import check_size
     from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
@@ -106,20 +106,34 @@ def planned_search(
         check_optimiser(settings)
     except UserError as error:
         raise error.at(str(error.where).removeprefix("tune.")) from error
-    searched = settings.candidates * settings.iterations * settings.restarts
     if settings.worlds.family:
-        family = family_of(families, settings.worlds.family, "worlds.family")
-        check_size([family.loop], family.horizon)
-        each, horizon = settings.worlds.draws * len(family.references), family.horizon
+        family_of(families, settings.worlds.family, "worlds.family")
     else:
         check_loops(settings)
         check_reach([each.reference for each in settings.scenarios], wrist, "scenarios.{}.reference")
-        check_size(settings.loops.values(), settings.horizon)
-        loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
-        each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
-        horizon = settings.horizon
+    asked = _size(settings, families)
+    check_size(asked)
     check_inverses(inverses_of(_references(settings, families)), inputs)
-    return f"{searched * each} rollouts of {horizon:g} s for each of {', '.join(settings.controllers)}"
+    one = asked.rollouts // len(settings.controllers)
+    return f"{one} rollouts of {asked.horizon:g} s for each of {', '.join(settings.controllers)}"
+
+
+def size(study: Study) -> Size:
+    """What all its searches run."""
+    return _size(study.tune, study.families)
+
+
+def _size(settings: TuneSettings, families: Mapping[str, Family]) -> Size:
+    from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import Size
+
+    searched = settings.candidates * settings.iterations * settings.restarts * len(settings.controllers)
+    if settings.worlds.family:
+        family = families[settings.worlds.family]
+        return Size([family.loop], family.horizon, searched * settings.worlds.draws * len(family.references))
+    loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
+    each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
+    return Size(loops, settings.horizon, searched * each)
 
 
 def tune(session: Session) -> Tuned:
@@ -265,5 +279,6 @@ TUNE = sweepable(
             EarlierRun("resume", kind="tune", optional=True, unfinished=True),
         ),
         doubts=refuse_out_of_reach,
+        size=size,
     )
 )
