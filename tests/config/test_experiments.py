@@ -161,34 +161,31 @@ def _refusal(file: Path) -> UserError:
 
 
 MAPPINGS = _all_mappings()
+OPEN = ("loops", "families", "budgets", "variants", "unknowns", "one_of")
+"""Mappings that take any name, but no number under it."""
 
 
-@pytest.mark.parametrize("place", MAPPINGS)
-def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_meant(
-    place: str, tmp_path: Path
-) -> None:
-    data, path, mapping = MAPPINGS[place]
-    meant = next(reversed(mapping))
-    misspelt = f"{meant}x"
-    file = tmp_path / "study.yaml"
-    file.write_text(yaml.safe_dump(_alone(data, path, {misspelt: 1.0}), sort_keys=False))
-    line = 1 + next(n for n, text in enumerate(file.read_text().splitlines()) if f"{misspelt}:" in text)
-    error = _refusal(file)
-    if "unknowns" in path and (path[-1] == "unless" or path[-2] == "one_of"):  # keys of leaves elsewhere
-        assert error.where.startswith(f"{file}:") and error.what.endswith(f"there is no leaf {misspelt.split('.')[-1]}")
-        return
-    names = (0 if isinstance(key, int) else key for key in (*path, misspelt))
-    assert error.where == f"{file}:{line}: {'.'.join(map(str, names))}"
-    if path[-1:] in (("loops",), ("families",), ("budgets",), ("variants",), ("unknowns",), ("one_of",)):
-        # any name will do, but a number is none
-        assert error.what == "1.0 should be a group of keys and values"
-    elif path[-1:] == ("terms",):
-        assert error.what == "1.0 should be a valid list"
-    elif path[-1:] == ("draw",):
-        assert error.what == "1.0 should be a valid string"
-    else:
-        assert "unknown" in error.what and repr(misspelt) in error.what
-        assert error.fix == f"did you mean {meant!r}?"
+def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_meant(tmp_path: Path) -> None:
+    for place, (data, path, mapping) in MAPPINGS.items():
+        meant = next(reversed(mapping))
+        misspelt = f"{meant}x"
+        file = tmp_path / "study.yaml"
+        file.write_text(yaml.safe_dump(_alone(data, path, {misspelt: 1.0}), sort_keys=False))
+        line = 1 + next(n for n, text in enumerate(file.read_text().splitlines()) if f"{misspelt}:" in text)
+        error = _refusal(file)
+        if "unknowns" in path and (path[-1] == "unless" or path[-2] == "one_of"):  # keys of leaves elsewhere
+            assert error.where.startswith(f"{file}:"), place
+            assert error.what.endswith(f"there is no leaf {misspelt.split('.')[-1]}"), place
+            continue
+        names = (0 if isinstance(key, int) else key for key in (*path, misspelt))
+        assert error.where == f"{file}:{line}: {'.'.join(map(str, names))}", place
+        last = path[-1] if path else ""
+        if last in (*OPEN, "terms", "draw"):
+            wanted = {"terms": "a valid list", "draw": "a valid string"}.get(str(last), "a group of keys and values")
+            assert error.what == f"1.0 should be {wanted}", place
+        else:
+            assert "unknown" in error.what and repr(misspelt) in error.what, place
+            assert error.fix == f"did you mean {meant!r}?", place
 
 
 def test_mappings_of_every_kind_are_among_those_that_refuse_a_key() -> None:

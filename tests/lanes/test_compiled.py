@@ -1,33 +1,25 @@
-"""Where compiled code is kept: by what it is made of, and without a word to the rest of the process."""
+"""Where compiled code is kept: by what it is made of, wherever the package lies."""
 
 from __future__ import annotations
 
 import ast
+import importlib.util
 import subprocess
 import sys
 import warnings
 from pathlib import Path
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numba
 import pytest
 
 import wristctl
 from wristctl.lanes import compiled as module
-from wristctl.lanes.compiled import TRIED, cache_folder, caching, sources
+from wristctl.lanes.compiled import TRIED, cache_folder, kernel, sources
 from wristctl.lanes.functions import clip
 
 PACKAGE = Path(wristctl.__file__).parent
 CONFIG = ("wristctl.config", "wristctl.records")
-EVERYTHING = "wristctl.simulation.rollout, wristctl.bench.virtual_bench, wristctl.trial.steering, wristctl.learning"
-
-
-def test_importing_all_compiled_code_leaves_numbas_settings_alone() -> None:
-    code = (
-        f"import numba; before = numba.config.CACHE_DIR; import {EVERYTHING}; print(before == numba.config.CACHE_DIR)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=True)
-    assert done.stdout == "True\n"
 
 
 def test_a_function_rests_on_what_it_imports_and_on_nothing_else() -> None:
@@ -61,23 +53,54 @@ def test_another_line_in_an_imported_file_is_another_folder(tmp_path: Path, monk
     cache_folder.cache_clear()
 
 
-def test_where_nothing_can_be_written_nothing_is_kept_and_the_setting_comes_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def doubling(folder: Path, gain: float = 2.0) -> Any:
+    """A kernel from a file of its own in this folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / "doubling.py"
+    file.write_text(f"def doubled(x):\n    return {gain} * x\n")
+    spec = importlib.util.spec_from_file_location("doubling", file)
+    assert spec is not None and spec.loader is not None
+    there = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(there)
+    return kernel(there.doubled)
+
+
+def found(made: Any) -> int:
+    """How often a kernel was found in the cache when it was first called."""
+    made(1.0)
+    return sum(made.stats.cache_hits.values())
+
+
+@pytest.fixture
+def kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(module, "_kernels", lambda: tmp_path / "kernels")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "numbas own"))
+    return tmp_path / "kernels"
+
+
+def test_copies_of_the_package_share_their_kernels_and_other_sources_do_not(
+    kernels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    copies = [tmp_path / name / "package" for name in ("first", "second", "changed")]
+    hits = []
+    for package, gain in zip(copies, (2.0, 2.0, 3.0), strict=True):
+        monkeypatch.setattr(module, "_PACKAGE", package)
+        hits.append(found(doubling(package / "control", gain)))
+    assert hits == [0, 1, 0]
+    assert found(doubling(copies[2] / "wrist", 3.0)) == 0, "elsewhere in the package the same lines are another file"
+    assert len(list(kernels.glob("*/doubling.doubled-1.*.nbi"))) == 3
+    assert not (tmp_path / "numbas own").exists()
+
+
+def test_files_outside_the_package_share_nothing(kernels: Path, tmp_path: Path) -> None:
+    """What they read from files beside them is not in their text."""
+    assert [found(doubling(tmp_path / name)) for name in ("first", "second", "first")] == [0, 0, 1]
+
+
+def test_where_nothing_can_be_written_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setattr(module, "_kernels", lambda: tmp_path / "file")
-    source = tmp_path / "source.py"
-    source.write_text("x = 1\n")
-    with caching(source) as cached:
-        assert not cached
-
-
-def test_the_setting_comes_back_whatever_happens_meanwhile() -> None:
-    before = numba.config.CACHE_DIR
-    with pytest.raises(ZeroDivisionError), caching(PACKAGE / "lanes" / "lane.py") as cached:
-        assert cached and before != numba.config.CACHE_DIR
-        raise ZeroDivisionError
-    assert before == numba.config.CACHE_DIR
+    assert [found(doubling(tmp_path / "law")) for _ in range(2)] == [0, 0]
 
 
 def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_arguments() -> None:

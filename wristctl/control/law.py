@@ -16,16 +16,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numba
 from numba.core import types
+from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
+from numba.core.sigutils import normalize_signature
 
 from wristctl.config.errors import UserError
 from wristctl.config.foreign import PLAIN
 from wristctl.config.section import Parameter
 from wristctl.control.plain_law import PlainLaw
 from wristctl.lanes.blocks import width
-from wristctl.lanes.compiled import caching, compiled
+from wristctl.lanes.compiled import compiled, keep
 from wristctl.lanes.frozen_values import frozen_values
 from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
@@ -156,11 +157,12 @@ class _NativeLaw(types.WrapperAddressProtocol):
     def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
         self._lanes = lanes
         frozen, others = frozen_values(law)
-        with caching(Path(law.__code__.co_filename), *others, frozen=frozen) as cached:
-            try:
-                self._code = numba.cfunc(_signature(lanes, names), cache=cached)(law)
-            except NumbaError as error:
-                raise _refused(law, error) from error
+        self._code = CFunc(law, normalize_signature(_signature(lanes, names)), locals={}, options={})
+        keep(self._code, law, *others, frozen=frozen)
+        try:
+            self._code.compile()
+        except NumbaError as error:
+            raise _refused(law, error) from error
 
     def __wrapper_address__(self) -> int:
         """Where the code is."""

@@ -2,6 +2,7 @@
 
 numba renews a cached function when its own file changes, but not when a function that it calls does. So the cache
 folder's name holds a hash of the file and of all files that it imports, theirs too: other sources, another folder.
+Where the package lies is no part of it: checkouts, copies and installed packages of the same sources share a cache.
 """
 
 from __future__ import annotations
@@ -10,16 +11,17 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast
 
 import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
 from wristctl.lanes.kernel_folder import kernels_folder
@@ -56,6 +58,12 @@ def _read(file: Path) -> tuple[bytes, tuple[Path, ...]]:
     return content, tuple(found)
 
 
+def _named(source: Path) -> str:
+    """A source file's name in a hash: below the package, or the whole path of what lies elsewhere."""
+    place = source.resolve()
+    return place.relative_to(_PACKAGE).as_posix() if place.is_relative_to(_PACKAGE) else str(place)
+
+
 def sources(file: Path) -> list[Path]:
     """The file and every file that it rests on, sorted: those that it imports and those that they import."""
     reached, waiting = {file}, [file]
@@ -75,9 +83,9 @@ def cache_folder(file: Path, *others: Path, frozen: bytes = b"") -> Path | None:
     """
     if not file.is_file():  # typed into a notebook
         return None
-    digest = hashlib.sha256(numba.__version__.encode() + frozen)
-    for source in sorted({each for root in (file, *others) for each in sources(root)}):
-        digest.update(_read(source)[0])
+    digest = hashlib.sha256(repr((numba.__version__, frozen, _named(file))).encode())
+    for source in sorted({each for root in (file, *others) for each in sources(root)}, key=_named):
+        digest.update(repr((_named(source), _read(source)[0])).encode())
     try:
         folder = _kernels() / digest.hexdigest()[:16]
         folder.mkdir(parents=True, exist_ok=True)
@@ -98,19 +106,37 @@ def _kernels() -> Path:
     return base
 
 
-@contextmanager
-def caching(file: Path, *others: Path, frozen: bytes = b"") -> Iterator[bool]:
-    """Within the block numba caches what these source files define where it belongs; yields whether it can.
+class _Kept(FunctionCache):
+    """numba's cache of one function, in a folder that it is given.
 
-    numba takes its folder from a setting of the whole process, when a function is decorated: it is put back at once.
+    numba's own takes the folder from a setting of the whole process, and adds where the sources lie.
     """
-    folder, before = cache_folder(file, *others, frozen=frozen), numba.config.CACHE_DIR
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._impl_class = partial(_KeptFiles, folder=folder)
+        super().__init__(function)
+
+
+class _KeptFiles(CompileResultCacheImpl):
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._locator, self._lineno = _Locator(function, folder), function.__code__.co_firstlineno
+        name = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}"
+        self._filename_base = self.get_filename_base(name, sys.abiflags)
+
+
+class _Locator(UserProvidedCacheLocator):
+    """Where the files of a function are; their stamp is the hash of its source file."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        code = function.__code__
+        self._py_file, self._lineno, self._cache_path = code.co_filename, code.co_firstlineno, str(folder)
+
+
+def keep(made: Any, function: Callable[..., Any], *others: Path, frozen: bytes = b"") -> None:
+    """Have what numba makes of a function, a dispatcher or a C function, kept in the folder of its sources."""
+    folder = cache_folder(Path(function.__code__.co_filename), *others, frozen=frozen)
     if folder is not None:
-        numba.config.CACHE_DIR = str(folder)
-    try:
-        yield folder is not None
-    finally:
-        numba.config.CACHE_DIR = before
+        made._cache = _Kept(function, folder)
 
 
 class _Inner(CPUDispatcher):
@@ -144,5 +170,6 @@ def kernel(function: F, *others: Path) -> F:
 
     `others` are source files beside the function's own that decide what it does, where it does not import them.
     """
-    with caching(Path(function.__code__.co_filename), *others) as cached:
-        return cast(F, numba.njit(cache=cached, **_OPTIONS)(function))
+    made = numba.njit(**_OPTIONS)(function)
+    keep(made, function, *others)
+    return cast(F, made)
