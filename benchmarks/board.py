@@ -9,8 +9,8 @@ import time
 from wristctl.board.check import RoundTrips, round_trips
 from wristctl.board.driver import Board
 from wristctl.board.emulator import Atmega2560
+from wristctl.board.emulator.atmega2560 import VirtualTransport
 from wristctl.board.emulator.chip import FREQUENCY
-from wristctl.board.emulator.virtual import VirtualTransport
 from wristctl.board.messages import BAUD, Command
 from wristctl.board.transport import SerialTransport, Transport
 

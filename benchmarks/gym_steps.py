@@ -12,9 +12,9 @@ import time
 
 import numpy as np
 
-from wristctl.config.load import load_study
 from wristctl.gym import WristVectorEnv
-from wristctl.lanes.cores import cores
+from wristctl.processes import cores
+from wristctl.study_files.load import load_study
 
 COUNT, EPISODES, WANTED = 1024, 3, 1e6
 RIG = ("simulate.loop.sensor.level=camera", "simulate.loop.actuator.level=tendon")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wristctl.config.load import load_study
+from wristctl.study_files.load import load_study
 
 STUDY = Path(__file__).resolve().parents[1] / "experiments" / "identify.yaml"
 MASSES = (0.3, 0.1)

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from wristctl.config.load import load_study
+from wristctl.commands.sweep.command import simulated, sweep_units
 from wristctl.config.study import Study
-from wristctl.config.sweeps import axes_of, points_of
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.reference import motion
 from wristctl.simulation.swept_loops import swept_metrics
-from wristctl.studies.sweep_unit import simulated, sweep_units
+from wristctl.study_files.load import load_study
+from wristctl.study_files.sweeps import axes_of, points_of
 
 POINTS, PAIRS, MOST = 1000, 5, 1.5
 FOLDER = tempfile.TemporaryDirectory()

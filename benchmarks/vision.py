@@ -17,9 +17,8 @@ from wristctl.arrays import Array
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame, Image
-from wristctl.vision.detector import CELLS, Detector, print_of, square_angle
+from wristctl.vision.detector import CELLS, Detector, outlined, print_of, square_angle
 from wristctl.vision.marker import SightingVerdict, Tracker
-from wristctl.vision.outline import outlined
 from wristctl.vision.scene import Scene
 from wristctl.vision.view import View
 

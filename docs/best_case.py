@@ -14,23 +14,21 @@ from typing import Any
 import numpy as np
 from best_case_figure import Move, Weighed, drawn
 
-from wristctl.comparison.best_case import BestCase, Reading, search
-from wristctl.comparison.box import courses, drawn_settings
-from wristctl.comparison.deciding_leaf import split
-from wristctl.comparison.equations import least_rmse
-from wristctl.comparison.held_tick import arrives_by_rule, overshoot_of_a_tick
+from wristctl.comparison.best_case import BestCase, Reading, arrives_by_rule, overshoot_of_a_tick, search
+from wristctl.comparison.derived_claims import least_rmse
 from wristctl.comparison.paper import FACTOR, T2
-from wristctl.comparison.readings import readings
-from wristctl.config.control import Row
-from wristctl.config.load import load_study
+from wristctl.comparison.robust import split
+from wristctl.comparison.unknowns_sampling import courses, drawn_settings, readings
+from wristctl.config.controllers import Row
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unstated import STRATA, Box, PaperSetting, Unstated
+from wristctl.config.unknowns_box import STRATA, Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
 from wristctl.control.smc import SMC
 from wristctl.records import open_run
 from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.study_files.load import load_study
 
 HERE = Path(__file__).parent
 WRIST = WristParameters()
@@ -172,7 +170,7 @@ Four segments at 1 kHz, 512 draws each. With the tension limit alone drawn, 10 t
 {limits} (four seeds, 95 % by bootstrap).
 At 60 N {arrivals}:
 RMSE {measured} (a minimum-jerk move of 1 s).
-The mechanism is a held tick that turns the tip too far (`wristctl/comparison/held_tick.py`). Where the tendons can hold
+The mechanism is a held tick that turns the tip too far (`wristctl/comparison/best_case.py`). Where the tendons can hold
 30 deg, and one tick turns the tip by no more than the law's own limit of rate would, the wrist arrives: that rule says
 {rule:.1f} N here, and is right in {right} of the draws over the whole box.
 {shares}"""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from wristctl.comparison.best_case import BestCase
 from wristctl.comparison.paper import FACTOR, T2
-from wristctl.report.style import (
+from wristctl.plotting.style import (
     BLUE,
     GREEN,
     GREY,

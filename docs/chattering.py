@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.comparison.combinations import ComparedRow, compare
-from wristctl.config.control import Row
-from wristctl.config.load import load_study
+from wristctl.config.controllers import Row
 from wristctl.config.loop import LOOPS, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.simulation.oscillation import FASTEST
+from wristctl.study_files.load import load_study
 
 PAGE = Path(__file__).parent / "chattering.md"
 LENGTHS = (0.08, 0.12)

@@ -12,11 +12,11 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic_core import PydanticUndefined
 
 from wristctl.config.choices import CONTROLLERS, DISTURBANCES, METRICS, OPTIMISERS, PLANTS, REFERENCES
-from wristctl.config.keys import keys_of, source_of, unit_of
 from wristctl.config.learning import PRESETS
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.section import OneOf, Section
 from wristctl.config.study import Study
+from wristctl.study_files.keys import keys_of, source_of, unit_of
 
 PAGE = Path(__file__).with_suffix(".md")
 OPENING = """# What can be chosen

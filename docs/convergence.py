@@ -17,13 +17,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.comparison.box import drawn_settings
+from wristctl.comparison.best_case import overshoot_of_a_tick
 from wristctl.comparison.combinations import ComparedRow, compare
-from wristctl.comparison.held_tick import overshoot_of_a_tick
-from wristctl.config.load import load_study
+from wristctl.comparison.unknowns_sampling import drawn_settings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
-from wristctl.config.unstated import PaperSetting
+from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
@@ -32,6 +31,7 @@ from wristctl.simulation.convergence import tolerance
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
+from wristctl.study_files.load import load_study
 
 HERE = Path(__file__).parent
 PAGE, EXPERIMENTS = HERE / "convergence.md", HERE.parent / "experiments"
@@ -205,7 +205,7 @@ def page(found: list[Drawn], rows: dict[str, tuple[int, int, list[Changed]]], li
     limit cycle. Steps given by hand stay, and are marked alike. `tune` verifies in this way only gains that would be
     its best: it never ends with what the step makes good, and may pass over what the step makes bad."""
     limit = """A 30 deg minimum jerk in 1 s, ideal measurement; above the limit a held tick turns the tip too far and
-    the wrist stays (`wristctl/comparison/held_tick.py`). Within some newtons of it the RMSE is chaotic. One step a tick
+    the wrist stays (`wristctl/comparison/best_case.py`). Within some newtons of it the RMSE is chaotic. One step a tick
     puts the limit elsewhere, and we believed it: [what we corrected](corrected.md)."""
     lines += [
         "",

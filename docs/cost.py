@@ -16,19 +16,19 @@ from typing import Any
 
 import numpy as np
 
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.study.command import plan
+from wristctl.commands.study.units import search_units
 from wristctl.comparison.world_ranking import RANKED
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller
-from wristctl.lanes.cores import cores
+from wristctl.processes import cores
 from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.studies.fair_study import plan
-from wristctl.studies.fair_units import search_units
-from wristctl.studies.inputs import Inputs
+from wristctl.study_files.load import load_study
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import perform_units
-from wristctl.work.unit import Unit
+from wristctl.work.worker import Unit
 
 HERE = Path(__file__).parent
 WORLDS, ROWS, TRIES, CORES = 40, 4, 3, cores()
@@ -119,7 +119,7 @@ def _over(added: dict[str, float], unit: float) -> list[str]:
 
 def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
     """What the full study takes, from the costs measured above."""
-    from wristctl.comparison.judge_unit import noises_of
+    from wristctl.comparison.world_ranking import noises_of
 
     budget = study.study.budgets["full"]
     searched = sum(unit.size * costs[at.family][at.law] for at, unit in search_units(study).items())

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.commands.compare.ranking import answer
+from wristctl.commands.printed_table import degrees
 from wristctl.comparison.geometric_means import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
-from wristctl.config.control import Row
+from wristctl.config.controllers import Row
 from wristctl.config.families import Drawn, Family, Worlds
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.studies.answer_lines import degrees
-from wristctl.studies.rank import answer
+from wristctl.study_files.load import load_study
 
 HERE = Path(__file__).parent
 SCENARIOS = HERE.parent / "experiments" / "scenarios"

@@ -19,11 +19,11 @@ from scipy import stats
 
 import wristctl
 from wristctl.arrays import Array
-from wristctl.learning.baseline import Polynomial
+from wristctl.commands.train.command import Trained
+from wristctl.learning.inference import Polynomial
 from wristctl.learning.network import Network
 from wristctl.records import Run, list_runs
 from wristctl.records.formats import write_figure
-from wristctl.studies.train import Trained
 from wristctl.wrist.kinematics import chain_tip, exact_angle
 
 HERE = Path(__file__).parent

@@ -14,13 +14,13 @@ from scipy.stats import spearmanr
 
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import penalised
-from wristctl.config.control import Objective
-from wristctl.config.load import load_study
+from wristctl.config.controllers import Objective
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
 
 HERE = Path(__file__).parent

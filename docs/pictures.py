@@ -10,22 +10,22 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
+from wristctl.commands.compare.class_figures import answer_figure
+from wristctl.commands.hysteresis.figures import loops as loops_by_speed
 from wristctl.comparison.class_standing import class_standings
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.paper import T2
-from wristctl.config.load import load_study
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.plotting.loop_figures import errors
+from wristctl.plotting.wrist_drawing import directions
 from wristctl.records.formats import write_figure
-from wristctl.report.answer_figure import answer_figure
-from wristctl.report.hysteresis_figures import loops as loops_by_speed
-from wristctl.report.loop_figures import errors
-from wristctl.report.wrist_drawing import directions
 from wristctl.simulation.hysteresis import loops
 from wristctl.simulation.strokes import strokes
-from wristctl.vision.annotate import annotate
+from wristctl.study_files.load import load_study
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Tracker
+from wristctl.vision.recordings import annotate
 from wristctl.vision.scene import Scene
 
 HERE = Path(__file__).parent

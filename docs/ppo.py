@@ -21,7 +21,6 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
 from wristctl.comparison.world_ranking import world_scores
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.table import controller
 from wristctl.gym import OBSERVED, WristVectorEnv
@@ -29,6 +28,7 @@ from wristctl.seeds import stream
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.simulation.oscillation import oscillations
+from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.search import search, tuning_cases
 

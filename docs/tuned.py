@@ -17,13 +17,13 @@ from scipy.stats import binomtest
 
 from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
 from wristctl.comparison.world_ranking import world_scores
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
 from wristctl.seeds import stream
 from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.search import search, tuning_cases
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from wristctl import loop_priority
-from wristctl.bench.film import start_film
+from wristctl.bench.frame_process import start_film
 from wristctl.config.bench import BenchSettings, RenderedCamera
 from wristctl.config.vision import Device, Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from tests.documented import script_of_docs
-from wristctl.comparison.held_tick import overshoot_of_a_tick
+from wristctl.comparison.best_case import overshoot_of_a_tick
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unstated import PaperSetting
+from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.arrival import SHORT

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.records.code import code_state
+from wristctl.records.provenance import code_state
 
 ROOT = Path(__file__).parents[1]
 PACKAGED = ("board/firmware/wrist.hex", "board/firmware/wrist.hex.sha256", "board/messages.toml", "py.typed")
@@ -69,7 +69,7 @@ def test_the_wheel_holds_experiments_firmware_templates_and_types_as_they_are_he
     for here, there in (
         (ROOT / "experiments", package / "experiments"),
         (ROOT / "wristctl/cli/templates", package / "cli/templates"),
-        (ROOT / "wristctl/report/templates", package / "report/templates"),
+        (ROOT / "wristctl/plotting/templates", package / "plotting/templates"),
     ):
         files = [each for each in here.rglob("*") if each.is_file() and each.suffix != ".pyc"]
         assert len(files) > 2

@@ -1,7 +1,5 @@
 """The command line as a process: Ctrl-C ends it in silence from here on, before all that it needs is imported."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -13,23 +13,23 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wristctl.config.load import load_study as _load_study
+from wristctl.commands.analyse.command import ANALYSE, Analysed
+from wristctl.commands.audit.command import AUDIT, Audited
+from wristctl.commands.compare.command import COMPARE, Compared
+from wristctl.commands.gen_data.command import GEN_DATA, Generated
+from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
+from wristctl.commands.identify.command import IDENTIFY, Identified
+from wristctl.commands.perform import RESULTS, Folder, Ref, carry_out, in_python
+from wristctl.commands.progress import Watch
+from wristctl.commands.simulate.command import SIMULATE, Simulated
+from wristctl.commands.study.command import FAIR_STUDY
+from wristctl.commands.study.units import Studied
+from wristctl.commands.train.command import TRAIN, Trained
+from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.study import Study
 from wristctl.records import Run
 from wristctl.records import open_run as _open_run
-from wristctl.studies.analyse import ANALYSE, Analysed
-from wristctl.studies.audit import AUDIT, Audited
-from wristctl.studies.compare import COMPARE, Compared
-from wristctl.studies.counting import Watch
-from wristctl.studies.fair_study import FAIR_STUDY
-from wristctl.studies.gen_data import GEN_DATA, Generated
-from wristctl.studies.hysteresis import HYSTERESIS, Hysteresis
-from wristctl.studies.identify import IDENTIFY, Identified
-from wristctl.studies.in_python import RESULTS, Folder, Ref, carry_out, in_python
-from wristctl.studies.simulate import SIMULATE, Simulated
-from wristctl.studies.studied import Studied
-from wristctl.studies.train import TRAIN, Trained
-from wristctl.studies.tune import TUNE, Tuned
+from wristctl.study_files.load import load_study as _load_study
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -232,7 +232,7 @@ def runs(
     """
     import pandas as pd
 
-    from wristctl.records.query import entries, in_order, select
+    from wristctl.records.find import entries, in_order, select
 
     asked = [where] if isinstance(where, str) else list(where)
     found = in_order(select(entries(Path(out)), kind, label, state, tag, asked, newer, older), sort)

@@ -1,7 +1,5 @@
 """The arrays that everything is computed with."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from typing import TypeVar
 

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError, meant
 from wristctl.config.study import Study
+from wristctl.errors import UserError, meant
 
 if TYPE_CHECKING:
     from wristctl.simulation.cases import Case

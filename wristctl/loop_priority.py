@@ -1,7 +1,5 @@
 """A loop that the computer lets run when it is due: real-time scheduling, memory that stays, no garbage collection."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

@@ -1,7 +1,5 @@
 """Random streams: every one of them has a name under the root seed of a study."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import lru_cache
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from tests.board.flash_image import RJMP_SELF, chip_with
-from wristctl.bench.bench_transport import BenchTransport
-from wristctl.bench.fault_injection import Faults
+from wristctl.bench.faults import Faults
+from wristctl.bench.virtual_bench import BenchTransport
 from wristctl.board.board_errors import PortLost
 from wristctl.board.driver import Board
 from wristctl.board.emulator import Atmega2560
-from wristctl.config.injected import FaultKind, InjectedFault
+from wristctl.config.bench import FaultKind, InjectedFault
 
 
 def wire(

@@ -6,8 +6,7 @@ import os
 
 import pytest
 
-from wristctl.bench.bystander import Bystander
-from wristctl.bench.rig import Rig
+from wristctl.bench.rig import Bystander, Rig
 from wristctl.config.bench import BenchSettings
 from wristctl.config.wrist import WristParameters
 

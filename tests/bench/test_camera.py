@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from tests.bench.conftest import TAUT, Host, HostOn
-from wristctl.bench.bench_transport import BenchTransport
 from wristctl.bench.rig import Rig
-from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.bench.virtual_camera import VirtualCamera
-from wristctl.config.bench import BenchSettings, RenderedCamera
-from wristctl.config.injected import FaultKind, InjectedFault
+from wristctl.bench.virtual_bench import BenchTransport, VirtualBench, VirtualCamera
+from wristctl.config.bench import BenchSettings, FaultKind, InjectedFault, RenderedCamera
 from wristctl.config.vision import Gates, Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame

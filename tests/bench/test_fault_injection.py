@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from wristctl.bench.fault_injection import Faults
-from wristctl.config.injected import InjectedFault
+from wristctl.bench.faults import Faults
+from wristctl.config.bench import InjectedFault
 
 
 def faults() -> Faults:

@@ -10,8 +10,7 @@ from tests.bench.conftest import TAUT, HostOn
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, PortLost, Restarted
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import Fault as Latched
-from wristctl.config.bench import BenchSettings
-from wristctl.config.injected import FAULTS, FaultKind, InjectedFault
+from wristctl.config.bench import FAULTS, BenchSettings, FaultKind, InjectedFault
 
 RATES = (0.0, 0.0, 500.0, 500.0)
 WATCHDOG, RAMP = 0.1, 0.03

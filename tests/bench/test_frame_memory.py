@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.bench.frame_memory import FrameMemory, SharedCamera
+from wristctl.bench.frame_process import FrameMemory, SharedCamera
 from wristctl.vision.camera import Frame
 
 

@@ -8,7 +8,7 @@ import urllib.request
 
 import numpy as np
 
-from wristctl.bench.mjpeg_stream import MjpegStream
+from wristctl.bench.frame_process import MjpegStream
 from wristctl.config.vision import Device
 from wristctl.vision.camera import Frame
 from wristctl.vision.device_camera import DeviceCamera

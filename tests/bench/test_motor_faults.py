@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.bench.fault_injection import Faults
-from wristctl.bench.motor_faults import MotorFaults
+from wristctl.bench.faults import Faults, MotorFaults
 from wristctl.board.emulator.chip import FREQUENCY
-from wristctl.config.injected import InjectedFault
+from wristctl.config.bench import InjectedFault
 
 A, C = ord("A"), ord("C")
 STEP, DIR = 0b01, 0b10

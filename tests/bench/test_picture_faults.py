@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.bench.picture_faults import PICTURE_FAULTS, spoiled
+from wristctl.bench.shutter import PICTURE_FAULTS, spoiled
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.detector import Detector

@@ -19,19 +19,16 @@ import pytest
 from tests.bench.conftest import TAUT
 from tests.bench.record import is_released, last_step, read
 from tests.board.patience import WATCHDOG, patient, wait_for
-from wristctl.bench.fault_injection import Faults
-from wristctl.bench.film import start_film
-from wristctl.bench.frame_memory import FrameMemory
-from wristctl.bench.line import FaultyLine
+from wristctl.bench.faults import Faults
+from wristctl.bench.frame_process import FrameMemory, start_film
 from wristctl.bench.real_time_bench import RealTimeBench
 from wristctl.bench.rig import Rig
-from wristctl.bench.server import BenchServer
+from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.driver import Board
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import Flag, Target
-from wristctl.config.bench import BenchSettings, RenderedCamera
-from wristctl.config.injected import InjectedFault
+from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
 from wristctl.config.vision import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.bench.fault_injection import Faults
+from wristctl.bench.faults import Faults
 from wristctl.bench.shutter import Shutter
-from wristctl.config.bench import RenderedCamera
-from wristctl.config.injected import InjectedFault
+from wristctl.config.bench import InjectedFault, RenderedCamera
 
 
 class Turning:

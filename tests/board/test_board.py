@@ -8,9 +8,9 @@ import pytest
 
 from wristctl.board import driver
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.driver import ATTEMPTS, Board
+from wristctl.board.driver import ATTEMPTS, Board, within_reach
 from wristctl.board.emulator import Atmega2560
-from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.emulator.atmega2560 import VirtualTransport
 from wristctl.board.messages import (
     DICTIONARY_HASH,
     MAX_RATE,
@@ -22,7 +22,6 @@ from wristctl.board.messages import (
     Result,
     State,
 )
-from wristctl.board.rates import within_reach
 from wristctl.board.transport import BOOT_TIME
 
 PERIOD = 0.005

@@ -9,7 +9,7 @@ import pytest
 
 from tests.board.flash_image import chip_with
 from wristctl.board.emulator import Atmega2560, Halted
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 RJMP_SELF, SEI, SLEEP, RETI, NOP, WDR = 0xCFFF, 0x9478, 0x9588, 0x9518, 0x0000, 0x95A8
 MCUSR, SMCR, WDTCSR, SREG = 0x54, 0x53, 0x60, 0x5F

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wristctl.board.emulator.chip import CONSTANTS, FLASH_BYTES, FLASH_WORDS
-from wristctl.board.emulator.decode import decode
 from wristctl.board.emulator.instructions import Op
+from wristctl.board.emulator.program import decode
 
 K = CONSTANTS
 """Where the number 0 lies: an immediate operand is read like a register."""

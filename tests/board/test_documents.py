@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wristctl.board.dictionary import load
-from wristctl.config.injected import FAULTS
+from wristctl.config.bench import FAULTS
 from wristctl.vision.marker import MEANING
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.board.bench import Bench
 from wristctl.board.emulator import Atmega2560
-from wristctl.board.emulator.eeprom import EEARH, EEARL, EECR, EEDR, EEMPE, EEPE, EERE
+from wristctl.board.emulator.peripherals import EEARH, EEARL, EECR, EEDR, EEMPE, EEPE, EERE
 from wristctl.board.messages import Command
 
 MILLISECONDS = 16_000

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.board.flash_image import record
-from wristctl.board.emulator.intel_hex import read_hex
-from wristctl.config.errors import UserError
+from wristctl.board.emulator.program import read_hex
+from wristctl.errors import UserError
 
 END = record(0, 1, b"")
 

@@ -11,7 +11,7 @@ from serial.tools import list_ports
 
 from wristctl.board import transport
 from wristctl.board.board_errors import BoardError, PortLost
-from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.emulator.atmega2560 import VirtualTransport
 from wristctl.board.transport import BOOT_TIME, SerialTransport, only_board, open_transport, ports
 
 

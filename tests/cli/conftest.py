@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.probe import COMMANDS
-from wristctl.cli import app
+from wristctl.cli import commands
 from wristctl.cli.app import main
 
 ROOT = Path(__file__).parents[2]
@@ -39,10 +39,10 @@ def probe(call: Call, monkeypatch: pytest.MonkeyPatch) -> Command:
     def run(*arguments: str, action: str = "") -> subprocess.CompletedProcess[str]:
         with monkeypatch.context() as during:
             during.setenv("PROBE", action)
-            for name in list(app.COMMANDS):
-                during.delitem(app.COMMANDS, name)
+            for name in list(commands.COMMANDS):
+                during.delitem(commands.COMMANDS, name)
             for name, entry in COMMANDS.items():
-                during.setitem(app.COMMANDS, name, entry)
+                during.setitem(commands.COMMANDS, name, entry)
             return subprocess.CompletedProcess(arguments, *call(*arguments))
 
     return run

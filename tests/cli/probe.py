@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import pandas as pd
 
-from wristctl.cli import app as application
-from wristctl.cli.command import study_command
-from wristctl.config.errors import UserError
-from wristctl.report.printed_table import Table
-from wristctl.studies.inputs import EarlierRun
-from wristctl.studies.procedure import Procedure
-from wristctl.studies.session import Session
-from wristctl.studies.study_result import StudyResult
+from wristctl.cli import commands
+from wristctl.cli.app import main
+from wristctl.cli.commands import Entry
+from wristctl.commands.inputs import EarlierRun
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -59,13 +58,13 @@ def train(session: Session) -> Probed:
 
 _GEN_DATA = Procedure("gen-data", lambda study, inputs: f"{study.gen_data.samples} samples", gen_data)
 _TRAIN = Procedure("train", lambda study, inputs: "", train, (EarlierRun("data", "gen-data"),))
-_PROBES = {"gen-data": study_command(_GEN_DATA), "train": study_command(_TRAIN, shortcuts=("epochs",))}
-for _name, _app in _PROBES.items():
-    sys.modules[f"probe-{_name}"] = SimpleNamespace(app=_app)  # type: ignore[assignment]
-COMMANDS = {name: (f"probe-{name}", "Probe", name) for name in _PROBES}
+COMMANDS = {
+    "gen-data": Entry(f"{__name__}:_GEN_DATA", "Probe", "gen-data"),
+    "train": Entry(f"{__name__}:_TRAIN", "Probe", "train", shortcuts=("epochs",)),
+}
 
 
 if __name__ == "__main__":
-    application.COMMANDS.clear()
-    application.COMMANDS.update(COMMANDS)
-    application.main()
+    commands.COMMANDS.clear()
+    commands.COMMANDS.update(COMMANDS)
+    main()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import signal
@@ -18,15 +17,16 @@ from typer.main import get_command
 
 from tests.cli.conftest import Call, Command
 from wristctl.cli import app, command
-from wristctl.cli.hw_calibrate import COMMANDS as CALIBRATIONS
+from wristctl.cli.app import typer_of
+from wristctl.cli.commands import CALIBRATIONS, COMMANDS
+from wristctl.commands.perform import perform
 from wristctl.records import Run
-from wristctl.studies.perform import perform
 
 
 def _commands() -> Iterator[tuple[str, Any]]:
     """Every command and group below `wristctl`, as it is when called."""
-    modules = {**app.COMMANDS, **CALIBRATIONS}
-    waiting = [(name, get_command(importlib.import_module(entry[0]).app)) for name, entry in modules.items()]
+    modules = {**COMMANDS, **CALIBRATIONS}
+    waiting = [(name, get_command(typer_of(entry))) for name, entry in modules.items()]
     while waiting:
         name, found = waiting.pop()
         yield name, found

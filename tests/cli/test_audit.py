@@ -18,8 +18,8 @@ from tests.cli.conftest import Call
 from wristctl.comparison.paper import T2, Ends
 from wristctl.comparison.verdicts import of_sample
 from wristctl.config.audit import VerdictName
-from wristctl.config.load import load_study
 from wristctl.records import open_run
+from wristctl.study_files.load import load_study
 
 VERDICTS = get_args(VerdictName)
 LEDGER = Path(__file__).parents[2] / "experiments" / "claims.yaml"

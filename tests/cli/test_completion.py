@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from wristctl.cli.completion import MOST, controllers, run_ids, study_files
+from wristctl.cli.options import MOST, controllers, run_ids, study_files
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.study import Study
 from wristctl.records import start_run

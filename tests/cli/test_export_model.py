@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.config.load import load_study
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, list_runs, start_run
+from wristctl.study_files.load import load_study
 
 IDENTIFIED = "wrist: {stiffness: 0.5, flexion_ratio: 2.0, damping: 0.1, tendon_radius: 0.02}\n"
 LOOP = "simulate: {loop: {actuator: {level: tendon}, sensor: {level: camera}}}\n"

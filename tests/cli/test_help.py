@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import re
@@ -14,9 +13,9 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from wristctl.cli.app import COMMANDS, app, main
-from wristctl.cli.hw_calibrate import COMMANDS as CALIBRATIONS
-from wristctl.config.strict_yaml import parse_yaml
+from wristctl.cli.app import app, main, typer_of
+from wristctl.cli.commands import CALIBRATIONS, COMMANDS
+from wristctl.study_files.strict_yaml import parse_yaml
 
 ROOT = Path(__file__).parents[2]
 HEAVY = ("torch", "scipy", "pandas", "matplotlib", "cv2", "numba", "numpy", "llvmlite")
@@ -72,8 +71,8 @@ def test_every_example_runs_as_written_but_for_what_it_takes_for_granted(
 ) -> None:
     """Earlier runs and recordings; and a study file that it names says something of its command."""
     monkeypatch.chdir(ROOT)
-    modules = {entry[0] for entry in (*COMMANDS.values(), *CALIBRATIONS.values())}
-    pages = [get_command(importlib.import_module(module).app).epilog for module in modules]
+    entries = (*COMMANDS.values(), *CALIBRATIONS.values())
+    pages = [get_command(typer_of(entry)).epilog for entry in entries]
     examples = [line for page in (*pages, app.info.epilog) for line in (page or "").split("\n") if "wristctl " in line]
     assert len(examples) > 30
     for example in examples:

@@ -12,8 +12,8 @@ import pytest
 
 from tests.cli.conftest import Call
 from wristctl.board.driver import Board
-from wristctl.board.emulator import virtual
-from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.emulator import atmega2560 as virtual
+from wristctl.board.emulator.atmega2560 import VirtualTransport
 from wristctl.board.messages import Limits
 from wristctl.config.plant import Actuator
 

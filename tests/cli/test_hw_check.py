@@ -15,11 +15,11 @@ from tests.cli.conftest import Call
 from wristctl.board import transport
 from wristctl.board.board_errors import PortUnusable
 from wristctl.board.check import RoundTrips
-from wristctl.board.exchange import Traffic
+from wristctl.board.driver import Traffic
 from wristctl.board.flashing import IMAGE
 from wristctl.board.messages import Command, Counters, Hello, Reset, Result, State, Status
 from wristctl.board.transport import BOOT_TIME
-from wristctl.cli.hw_options import facts_of
+from wristctl.cli.options import facts_of
 
 HELLO = Hello(2, 0xAB, (1, 2, 3), 9, Reset.EXTERNAL | Reset.WARM, 4, 1000, 2000, 5)
 COUNTERS = Counters(*range(11, 11 + len(Counters._fields)))

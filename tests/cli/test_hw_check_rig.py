@@ -55,7 +55,7 @@ def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monke
 def test_nothing_moves_without_a_yes_and_the_rest_is_measured(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     moved: list[Any] = []
     monkeypatch.setattr(rig_facts, "RigStrokes", lambda *given: moved.append(given))
-    monkeypatch.setattr("wristctl.cli.hw_check_rig.typed_line", lambda meanwhile: "no")
+    monkeypatch.setattr("wristctl.cli.hw_check.typed_line", lambda meanwhile: "no")
     code, out, err = call("hw", "check", "--rig", "--port", "emulated", "--json")
     found = json.loads(out)
     assert code == 0 and not moved and found["fit"] and found["latency"] is None

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 
 from tests.cli.conftest import Call
-from tests.report.browser import CHROMIUM, DRIVER, Browser
+from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.board.framing import Decoder
 from wristctl.board.messages import LAYOUTS, Command, Rate
-from wristctl.config.load import load_study
+from wristctl.commands.loop_warnings import outside_conditions
 from wristctl.config.vision import Gates, Markers
 from wristctl.records import Run, list_runs, open_run
-from wristctl.studies.loop_warnings import outside_conditions
+from wristctl.study_files.load import load_study
 from wristctl.vision.camera import VideoCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View

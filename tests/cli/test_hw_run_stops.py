@@ -19,11 +19,11 @@ import pytest
 from tests.cli.conftest import Call
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
-from wristctl.config.injected import FAULTS
+from wristctl.commands.hw_run import figures as trial_figures
+from wristctl.config.bench import FAULTS
 from wristctl.config.study import Study
 from wristctl.records import list_runs, start_run
 from wristctl.records.run import Run
-from wristctl.report import trial_figures
 from wristctl.trial import homing, testbeds
 from wristctl.trial.calibration import FILE, WristCalibration
 from wristctl.trial.homing import Zero

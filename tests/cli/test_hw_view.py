@@ -15,7 +15,7 @@ import pytest
 from wristctl.cli import operator
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
-from wristctl.studies.session import Session
+from wristctl.commands.session import Session
 from wristctl.trial.log import LOG
 from wristctl.trial.trials import Trial
 

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import wristctl
+from wristctl.commands.hw_run import live_figure
 from wristctl.records import Run, start_run
-from wristctl.report import live_figure
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -66,7 +66,7 @@ def test_a_run_is_drawn_again_until_it_has_ended(call: Call, asked: list[Any], m
     run = performed("a")
     states, waited = iter(["running", "running", "ok"]), list[float]()
     monkeypatch.setattr(Run, "state", property(lambda _: next(states)))
-    monkeypatch.setattr("wristctl.cli.hw_watch.time.sleep", waited.append)
+    monkeypatch.setattr("wristctl.cli.hw_bench.time.sleep", waited.append)
     assert call("hw", "watch", str(run.path), "--every", "0.2")[0] == 0
     assert len(asked) == 3 and waited == [0.2, 0.2], "once more after its end, and then no pause"
 

@@ -8,13 +8,13 @@ import pytest
 
 from tests.cli.conftest import Call
 from tests.identification.benches import KNOWN, LEVEL, SLOW, UPRIGHT, write_run
-from wristctl.config.load import load_study
 from wristctl.config.loop import DirectionName, Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
-from wristctl.identification.identified import identified_yaml, with_identified
+from wristctl.identification.unknowns import identified_yaml, with_identified
 from wristctl.records import open_run
 from wristctl.simulation.closed_loop import simulate
+from wristctl.study_files.load import load_study
 
 SIDES: tuple[DirectionName, ...] = ("ulnar", "extension")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import os
 import random
@@ -11,7 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from wristctl.cli.app import COMMANDS
+from wristctl.cli.app import typer_of
+from wristctl.cli.commands import COMMANDS
 from wristctl.records import list_runs
 
 ROOT = Path(__file__).parents[2]
@@ -42,11 +42,15 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
 
 def _that_write() -> list[str]:
     """The commands that make a run."""
-    apps = {name: importlib.import_module(module).app for name, (module, *_) in COMMANDS.items()}
+    apps = {name: typer_of(entry) for name, entry in COMMANDS.items()}
     return [
         name
         for name, app in apps.items()
-        if any("dry_run" in inspect.signature(each.callback).parameters for each in app.registered_commands)
+        if any(
+            "dry_run" in inspect.signature(each.callback).parameters
+            for each in app.registered_commands
+            if each.callback
+        )
     ]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.learning import processes, training
+from wristctl.learning import training, training_processes
 from wristctl.learning.dataset import Samples
 from wristctl.learning.network_file import load_network, training_record
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
@@ -101,7 +101,7 @@ def interrupt_at(epoch: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
         return training.train_one(samples, job, device, checkpoints, stop)
 
-    monkeypatch.setattr(processes, "train_one", interrupted)
+    monkeypatch.setattr(training_processes, "train_one", interrupted)
 
 
 def test_interrupted_training_keeps_the_network_found_so_far(

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.records.tags import change_tags
 

@@ -12,7 +12,7 @@ import pytest
 
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 
 def _operator(*flags: str, quiet: bool = False, terminal: bool = False) -> TerminalOperator:

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from wristctl.cli import progress as module
-from wristctl.studies.counting import Count, no_event
+from wristctl.commands.progress import Count, no_event
 
 
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:

@@ -115,7 +115,7 @@ def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Pa
     status, found = _verdict(wristctl, data)
     file.write_text(text)
     assert status == 3 and all(cause.startswith("code: ") for cause in found["causes"])
-    assert any(cause.startswith("code: studies/gen_data.py: ") for cause in found["causes"])
+    assert any(cause.startswith("code: commands/gen_data/command.py: ") for cause in found["causes"])
     differing = {each["path"]: each["detail"] for each in found["files"] if each["verdict"] == "differs"}
     assert differing["metrics.json"].endswith("10 before, 11 now") and "data/samples.csv" not in differing
 

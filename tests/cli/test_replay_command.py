@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.cli.child import end_with_parent
 from wristctl.config.study import Study
+from wristctl.processes import end_with_parent
 from wristctl.records import InputRun, Run, start_run
 
 
@@ -43,7 +43,9 @@ def again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., list
             return SimpleNamespace(returncode=code)
 
         monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-        monkeypatch.setattr("wristctl.cli.runs.replay.subprocess", SimpleNamespace(run=run, DEVNULL=subprocess.DEVNULL))
+        monkeypatch.setattr(
+            "wristctl.cli.runs.verification.subprocess", SimpleNamespace(run=run, DEVNULL=subprocess.DEVNULL)
+        )
         return called
 
     return prepared

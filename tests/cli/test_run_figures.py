@@ -13,9 +13,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
+from wristctl.commands.printed_table import Table, latex_table
 from wristctl.records import open_run
-from wristctl.report.latex import latex_table
-from wristctl.report.printed_table import Table
 
 COMPARE = (
     "compare", "--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.4", "--set", "inverses=[none]",

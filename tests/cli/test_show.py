@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, seal, start_run
 from wristctl.records.files import sha256_of
 from wristctl.records.manifest import Code

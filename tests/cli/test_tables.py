@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from wristctl.report.latex import latex_table
-from wristctl.report.printed_table import Table
+from wristctl.commands.printed_table import Table, latex_table
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
 

@@ -17,14 +17,13 @@ import pytest
 
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
+from wristctl.commands.calibrate.camera import look
 from wristctl.config.vision import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, open_run
 from wristctl.records.manifest import command_of
-from wristctl.studies.camera_views import look
-from wristctl.vision.board_shots import board_shots
 from wristctl.vision.camera import FolderCamera, Frame
-from wristctl.vision.scene import Scene
+from wristctl.vision.scene import Scene, board_shots
 
 THOROUGH = os.environ.get("WRISTCTL_THOROUGH")
 Call = Callable[..., tuple[int, str, str]]

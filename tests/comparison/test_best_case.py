@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from wristctl.comparison.best_case import GUARD_DEG, closest, follows, search
-from wristctl.comparison.box import courses
 from wristctl.comparison.paper import T2
-from wristctl.comparison.readings import Courses, readings
-from wristctl.config.control import Row
+from wristctl.comparison.unknowns_sampling import Courses, courses, readings
+from wristctl.config.controllers import Row
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unstated import Box, PaperSetting, Unstated
+from wristctl.config.unknowns_box import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
 
 WRIST = WristParameters()

@@ -13,21 +13,28 @@ import pytest
 import scipy.stats
 
 from tests.values import one_move
-from wristctl.comparison.box import Reactions, continuous_settings, courses, drawn_settings, react
-from wristctl.comparison.deciding_leaf import deciding, split
-from wristctl.comparison.held_tick import arrives_by_rule, overshoot_of_a_tick
-from wristctl.comparison.readings import Courses, readings, usual
-from wristctl.comparison.robust import Strip, draws_frame, rows_in_box, strips, strips_frame
+from wristctl.comparison.best_case import arrives_by_rule, overshoot_of_a_tick
+from wristctl.comparison.robust import Strip, deciding, draws_frame, rows_in_box, split, strips, strips_frame
+from wristctl.comparison.unknowns_sampling import (
+    Courses,
+    Reactions,
+    continuous_settings,
+    courses,
+    drawn_settings,
+    react,
+    readings,
+    usual,
+)
 from wristctl.config.audit import Claim
-from wristctl.config.control import Row
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.config.controllers import Row
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.unstated import Box, PaperSetting, Unstated
+from wristctl.config.unknowns_box import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.simulation.arrival import SHORT, arrives, missing
 from wristctl.simulation.metrics import metrics_of
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.study_files.load import load_study
 
 WRIST = WristParameters()
 EXCHANGED = Row(controller="smc", gains="exchanged")

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.studies.conftest import repeated
+from tests.commands.conftest import repeated
 from wristctl.api import load_study
 from wristctl.comparison.class_standing import ClassStanding, class_standings, standings_frame
-from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.condition_classes import CLASSES, class_of
+from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
 from wristctl.comparison.geometric_means import MEASURABLE, paired_ratio
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.wrist import WristParameters

@@ -8,11 +8,11 @@ import pytest
 import wristctl.comparison
 from tests.values import changeable
 from wristctl.comparison.combinations import ComparedRow, compare, count_rollouts, planned, refuse_tuned_scenarios
-from wristctl.config.errors import UserError
 from wristctl.config.families import TuningWorlds, Worlds
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import simulate
+from wristctl.study_files.load import load_study
 from wristctl.wrist.kinematics import AnglePath, TipPath, exact_angle
 
 PID, SOFTER = "{controller: pid, gains: {Kp: 30, Ki: 10, Kd: 0.5}}", "{controller: pid, gains: {Kp: 3, Ki: 1, Kd: 0.1}}"

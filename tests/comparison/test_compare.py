@@ -11,12 +11,12 @@ from wristctl.comparison.combinations import ComparedRow, compare, refuse_tuned_
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
-from wristctl.config.control import CompareSettings, TuneSettings
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.config.controllers import CompareSettings, TuneSettings
 from wristctl.config.loop import Reference
 from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.reference import reference_name
+from wristctl.study_files.load import load_study
 
 SETTINGS = (
     "loops={one: {plant_segments: 1}, four: {}}", "horizon=0.4", "inverses=[none, closed-form]",

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.comparison.equations import EQUATIONS, least_rmse
+from wristctl.comparison.derived_claims import EQUATIONS, least_rmse
 from wristctl.comparison.paper import T2
 
 

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from wristctl.arrays import Array
-from wristctl.comparison.order_shifts import order_shift
-from wristctl.comparison.term_values import term_values
+from wristctl.commands.study.answer import answer
+from wristctl.commands.study.figures import undominated
+from wristctl.comparison.paired_worlds import order_shift, term_values
 from wristctl.comparison.world_ranking import RANKED, RankedRow, WorldRanking, ranking
 from wristctl.config.families import Family
-from wristctl.report.fair_figures import undominated
 from wristctl.simulation.cases import Measured
-from wristctl.studies.fair_answer import answer
 
 WORLDS = 40
 HARD = np.exp(np.random.default_rng(1).normal(-5.0, 0.4, WORLDS))

@@ -8,13 +8,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.comparison.equations import EQUATIONS, Equation
-from wristctl.comparison.evidence import Grounds, TrialsDone, conditions_of, evidence_study, rows_of
-from wristctl.comparison.ledger import Judgement, interval, judge, judge_all, ledger_frame
+from wristctl.comparison.claims import (
+    Grounds,
+    Judgement,
+    TrialsDone,
+    conditions_of,
+    evidence_study,
+    interval,
+    judge,
+    judge_all,
+    ledger_frame,
+    rows_of,
+)
+from wristctl.comparison.derived_claims import EQUATIONS, Equation
 from wristctl.config.audit import Claim
-from wristctl.config.load import load_study
 from wristctl.config.loop import LOOPS
 from wristctl.simulation.arrival import SHORT
+from wristctl.study_files.load import load_study
 
 OPEN, BETTER, WORSE = "not specified enough", "better than the paper", "worse than the paper"
 FAILS = "does not hold"

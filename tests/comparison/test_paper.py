@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wristctl.comparison.paper import EXPERIMENT, T1, T2, rounded, verdict
-from wristctl.config.load import load_study
+from wristctl.study_files.load import load_study
 
 LEDGER = Path(__file__).parents[2] / "experiments" / "claims.yaml"
 HAIR = 1e-9

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import binom
 
 from wristctl.arrays import Array
-from wristctl.comparison.shares import performance_profiles, share
+from wristctl.comparison.tie_groups import performance_profiles, share
 
 
 @pytest.mark.parametrize(

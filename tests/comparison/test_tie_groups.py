@@ -15,8 +15,7 @@ from scipy.stats import studentized_range, t, ttest_rel
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import FAILURE, MEASURABLE
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
-from wristctl.comparison.shares import share
-from wristctl.comparison.tie_groups import Standing, standing
+from wristctl.comparison.tie_groups import Standing, share, standing
 
 RANGE = 50.0
 

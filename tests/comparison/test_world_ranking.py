@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
+from wristctl.commands.compare.answer import answer_lines
+from wristctl.commands.compare.command import Compared
+from wristctl.commands.compare.ranking import answer
+from wristctl.commands.results import Findings
 from wristctl.comparison.class_standing import of_ranking
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.world_ranking import (
@@ -18,13 +22,9 @@ from wristctl.comparison.world_ranking import (
     worlds_frame,
 )
 from wristctl.config.families import Family
-from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.simulation.cases import Measured
-from wristctl.studies.compare import Compared
-from wristctl.studies.compare_answer import answer_lines
-from wristctl.studies.findings import Findings
-from wristctl.studies.rank import answer
+from wristctl.study_files.load import load_study
 
 WORLDS = 40
 FAMILY = Family()

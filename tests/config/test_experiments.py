@@ -10,19 +10,19 @@ from typing import Any
 import pytest
 import yaml
 
-from wristctl.config.control import Row
-from wristctl.config.errors import UserError
-from wristctl.config.explain import located
-from wristctl.config.load import load_study, read_study
-from wristctl.config.resolved import config_hash, resolved_yaml
+from wristctl.commands.compare import command as compare
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.simulate import command as simulate
+from wristctl.config.controllers import Row
 from wristctl.config.section import Section
-from wristctl.config.strict_yaml import KeyPath, parse_yaml
 from wristctl.config.study import Study
-from wristctl.records.code import code_state
-from wristctl.records.environment import environment_state
+from wristctl.errors import UserError
+from wristctl.records.provenance import code_state, environment_state
 from wristctl.records.start import fingerprint
-from wristctl.studies import compare, simulate
-from wristctl.studies.inputs import Inputs
+from wristctl.study_files.explain import located
+from wristctl.study_files.load import load_study, read_study
+from wristctl.study_files.resolved import config_hash, resolved_yaml
+from wristctl.study_files.strict_yaml import KeyPath, parse_yaml
 
 EXPERIMENTS = sorted((Path(__file__).parents[2] / "experiments").rglob("*.yaml"))
 SECTIONS = {field.alias or name: name for name, field in Study.model_fields.items()}

@@ -10,7 +10,7 @@ import pytest
 
 from wristctl.config import choices
 from wristctl.config.choices import Choices
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 ROOT = Path(__file__).parents[2]
 CODE = """
@@ -18,7 +18,7 @@ import importlib, pkgutil, sys
 import wristctl.config as config
 for module in pkgutil.iter_modules(config.__path__, "wristctl.config."):
     importlib.import_module(module.name)
-from wristctl.config.load import load_study
+from wristctl.study_files.load import load_study
 load_study([], ["simulate={controller: pid, reference: {kind: sine}}", "tune.optimiser=random"])
 print(*sys.modules)
 """

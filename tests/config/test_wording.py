@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError, under
-from wristctl.config.explain import located
-from wristctl.config.load import load_study, read_study
-from wristctl.config.wording import Argument, Call, Phrase, Setting
+from wristctl.errors import Argument, Call, Phrase, Setting, UserError, under
+from wristctl.study_files.explain import located
+from wristctl.study_files.load import load_study, read_study
 
 PHRASES: list[tuple[Phrase, str, str]] = [
     (Argument("network"), "--network RUN", "network=..."),

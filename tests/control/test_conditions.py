@@ -11,21 +11,20 @@ import pytest
 from tests.documented import script_of_docs
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
+from wristctl.commands.hw_run.command import hw_run
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.loop_warnings import warn_outside_conditions
+from wristctl.commands.progress import watched
+from wristctl.commands.results import Findings
+from wristctl.commands.session import Session, Unattended
 from wristctl.config.choices import CONTROLLERS
-from wristctl.config.control import Row
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.config.controllers import Row
 from wristctl.config.loop import Loop
 from wristctl.control.law import Conditions
 from wristctl.control.table import controller
+from wristctl.errors import UserError
 from wristctl.simulation.oscillation import LIMIT_CYCLE
-from wristctl.studies.counting import watched
-from wristctl.studies.findings import Findings
-from wristctl.studies.hw_run import hw_run
-from wristctl.studies.inputs import Inputs
-from wristctl.studies.loop_warnings import warn_outside_conditions
-from wristctl.studies.session import Session
-from wristctl.studies.unattended import Unattended
+from wristctl.study_files.load import load_study
 
 PAPERS = ("smc", "pid", "pid-angle")
 STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).conditions]

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
 from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.compiled_model import terms

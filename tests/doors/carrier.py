@@ -11,10 +11,10 @@ from typing import Any
 
 from tests.doors.conftest import HELPER, LAW
 from wristctl.config.foreign import Foreign
-from wristctl.config.load import load_study
 from wristctl.records import Run, start_run
 from wristctl.records.manifest import Manifest
 from wristctl.records.seal import result_hash, write_seal
+from wristctl.study_files.load import load_study
 
 LAW_FILE, MARK = "code/strange/strange.py", "was here"
 CARRIED = f"{LAW_FILE}:STRANGE"

@@ -13,17 +13,17 @@ from numba.core import event
 
 import wristctl as face
 from tests.doors.conftest import LAW, wristctl
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.commands.adoption import adopt, adopted, adoption, sources_in
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.control.vetting import call_law
+from wristctl.errors import UserError
 from wristctl.interrupt import interrupts
 from wristctl.lanes.frozen_values import frozen_values
 from wristctl.records import list_runs
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.studies.adopted import adopt, adopted, adoption, sources_in
+from wristctl.study_files.load import load_study
 
 QUICK = "horizon: 0.3, loop: {plant_segments: 1}"
 
@@ -155,7 +155,7 @@ LAW = Controller("frozen", made({closed}), "a test", {{"k": Gain("", "", 0.1, 10
         (tmp_path / "law.py").write_text(text.format(**numbers))
         (tmp_path / "own_numbers.py").write_text(f"VALUE = {value if where == 'module' else '1.0'}\n")
         (tmp_path / "number.txt").write_text(value if where == "file" else "1.0")
-        from wristctl.config import foreign
+        from wristctl.plugins import places as foreign
 
         foreign._loaded.clear()  # as in another process: of what it reads, a law's own data are not watched
         law = CONTROLLERS[f"{tmp_path}/law.py:LAW"]

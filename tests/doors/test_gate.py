@@ -11,13 +11,13 @@ import pytest
 
 from tests.cli.conftest import Call, call  # noqa: F401
 from tests.doors.carrier import CARRIED, LAW_FILE, MARK, carrier
-from wristctl.config import trust
-from wristctl.config.errors import UserError
-from wristctl.config.foreign import load
-from wristctl.config.sha256sums import read_seal
-from wristctl.config.trust import asking, run_around
+from wristctl.errors import UserError
+from wristctl.plugins import trust
+from wristctl.plugins.places import load
+from wristctl.plugins.trust import asking, run_around
 from wristctl.records import Run
 from wristctl.records.seal import write_seal
+from wristctl.sha256sums import read_seal
 
 MARKS = ("run.json", "SHA256SUMS", "code.txt", "config.yaml")
 

@@ -10,15 +10,15 @@ import pytest
 
 import wristctl as face
 from tests.doors.conftest import LAW, wristctl
-from wristctl.config.errors import UserError
-from wristctl.config.foreign import load
-from wristctl.config.load import load_study
+from wristctl.commands.adoption import adopt, adopted, adoption
+from wristctl.errors import UserError
+from wristctl.plugins.places import load
 from wristctl.records import Run
-from wristctl.studies.adopted import adopt, adopted, adoption
+from wristctl.study_files.load import load_study
 
 READS = """
 import numpy as np
-from wristctl.config.sources import data_file
+from wristctl.plugins.import_hook import data_file
 SPRING = float(np.load(data_file(__file__, "{name}"))[0])
 """
 STUDY = "simulate: {controller: strange.py:STRANGE, gains: default, horizon: 0.3, loop: {plant_segments: 1}}\n"

@@ -21,14 +21,14 @@ from tests.doors.carrier import MARK, MARKING, forged
 from wristctl.board.flashing import flash
 from wristctl.board.messages import BAUD
 from wristctl.board.transport import SerialTransport, open_transport
-from wristctl.cli.runs.replay import _again
-from wristctl.config.errors import UserError
+from wristctl.cli.runs.verification import _again
+from wristctl.commands.procedure import procedure_of
 from wristctl.config.study import Study
 from wristctl.config.vision import Device
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, list_runs, start_run
 from wristctl.records.manifest import KINDS
 from wristctl.records.seal import write_seal
-from wristctl.studies.procedures import procedure_of
 from wristctl.vision.device_camera import DeviceCamera
 
 Change = Callable[[dict[str, Any]], object]
@@ -125,7 +125,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         found.append(command)
         return SimpleNamespace(returncode=0)
 
-    monkeypatch.setattr("wristctl.cli.runs.replay.subprocess", SimpleNamespace(run=run, DEVNULL=-3))
+    monkeypatch.setattr("wristctl.cli.runs.verification.subprocess", SimpleNamespace(run=run, DEVNULL=-3))
     return found
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import wristctl as face
 from tests.doors.conftest import LAW, ROOT, wristctl
-from wristctl.studies.law_certificate import LawCheck, certificate
+from wristctl.commands.law_certificate import LawCheck, certificate
 
 THOROUGH = os.environ.get("WRISTCTL_THOROUGH") == "1"
 PAGE = (ROOT / "docs" / "your-own-controller.md").read_text(encoding="utf-8")

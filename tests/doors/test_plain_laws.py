@@ -12,7 +12,6 @@ from numba.core import event
 
 import wristctl as face
 from tests.doors.conftest import ROOT
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -20,6 +19,7 @@ from wristctl.control.computed_torque import COMPUTED_TORQUE
 from wristctl.control.law import Controller, Gain
 from wristctl.control.plain_model import plain_one_segment
 from wristctl.control.table import CONTROLLERS
+from wristctl.errors import UserError
 from wristctl.interrupt import from_outside, interrupts
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion

@@ -15,9 +15,9 @@ import pytest
 
 import wristctl as face
 from tests.doors.conftest import ROOT, wristctl
-from wristctl.config.errors import UserError
-from wristctl.config.foreign import load
-from wristctl.config.trust import asking
+from wristctl.errors import UserError
+from wristctl.plugins.places import load
+from wristctl.plugins.trust import asking
 from wristctl.records import Run
 
 HOSTILE = "open({marker!r}, 'a').close()\n"

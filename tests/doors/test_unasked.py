@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import shutil
 from collections.abc import Iterator, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,8 @@ from typer.main import get_command
 
 from tests.cli.conftest import Call, call  # noqa: F401
 from tests.doors.carrier import CARRIED, LAW_FILE, MARK, carrier
-from wristctl.cli.app import COMMANDS
+from wristctl.cli.app import typer_of
+from wristctl.cli.commands import COMMANDS
 from wristctl.records import Run
 
 ROW = {"controller": CARRIED, "gains": "rig"}
@@ -31,8 +31,8 @@ PLACES, COUNTS = ("--out", "--file", "--label", "--slurm"), ("--seed", "--segmen
 
 
 def _leaves(command: Any, name: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    if lazy := getattr(command, "_module", ""):
-        command = get_command(import_module(lazy).app)
+    if lazy := getattr(command, "entry", None):
+        command = get_command(typer_of(lazy))
     below: Mapping[str, Any] = getattr(command, "commands", {})
     if not below:
         yield name, command
@@ -43,8 +43,8 @@ def _leaves(command: Any, name: tuple[str, ...]) -> Iterator[tuple[tuple[str, ..
 def _program() -> dict[tuple[str, ...], list[Any]]:
     """The parameters of every command, by its words."""
     found: dict[tuple[str, ...], list[Any]] = {}
-    for name, (module, *_) in COMMANDS.items():
-        found |= {words: command.params for words, command in _leaves(get_command(import_module(module).app), (name,))}
+    for name, entry in COMMANDS.items():
+        found |= {words: command.params for words, command in _leaves(get_command(typer_of(entry)), (name,))}
     return found
 
 

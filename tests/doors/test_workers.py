@@ -16,12 +16,13 @@ import pytest
 import wristctl
 from tests.doors.carrier import MARKING
 from tests.doors.conftest import ROOT
-from wristctl.bench import film, real_time_bench
+from wristctl.bench import frame_process as film
+from wristctl.bench import real_time_bench
 from wristctl.config.bench import BenchSettings
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.learning import processes
-from wristctl.work.serving import safe_path
+from wristctl.errors import UserError
+from wristctl.learning import training_processes
+from wristctl.processes import safe_path
 
 PROGRAM = """
 import os
@@ -83,10 +84,10 @@ class Begun:
 def test_trainings_and_the_emulated_bench_begin_safely_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
     begun = Begun()
-    monkeypatch.setattr(processes, "ProcessPoolExecutor", begun.pool)
+    monkeypatch.setattr(training_processes, "ProcessPoolExecutor", begun.pool)
     jobs: Any = [None, None]
     with pytest.raises(UserError, match="worker process died"):
-        processes.train_all(None, jobs, workers=2)  # type: ignore[arg-type]
+        training_processes.train_all(None, jobs, workers=2)  # type: ignore[arg-type]
     for module in (film, real_time_bench):
         monkeypatch.setattr(module, "multiprocessing", SimpleNamespace(get_context=begun.context))
     with pytest.raises(UserError, match="enough"):

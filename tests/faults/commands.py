@@ -126,8 +126,9 @@ def runs(work: Path) -> list[Run]:
 
 def warm() -> None:
     """Import what the commands import, so that a forked process begins at once."""
-    from wristctl.cli.app import COMMANDS as ALL
+    from wristctl.cli.app import typer_of
+    from wristctl.cli.commands import COMMANDS as ALL
 
     cv2.setNumThreads(1)
-    for module, *_ in ALL.values():
-        importlib.import_module(module)
+    for entry in ALL.values():
+        typer_of(entry)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from tests.faults.commands import LOST, runs
 from wristctl.board.board_errors import SAFETY_STOP
-from wristctl.records.leftovers import clear, clear_tags, leftovers, lost_tags
 from wristctl.records.manifest import SUMS
+from wristctl.records.removal import clear, clear_tags, leftovers, lost_tags
 from wristctl.records.tags import known_tags
 
 HANGS, KILLED = -1, -9

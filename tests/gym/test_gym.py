@@ -15,16 +15,16 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
 from wristctl.control.law import Controller, Gain
+from wristctl.errors import UserError
 from wristctl.gym import OBSERVED, SCALE, WristEnv, WristVectorEnv
 from wristctl.simulation.closed_loop import repeat, scenario_of, simulate
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.study_files.load import load_study
 
 ROOT = Path(__file__).parents[2]
 N = ("simulate.loop.plant_segments=1", "simulate.horizon=0.4", "simulate.reference.duration=0.2")

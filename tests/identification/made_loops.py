@@ -11,8 +11,7 @@ import numpy as np
 from wristctl.config.hysteresis import HysteresisSettings, KnownBeforehand
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.loop_problem import LoopProblem
-from wristctl.identification.measured_loop import MeasuredLoop
+from wristctl.identification.loop_problem import LoopProblem, MeasuredLoop
 from wristctl.simulation.spooled import SpooledWrist, spooled
 from wristctl.simulation.strokes import FrictionCase, strokes
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, START, TENDONS, UPRIGHT
-from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
+from wristctl.errors import UserError
 from wristctl.identification import identifiability
 from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linearise
 from wristctl.identification.forward import SupposedWrist

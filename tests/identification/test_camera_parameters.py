@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.identification.camera_parameters import camera_parameters
 from wristctl.identification.intervals import Knowledge
+from wristctl.identification.measured_trials import camera_parameters
 
 
 def logged(run: str, trial: int, start: float, frames: int = 120, rate: float = 60.0) -> pd.DataFrame:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import logged, problem
-from wristctl.config.errors import UserError
 from wristctl.config.plant import TendonFacts, TrueWrist
+from wristctl.errors import UserError
 from wristctl.identification.fit import fit
 from wristctl.identification.identifiability import FINER, budget, not_identified
 from wristctl.identification.intervals import interval, knowledge

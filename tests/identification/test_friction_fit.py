@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.identification.made_loops import SHORT, Measured, Recording, made_loop
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.identification.friction_fit import FrictionFit, fit_friction
 from wristctl.identification.loop_problem import LEAST_SHARE
 from wristctl.simulation.strokes import FrictionCase

@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, SLOW, START, TENDONS, UPRIGHT, logged, problem
-from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName
+from wristctl.errors import UserError
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.identifiability import additions, budget, not_identified, refuse
 from wristctl.identification.intervals import Knowledge, knowledge

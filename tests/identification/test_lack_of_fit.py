@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import logged, problem
-from wristctl.config.errors import UserError
 from wristctl.config.plant import TendonFacts, TrueWrist
+from wristctl.errors import UserError
 from wristctl.identification.fit import Fit, fit, frame_noise
 from wristctl.identification.intervals import Knowledge, interval, knowledge
 from wristctl.identification.lack_of_fit import (

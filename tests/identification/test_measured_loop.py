@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.measured_loop import MeasuredLoop, read_loop
+from wristctl.errors import UserError
+from wristctl.identification.loop_problem import MeasuredLoop, read_loop
 
 WRIST = WristParameters()
 TIME = np.linspace(0.0, 10.0, 201)

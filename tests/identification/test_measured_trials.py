@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.identification.measured_trials import MeasuredTrial, measured_trials
 
 GRID, STEP = 1e-3, 1e-5

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from tests.identification.benches import LEVEL, STEPS, TENDONS
-from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
+from wristctl.errors import UserError
 from wristctl.identification import rehearsal
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse

@@ -11,9 +11,8 @@ import pytest
 import wristctl.identification
 from tests.values import changeable
 from wristctl.config.identify import Fixed
-from wristctl.config.load import load_study
-from wristctl.identification.identified import identified_yaml, with_identified
-from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, tendons_of_values
+from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, identified_yaml, tendons_of_values, with_identified
+from wristctl.study_files.load import load_study
 
 LOGARITHMS = {name for name, each in UNKNOWNS.items() if each.log}
 

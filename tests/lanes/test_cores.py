@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wristctl.lanes.cores import cores
+from wristctl.processes import cores
 
 
 @pytest.mark.parametrize("said, given", [("1", 1), ("1,2", 1), ("100000", None), ("", None), ("many", None), ("0", 1)])

@@ -10,7 +10,7 @@ import pytest
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.lanes.stoppable_threads import stoppable
+from wristctl.processes import stoppable
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 

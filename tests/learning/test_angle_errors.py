@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.learning.angle_errors import angle_errors, error_map
 from wristctl.learning.domain import Domain
+from wristctl.learning.evaluation import angle_errors, error_map
 from wristctl.wrist.kinematics import exact_angle
 
 DOMAIN = Domain((-0.8, 0.8), (0.07, 0.09))

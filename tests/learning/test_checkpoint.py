@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from wristctl.config.errors import UserError
-from wristctl.learning.checkpoint import read_checkpoint, write_checkpoint
+from wristctl.errors import UserError
+from wristctl.learning.training import read_checkpoint, write_checkpoint
 
 
 def test_a_checkpoint_reads_back_and_only_for_its_own_training(tmp_path: Path) -> None:

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples, draw_samples, split_samples, unit_cube
 from wristctl.wrist.kinematics import arc_tip, exact_angle
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import ttest_rel
 
 from wristctl.config.learning import NetworkSettings
-from wristctl.learning.depths import Depth, compare_depths
 from wristctl.learning.ranking import trained_alike
-from wristctl.learning.selection import CrossValidated
+from wristctl.learning.selection import CrossValidated, Depth, compare_depths
 
 FOLDS = np.array([1.00, 1.01, 0.99, 1.02, 0.98])
 

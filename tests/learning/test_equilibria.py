@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, KEPT, Samples
-from wristctl.learning.equilibria import draw_equilibria
+from wristctl.errors import UserError
+from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, KEPT, Samples, draw_equilibria
 from wristctl.wrist.kinematics import chain_tip, exact_arc
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibria_at

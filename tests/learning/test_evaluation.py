@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from wristctl.config.learning import NetworkSettings
-from wristctl.learning.angle_errors import angle_errors, error_map
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, KEPT, Samples, Split
 from wristctl.learning.domain import Domain
-from wristctl.learning.evaluation import MEASURES, inverses, measures, places
+from wristctl.learning.evaluation import MEASURES, angle_errors, error_map, inverses, measures, places
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
 from wristctl.wrist.kinematics import arc_tip, exact_angle

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.learning.baseline import Polynomial
-from wristctl.learning.inference import CHUNK, compiled_exact, compiled_polynomial, microseconds
+from wristctl.learning.inference import CHUNK, Polynomial, compiled_exact, compiled_polynomial, microseconds
 from wristctl.wrist.kinematics import arc_tip, exact_angle
 
 TIPS = np.random.default_rng(2).uniform((0.05, -0.05), (0.09, 0.05), (300, 2))

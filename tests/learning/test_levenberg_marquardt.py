@@ -11,8 +11,8 @@ import torch
 from wristctl.config.learning import DataSettings, NetworkSettings, TrainSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.learning import levenberg_marquardt
-from wristctl.learning.angle_errors import error_map
 from wristctl.learning.dataset import draw_samples, split_samples
+from wristctl.learning.evaluation import error_map
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Job

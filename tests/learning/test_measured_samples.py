@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.measured_samples import RecordedCourse, courses_in, read_courses, samples_of_courses
 from wristctl.wrist.kinematics import arc_tip

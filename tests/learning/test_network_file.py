@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.network_file import load_network, save_network, training_record

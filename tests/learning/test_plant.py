@@ -3,11 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, KEPT, Samples, split_samples
-from wristctl.learning.equilibria import draw_equilibria
+from wristctl.errors import UserError
+from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, KEPT, Samples, draw_equilibria, split_samples
 from wristctl.wrist.kinematics import chain_tip, exact_angle
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibria_at, equilibrium

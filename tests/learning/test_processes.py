@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.learning import processes
+from wristctl.learning import training_processes
 from wristctl.learning.dataset import Samples
-from wristctl.learning.processes import train_all
+from wristctl.learning.training_processes import train_all
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
 
 
@@ -40,7 +40,7 @@ def told(
     monkeypatch: pytest.MonkeyPatch, trainings: Trainings, samples: Samples, count: int = 3, **more: Any
 ) -> tuple[list[int], list[int]]:
     """Trials that came back, and jobs that reported."""
-    monkeypatch.setattr(processes, "train_one", trainings)
+    monkeypatch.setattr(training_processes, "train_one", trainings)
     seen: list[int] = []
     found = train_all(samples, jobs(trainings.done, count), report=lambda job, epoch: seen.append(job), **more)
     return [each.job.trial for each in found], seen

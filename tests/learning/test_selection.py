@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import PRESETS, NetworkSettings, TrainSettings
+from wristctl.errors import UserError
 from wristctl.learning.dataset import split_samples
 from wristctl.learning.ranking import holm, mean_interval, rank
 from wristctl.learning.selection import CrossValidated, candidates, choose, fold_jobs, grid_points

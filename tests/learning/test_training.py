@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.learning import training
-from wristctl.learning.angle_errors import AngleErrors, angle_errors
 from wristctl.learning.dataset import Samples, Split, draw_samples, split_samples
-from wristctl.learning.processes import train_all
+from wristctl.learning.evaluation import AngleErrors, angle_errors
 from wristctl.learning.training import train_one
+from wristctl.learning.training_processes import train_all
 from wristctl.learning.training_result import Epoch, Job, TrainingResult, best_of
 
 SEED = np.random.SeedSequence(7)

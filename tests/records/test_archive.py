@@ -16,13 +16,12 @@ from typing import Any
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
-from wristctl.config.system_errors import fix_of, fix_to_read
+from wristctl.errors import UserError, fix_of, fix_to_read
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.archive import PACK, SCHEMA, pack, unpack
-from wristctl.records.leftovers import clear, leftovers
 from wristctl.records.lock import LOCK, delete_folder
+from wristctl.records.removal import clear, leftovers
 
 Make = Callable[..., Run]
 Entries = dict[str, bytes]

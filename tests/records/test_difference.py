@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.difference import Change, changes, difference
+from wristctl.records.find import entries
 from wristctl.records.lineage import Ancestor, ancestry, dependents, input_run
 from wristctl.records.manifest import Code
-from wristctl.records.query import entries
-from wristctl.records.remove import removable, remove
+from wristctl.records.removal import removable, remove
 from wristctl.records.replay import changed_inputs
 from wristctl.records.tags import change_tags, read_tags
+from wristctl.study_files.load import load_study
 
 
 def _run(results: Path, kind: str, study: Study, rmse: float = 1.0, inputs: dict[str, Run] | None = None) -> Run:

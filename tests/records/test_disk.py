@@ -13,10 +13,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import list_runs, start_run
-from wristctl.records.query import entries
+from wristctl.records.find import entries
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 from safetensors.numpy import save_file
 
-from wristctl.records.file_comparison import FileComparison, compare_files
 from wristctl.records.formats import write_arrays, write_table
+from wristctl.records.replay import FileComparison, compare_files
 
 Compare = Callable[[float, float], FileComparison]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, list_runs, open_run, require, start_run
 from wristctl.records.index import INDEX, indexed
 

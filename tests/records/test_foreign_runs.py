@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.plotting.page import page
 from wristctl.records import InputRun, Run, list_runs, open_run, start_run
 from wristctl.records.lineage import ancestry
 from wristctl.records.seal import write_seal
-from wristctl.report.page import page
 
 Make = Callable[..., Run]
 

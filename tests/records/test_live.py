@@ -16,8 +16,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, start_run, stream
 from wristctl.records.files import sha256_of_list, write_text
 from wristctl.records.journal import jsonable
@@ -64,9 +64,9 @@ def test_times_begin_with_the_run_and_memory_is_in_the_systems_own_unit(
 ) -> None:
     walls, processors = iter((10.0, 13.5)), iter((100.0, 101.25))
     clock = SimpleNamespace(perf_counter=lambda: next(walls), process_time=lambda: next(processors))
-    monkeypatch.setattr("wristctl.records.live.time", clock)
+    monkeypatch.setattr("wristctl.records.run_writer.time", clock)
     monkeypatch.setattr(resource, "getrusage", lambda _: SimpleNamespace(ru_maxrss=3 * 2**20))
-    monkeypatch.setattr("wristctl.records.live.sys", SimpleNamespace(platform=platform))
+    monkeypatch.setattr("wristctl.records.run_writer.sys", SimpleNamespace(platform=platform))
     with start_run("tune", Study(), "", results) as live:
         pass
     timing = Run(live.path).manifest.timing

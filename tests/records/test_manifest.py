@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError
-from wristctl.config.resolved import config_hash
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.files import files_below, sha256_of_list
 from wristctl.records.manifest import Code, command_of
-from wristctl.records.readme import readme
+from wristctl.records.run_writer import readme
 from wristctl.records.tags import change_tags
+from wristctl.study_files.resolved import config_hash
 
 Make = Callable[..., Run]
 

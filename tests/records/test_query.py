@@ -16,11 +16,11 @@ from typing import Any
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, open_run, start_run
+from wristctl.records.find import entries, in_order, select
 from wristctl.records.index import INDEX, IndexEntry
-from wristctl.records.query import entries, in_order, select
 from wristctl.records.tags import change_tags
 
 Make = Callable[..., Run]

@@ -18,10 +18,10 @@ import pandas as pd
 import pytest
 
 import wristctl
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run, stream
+from wristctl.study_files.load import load_study
 
 Make = Callable[..., Run]
 
@@ -178,7 +178,7 @@ def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "all"]):
         subprocess.run([*git, *command], check=True, capture_output=True)
     ask = (
-        "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.records.code import code_state; "
+        "import sys; sys.path.insert(0, sys.argv[1]); from wristctl.records.provenance import code_state; "
         "code, patch, _ = code_state(); print(code.commit, code.dirty, code.tree_sha256); "
         "sys.stdout.write(patch.decode())"
     )

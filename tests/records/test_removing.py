@@ -11,13 +11,12 @@ from threading import Thread
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, open_run, start, start_run
-from wristctl.records.leftovers import Leftover, clear, leftovers, lost_repetitions, lost_tags
+from wristctl.records.find import entries
 from wristctl.records.lock import LOCK, RunLock, delete_folder
-from wristctl.records.query import entries
-from wristctl.records.remove import foreign, removable, remove
+from wristctl.records.removal import Leftover, clear, foreign, leftovers, lost_repetitions, lost_tags, removable, remove
 from wristctl.records.tags import change_tags, read_tags
 
 Make = Callable[..., Run]
@@ -185,6 +184,6 @@ def test_gc_takes_nothing_from_who_is_writing_tags_and_passes_over_what_is_gone_
         assert change_tags(results, run.id, add=["x"]) == ["x"]
     clearing[0].join()
     assert [each.path.name for each in found] == [".tags.json.part"] and read_tags(results) == {run.id: ["x"]}
-    monkeypatch.setattr("wristctl.records.leftovers._size", lambda path: path.with_name("gone").stat().st_size)
+    monkeypatch.setattr("wristctl.records.removal._size", lambda path: path.with_name("gone").stat().st_size)
     (results / ".old.removed").mkdir()
     assert list(leftovers(results)) == []

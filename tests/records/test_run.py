@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, formats, start_run
-from wristctl.records.code import code_state
 from wristctl.records.formats import read_arrays, write_arrays, write_figure, write_table
+from wristctl.records.provenance import code_state
 
 Make = Callable[..., Run]
 
@@ -101,7 +101,7 @@ def test_a_package_that_a_repository_holds_but_does_not_track_has_no_commit(
     package = tmp_path / "package"
     package.mkdir()
     (package / "__init__.py").touch()
-    monkeypatch.setattr("wristctl.records.code._PACKAGE", package)
+    monkeypatch.setattr("wristctl.records.provenance._PACKAGE", package)
     subprocess.run([*git, "init", "-q", "-b", "trunk"], check=True)
     assert code_state()[0].commit is None, "no commit yet"
     subprocess.run([*git, "commit", "-q", "--allow-empty", "-m", "none of it"], check=True)

@@ -19,11 +19,10 @@ import pytest
 from wristctl.cli.app import main
 from wristctl.config.study import Study
 from wristctl.records import Run, list_runs, open_run, start_run
+from wristctl.records.find import entries
 from wristctl.records.index import INDEX
-from wristctl.records.leftovers import leftovers
 from wristctl.records.lock import LOCK, is_locked
-from wristctl.records.query import entries
-from wristctl.records.remove import remove
+from wristctl.records.removal import leftovers, remove
 from wristctl.records.tags import change_tags, read_tags
 
 Make = Callable[..., Run]

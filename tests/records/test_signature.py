@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from wristctl.cli.app import main
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.records.manifest import SIGNATURE
 from wristctl.records.seal import write_seal

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, list_runs, start_run
 
 Start = Callable[[str, Path], subprocess.Popen[str]]

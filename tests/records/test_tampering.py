@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run, list_runs, require, start_run
 from wristctl.records.files import sha256_of
 from wristctl.records.seal import write_seal

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, open_run, require, start_run
+from wristctl.records.find import entries
 from wristctl.records.lineage import ancestry
-from wristctl.records.query import entries
 from wristctl.records.replay import changed_inputs
 from wristctl.records.seal import write_seal
 

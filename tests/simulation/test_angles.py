@@ -9,10 +9,10 @@ import pytest
 
 from wristctl.arrays import Array
 from wristctl.config.choices import REFERENCES
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.motion import Angles
 from wristctl.simulation.reference import ReferenceKind, motion
 from wristctl.simulation.rollout import rollout

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.studies.conftest import course
+from tests.commands.conftest import course
 from wristctl.api import load_study
 from wristctl.simulation.arrival import SHORT, arrives, missing, why_not
 from wristctl.simulation.closed_loop import simulate

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.study_files.load import load_study
 from wristctl.wrist.statics import equilibrium
 
 LEANING = "wrist={gravity: [-9.0, 3.0]}"

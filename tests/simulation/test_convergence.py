@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from wristctl.api import simulate as simulated
-from wristctl.comparison.box import drawn_settings
-from wristctl.config.load import load_study
+from wristctl.comparison.unknowns_sampling import drawn_settings
 from wristctl.config.loop import LOOPS, Loop, Reference
-from wristctl.config.unstated import PaperSetting
+from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.convergence import agree, in_doubt, tolerance
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
+from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.search import tuning_cases
 

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from wristctl.config.errors import UserError
 from wristctl.config.families import Family, drawn_value
-from wristctl.config.load import load_study
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.simulation.drawn_worlds import drawn_cases, streams_of, world_of
 from wristctl.simulation.worlds import World
+from wristctl.study_files.load import load_study
 
 WRIST = WristParameters()
 SCENARIOS = Path(__file__).parents[2] / "experiments" / "scenarios"

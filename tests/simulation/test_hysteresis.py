@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, friction_cases, loops, main_case
 from wristctl.simulation.strokes import Strokes, strokes
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from tests.values import LAST_MOVES, multi_step, one_move
-from wristctl.config.load import load_study
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import METRICS, metrics_of, of_trajectory, summed
 from wristctl.simulation.reference import motion
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.study_files.load import load_study
 
 PERIOD, HORIZON = 1e-4, 5.0
 TIME = np.arange(float(round(HORIZON / PERIOD))) * PERIOD

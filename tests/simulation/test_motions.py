@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from wristctl.config.choices import REFERENCES
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import jumps, motion, reference_name, toward
 from wristctl.simulation.tracked_range import range_untracked

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.simulation.spools import HOME, STIFF, WRIST, antagonists, minimum_jerk, spooled
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueWrist
 from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout

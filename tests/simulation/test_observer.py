@@ -9,8 +9,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
-from wristctl.config.control import SimulateSettings
-from wristctl.config.load import load_study
+from wristctl.config.controllers import SimulateSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
 from wristctl.config.study import Study
@@ -23,6 +22,7 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.stationary_filter import Belief, expected_error, stationary_gains
 from wristctl.simulation.worlds import plant_of
+from wristctl.study_files.load import load_study
 from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import segments
 

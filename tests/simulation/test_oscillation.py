@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
@@ -28,6 +27,7 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.trajectory import Trajectory
+from wristctl.study_files.load import load_study
 
 TIME = np.linspace(0.0, 4.999, 5000)
 SOFT = ("simulate.controller=smc-tracking", "simulate.gains=camera", "simulate.loop.sensor.level=camera",

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.learning.domain import Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.simulation.closed_loop import scenario_of

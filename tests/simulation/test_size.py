@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.commands.audit.command import AUDIT
+from wristctl.commands.compare.command import COMPARE
+from wristctl.commands.perform import prepare
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.simulate.command import SIMULATE
+from wristctl.commands.study.command import FAIR_STUDY
+from wristctl.commands.tune.command import TUNE
 from wristctl.config.loop import LOOPS, Loop
+from wristctl.errors import UserError
 from wristctl.simulation.size import MOST_BYTES, MOST_IN_ALL, Size, check_size
-from wristctl.studies.audit import AUDIT
-from wristctl.studies.compare import COMPARE
-from wristctl.studies.fair_study import FAIR_STUDY
-from wristctl.studies.perform import prepare
-from wristctl.studies.procedure import Procedure
-from wristctl.studies.simulate import SIMULATE
-from wristctl.studies.tune import TUNE
+from wristctl.study_files.load import load_study
 
 TABLE: dict[str, Procedure[Any]] = {"simulate": SIMULATE, "compare": COMPARE, "tune": TUNE, "audit": AUDIT}
 NOWHERE = Path("nowhere")

@@ -10,20 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.commands.truth_table import truth_heading, truth_tables, truth_told
 from wristctl.config.choices import PLANTS
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSensor
-from wristctl.config.resolved import config_hash, resolved_yaml
-from wristctl.config.truth import actual
+from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSensor, actual
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import now_of
 from wristctl.control.response import Controlled, respond
 from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.report.truth_table import truth_heading, truth_tables, truth_told
 from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
@@ -32,6 +29,8 @@ from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import _advance, columns_of
 from wristctl.simulation.worlds import World, facing, mismatches, plant_of
+from wristctl.study_files.load import load_study
+from wristctl.study_files.resolved import config_hash, resolved_yaml
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.statics import equilibrium

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from wristctl.comparison.combinations import ComparedRow, compare
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.cases import measure
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import drawn
+from wristctl.study_files.load import load_study
 from wristctl.tuning.search import tuning_cases
 
 WRIST = WristParameters()

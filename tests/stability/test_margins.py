@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from tests.stability.conftest import closed, linear, periodic
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
-from wristctl.stability.encirclements import PoleCount
-from wristctl.stability.margins import NEUTRAL, frequencies, margins
+from wristctl.stability.margins import NEUTRAL, PoleCount, frequencies, margins
 from wristctl.stability.sampled_loop import SampledLoop
 
 S, PERIOD = control.tf("s"), 0.01

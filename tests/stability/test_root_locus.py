@@ -9,8 +9,8 @@ import pytest
 
 from tests.stability.conftest import PID, closed, row
 from wristctl.config.loop import Loop
+from wristctl.stability.loop_analysis import root_locus
 from wristctl.stability.margins import margins
-from wristctl.stability.root_locus import root_locus
 from wristctl.stability.sampled_loop import SampledLoop
 
 THETA = math.radians(10.0)

@@ -10,8 +10,8 @@ import pytest
 
 from tests.stability.conftest import closed, linear
 from wristctl.config.loop import Loop
+from wristctl.stability.loop_analysis import step_info, step_response
 from wristctl.stability.sampled_loop import LinearTick, SampledLoop
-from wristctl.stability.step_response import step_info, step_response
 
 S, PERIOD = control.tf("s"), 1e-3
 

@@ -18,9 +18,9 @@ from tests.trial.fault_cases import AT, Case, Phase
 from tests.trial.fault_judging import Course, Judged, judge
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
-from wristctl.config.errors import UserError
+from wristctl.config.bench import InjectedFault
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.injected import InjectedFault
+from wristctl.errors import UserError
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.homing import Zero

@@ -12,7 +12,7 @@ import pytest
 
 from tests.trial.rig import RigBoard
 from wristctl.board.board_errors import BoardError
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.homing import Zero
 

@@ -20,7 +20,7 @@ from wristctl.trial.log import TrialLog
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.steering import Steering
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.trial_motions import at_rest, back
+from wristctl.trial.trials import at_rest, back
 from wristctl.vision.marker import SightingVerdict
 
 PERIOD = 5e-3

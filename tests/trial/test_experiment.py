@@ -12,7 +12,7 @@ import pytest
 from tests.trial.conftest import Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.trial.homing import check_zero, slacken
 from wristctl.trial.log import LOG
 

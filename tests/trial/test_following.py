@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from tests.trial.conftest import WRIST, settings_of
-from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.following import Following
-from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side
+from wristctl.trial.tracking_monitor import BlindModel, Evidence, Following, likely_causes, reversals
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import away_of
 

@@ -11,8 +11,7 @@ from tests.trial.rig import RigBoard
 from wristctl.board.board_errors import BoardError
 from wristctl.board.messages import Command, Configure, Flag, Limits, State
 from wristctl.config.plant import Actuator
-from wristctl.trial.halt import halt
-from wristctl.trial.prepare import prepare
+from wristctl.trial.motors_ready import halt, prepare
 from wristctl.trial.spools import spools_of
 
 

@@ -11,7 +11,7 @@ from tests.trial.conftest import WRIST, settings_of
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.trial.homing import Zero, find_zero
-from wristctl.trial.prepare import prepare
+from wristctl.trial.motors_ready import prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.simulation.minimum_jerk import minimum_jerk
-from wristctl.trial.marker_lag import MarkerLag
+from wristctl.trial.warnings_report import MarkerLag
 
 RATE, NOISE = 60.0, 1e-3
 """Frames a second; standard deviation of an angle [rad]."""

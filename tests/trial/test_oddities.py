@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.trial.following import Greatest
-from wristctl.trial.oddities import Oddities
+from wristctl.trial.tracking_monitor import Greatest
+from wristctl.trial.warnings_report import Oddities
 
 SETTINGS = HwRunSettings()
 LIMITS, PERIOD = SETTINGS.safety, SETTINGS.control_period

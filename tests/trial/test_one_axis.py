@@ -9,7 +9,7 @@ import pytest
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.one_axis import axis_tried
+from wristctl.trial.rig_strokes import axis_tried
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View

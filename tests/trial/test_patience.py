@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.trial.rig import Marker, RigBoard
-from wristctl.trial.patience import Patience
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.supervised_wait import Patience
 
 
 def test_waiting_keeps_the_boards_link_alive() -> None:

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.board.driver import Board
-from wristctl.board.emulator.virtual import VirtualTransport
+from wristctl.board.emulator.atmega2560 import VirtualTransport
 from wristctl.board.messages import Configure, Flag, Limits, Target
-from wristctl.trial.ramped_move import RampedMove
+from wristctl.trial.rig_strokes import RampedMove
 
 ACCELERATION = 50_000.0
 

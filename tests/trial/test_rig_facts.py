@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from tests.trial.test_camera_pace import pace
-from wristctl.board.check import RoundTrips
-from wristctl.board.usb_adapter import latency_timer, shorter
+from wristctl.board.check import RoundTrips, latency_timer, shorter
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.rig_facts import RigFacts, troubles
-from wristctl.trial.step_latency import Latency
+from wristctl.trial.rig_strokes import Latency
+from wristctl.vision.detector import PictureQuality
 from wristctl.vision.marker import SightingVerdict
-from wristctl.vision.picture_quality import PictureQuality
 
 SETTINGS = HwRunSettings()
 SOUND = RigFacts(

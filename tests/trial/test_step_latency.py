@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from wristctl.trial.step_latency import MotorStroke, find_latency
+from wristctl.trial.rig_strokes import MotorStroke, find_latency
 
 GAIN, STEP_RATE, HIGH, NOISE = 1.0e-3, 1000.0, 70.0, 5e-4
 

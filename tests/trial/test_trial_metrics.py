@@ -12,14 +12,11 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from tests.values import LAST_MOVES, multi_step
 from wristctl.arrays import Array
-from wristctl.config.load import load_study
 from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Push
 from wristctl.simulation.motion import Angles, Motion
-from wristctl.trial.trial_metrics import JUDGED, evaluated
-from wristctl.trial.trial_motions import motion_of
-from wristctl.trial.trials import Trial
-from wristctl.trial.twin import twin
+from wristctl.study_files.load import load_study
+from wristctl.trial.trials import JUDGED, Trial, evaluated, motion_of, twin
 from wristctl.wrist.directions import DIRECTIONS
 
 PERIOD, HORIZON = 5e-3, 3.0

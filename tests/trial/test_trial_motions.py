@@ -8,10 +8,10 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.arrays import Array
 from wristctl.config.choices import REFERENCES
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
+from wristctl.errors import UserError
 from wristctl.simulation.reference import ReferenceKind
-from wristctl.trial.trial_motions import at_rest, back, motion_of
+from wristctl.trial.trials import at_rest, back, motion_of
 
 PERIOD = 5e-3
 

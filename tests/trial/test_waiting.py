@@ -15,10 +15,10 @@ from wristctl.board.board_errors import Faulted, PortLost, Restarted
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.framing import encode
 from wristctl.board.messages import ESTOP_SEQ, Command
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.trial import testbeds
-from wristctl.trial.patience import Meanwhile
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.supervised_wait import Meanwhile
 from wristctl.trial.testbeds import BEFORE_MOTION, EmulatedTestbed, RealTestbed
 from wristctl.trial.tracking import InlineTracking
 from wristctl.vision.marker import Sighting

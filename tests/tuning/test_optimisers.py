@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
-from wristctl.config.control import TuneSettings
-from wristctl.config.errors import UserError
+from wristctl.config.controllers import TuneSettings
+from wristctl.errors import UserError
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.tuning.optimisers.pso import ParticleSwarm
 

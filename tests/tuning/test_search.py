@@ -13,13 +13,12 @@ import wristctl
 import wristctl.tuning
 from tests.values import changeable
 from wristctl.arrays import Array
-from wristctl.config.control import Objective
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.config.controllers import Objective
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.control.table import CONTROLLERS, controller
+from wristctl.control.table import CONTROLLERS, controller, read_gains, write_gains
+from wristctl.errors import UserError
 from wristctl.seeds import stream
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.closed_loop import repeat, scenario_of
@@ -27,18 +26,20 @@ from wristctl.simulation.draws import Draws
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import FASTEST, LIMIT_CYCLE
 from wristctl.simulation.reference import motion
-from wristctl.tuning.gains_file import read_gains, write_gains
+from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge, marks_of
 from wristctl.tuning.search import (
+    GainSpace,
     Search,
     Tried,
     check_loops,
     check_tunable,
+    finalists,
+    history,
     search,
+    tried_of,
     tuning_cases,
 )
-from wristctl.tuning.search_tables import finalists, history, tried_of
-from wristctl.tuning.space import GainSpace
 
 SETTINGS = (
     "loops={one: {plant_segments: 1}}", "horizon=1.2", "candidates=8", "iterations=5",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
 from wristctl.control.law import Gain
-from wristctl.tuning.space import GainSpace
+from wristctl.errors import UserError
+from wristctl.tuning.search import GainSpace
 
 SPACE = GainSpace.of({"P1": Gain("1/rad", "", 1e-1, 1e5), "P2": Gain("s/rad", "", 1e-3, 1e3)})
 

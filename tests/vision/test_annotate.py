@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wristctl.vision.annotate import AnnotatedVideo, Picked, annotate
 from wristctl.vision.camera import Frame, VideoCamera
 from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.vision.recordings import AnnotatedVideo, Picked, annotate
 
 GREY = 100
 BASE, TIP = ([[x, y], [x + 80.0, y], [x + 80.0, y + 80.0], [x, y + 80.0]] for x, y in ((100.0, 300.0), (400.0, 150.0)))

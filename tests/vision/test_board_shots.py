@@ -10,10 +10,10 @@ import pytest
 
 from wristctl.arrays import Array
 from wristctl.config.vision import CharucoBoard, SceneSettings
-from wristctl.vision.board_shots import board_shots
 from wristctl.vision.camera import Frame
 from wristctl.vision.charuco import BoardFinder, BoardView
-from wristctl.vision.pinhole import Pinhole
+from wristctl.vision.scene import board_shots
+from wristctl.vision.view import Pinhole
 
 BOARD = CharucoBoard(columns=6, rows=8, square=0.02, marker=0.015)
 PLAIN = SceneSettings(noise=0.0, gradient=0.0, blur=0.0, distortion=0.0, tilt_deg=10.0, pan_deg=-4.0)

@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 
 from tests.vision.conftest import bent
-from wristctl.config.errors import UserError
 from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard, Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.vision.board_shots import board_shots
+from wristctl.errors import UserError
 from wristctl.vision.camera import Frame
 from wristctl.vision.charuco import Album, BoardFinder, CameraCalibration, calibrate, least_seen, plane_tilt
 from wristctl.vision.marker import SightingVerdict, Tracker
-from wristctl.vision.pinhole import Pinhole
-from wristctl.vision.scene import Scene
-from wristctl.vision.view import FILE, View
+from wristctl.vision.scene import Scene, board_shots
+from wristctl.vision.view import FILE, Pinhole, View
 
 SCENE = SceneSettings(tilt_deg=10.0, pan_deg=-4.0)
 SETTINGS = CalibrateCameraSettings(scene=SCENE, views=10)

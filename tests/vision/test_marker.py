@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.vision.conftest import FRAME_RATE, Array, bent, frames
-from wristctl.config.errors import UserError
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import askew, edges, square_angle
 from wristctl.vision.marker import MEANING, Sighting, SightingVerdict, Tracker

@@ -10,9 +10,8 @@ from scipy.special import ndtr
 from tests.vision.conftest import Array, frames
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.vision.detector import square_angle
+from wristctl.vision.detector import outlined, square_angle
 from wristctl.vision.marker import Tracker
-from wristctl.vision.outline import outlined
 from wristctl.vision.scene import Scene
 
 SIZE, CELLS = 80, 6

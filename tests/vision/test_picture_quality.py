@@ -8,8 +8,8 @@ import pytest
 from wristctl.config.vision import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
+from wristctl.vision.detector import PictureQuality, quality_of
 from wristctl.vision.marker import Tracker
-from wristctl.vision.picture_quality import PictureQuality, quality_of
 from wristctl.vision.scene import Scene
 from wristctl.vision.view import View
 

@@ -11,7 +11,7 @@ import pytest
 
 from wristctl.arrays import Array
 from wristctl.config.vision import SceneSettings
-from wristctl.vision.pinhole import Pinhole
+from wristctl.vision.view import Pinhole
 
 Side = Literal["right", "left"]
 SIDES: tuple[Side, ...] = ("right", "left")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wristctl.vision.marker import Sighting, SightingVerdict
-from wristctl.vision.recording_quality import angle_noise, base_askew
+from wristctl.vision.recordings import angle_noise, base_askew
 from wristctl.vision.view import View
 
 SQUARE = 22.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) + 200.0

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.vision.view import SCHEMA, View
 
 LENS = np.array([[500.0, 0.0, 310.0], [0.0, 520.0, 250.0], [0.0, 0.0, 1.0]])

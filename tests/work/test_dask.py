@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from tests.work.walks import at, contents, golden, walks
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
 from wristctl.work.worker import Golden

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from tests.work.walks import at, contents, golden, tries, walks
-from wristctl.config.errors import UserError
-from wristctl.work import unit as units_of_work
+from wristctl.errors import UserError
+from wristctl.work import worker as units_of_work
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
-from wristctl.work.unit import Unit, file_of, read_unit, same_arrays, write_unit
-from wristctl.work.worker import Computed, Furnish, Golden
+from wristctl.work.worker import Computed, Furnish, Golden, Unit, file_of, read_unit, same_arrays, write_unit
 
 
 def same(one: UnitsDone, other: UnitsDone) -> bool:

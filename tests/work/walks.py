@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wristctl.work.unit import Unit
-from wristctl.work.worker import Golden
+from wristctl.work.worker import Golden, Unit
 
 
 def walks(count: int = 6, takes: float = 0.0) -> list[Unit]:

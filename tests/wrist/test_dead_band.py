@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.simulation.spools import WRIST, rest_angle
-from wristctl.config.errors import UserError
 from wristctl.config.plant import Actuator
+from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dead_band import FROM_ABOVE, FROM_BELOW, UNBENT, HeldTendons, at_rest_with
 from wristctl.wrist.segments import segments

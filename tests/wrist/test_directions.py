@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wristctl.comparison.combinations import compare
-from wristctl.config.load import load_study
 from wristctl.config.wrist import WristParameters
+from wristctl.study_files.load import load_study
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of
 
 SETTINGS = (

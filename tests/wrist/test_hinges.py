@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of, square_like

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import equilibrium, least_stiffness

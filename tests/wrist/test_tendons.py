@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach, torque_of

@@ -1,7 +1,5 @@
 """The wrist that hangs on the emulated board, and what it has done."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal, NamedTuple
 
@@ -9,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.bench.fault_injection import Faults
-from wristctl.bench.motor_faults import MotorFaults
+from wristctl.bench.faults import Faults, MotorFaults
 from wristctl.bench.motors import CYCLES, PERIOD, Hanging, follow, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES

@@ -6,8 +6,6 @@ pulls no harder, and nothing reels that in again. Energised anew, the rotor fall
 fits the drive's count: up to two full steps away, so that positions are lost with the release.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

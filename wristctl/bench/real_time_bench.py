@@ -1,7 +1,5 @@
 """The emulated bench in real time, started in a process of its own and used like the one in virtual time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import shutil
 import signal
@@ -14,18 +12,17 @@ from types import TracebackType
 from typing import Any, Self
 
 from wristctl.bench.bench_wrist import MotorMotion, Truth
-from wristctl.bench.film import start_film
-from wristctl.bench.frame_memory import SharedCamera
+from wristctl.bench.frame_process import SharedCamera, start_film
 from wristctl.board.board_errors import BoardError
 from wristctl.board.messages import BAUD
 from wristctl.board.transport import SerialTransport
 from wristctl.config.bench import BenchSettings
-from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.processes import safe_path
 from wristctl.seeds import Entropy
-from wristctl.work.serving import safe_path
 
 _END = 5.0
 

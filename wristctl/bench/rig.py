@@ -1,14 +1,15 @@
 """What stands on the emulated bench, in virtual as in real time: board, wrist, camera, and what goes wrong."""
 
-from __future__ import annotations
-
+import logging
+import os
+import select
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.bench.bench_wrist import BenchWrist
-from wristctl.bench.fault_injection import Faults
+from wristctl.bench.faults import Faults
 from wristctl.bench.shutter import Shutter
 from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.config.bench import BenchSettings
@@ -17,6 +18,7 @@ from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
 from wristctl.vision.scene import Scene
+from wristctl.wrist.directions import DIRECTIONS
 
 
 class Rig:
@@ -69,3 +71,42 @@ class Rig:
         if noise is not None:
             self.shutter.begin(start, noise)
         self.faults.begin(start)
+
+
+log = logging.getLogger(__name__)
+
+_BUTTON = "G", 0
+_ACTS = f"press, release, or one of {', '.join(DIRECTIONS)}"
+
+
+class Bystander:
+    """Does what comes as lines from a file descriptor; never waits for one."""
+
+    def __init__(self, rig: Rig, typed: int) -> None:
+        self._rig, self._typed = rig, typed
+        self._line = b""
+        self._there = True
+
+    def look(self) -> None:
+        """Do what has been typed since the last look."""
+        while self._there and self._may_read() and select.select([self._typed], [], [], 0.0)[0]:
+            read = os.read(self._typed, 256)
+            self._there = bool(read)
+            *lines, self._line = (self._line + read).split(b"\n")
+            for line in lines:
+                self.do(line.decode(errors="replace").strip())
+
+    def do(self, act: str) -> None:
+        """Press or release the button, or turn the wrist to bend toward a direction."""
+        if act in ("press", "release"):
+            self._rig.chip.drive(*_BUTTON, act == "press")  # an open contact stops
+        elif act in DIRECTIONS:
+            self._rig.face(act)
+        else:
+            log.warning("nobody knows how to %r: %s", act, _ACTS)
+            return
+        log.info("done: %s", act)
+
+    def _may_read(self) -> bool:
+        """In the background a terminal is somebody else's: reading it would stop this process."""
+        return not os.isatty(self._typed) or os.tcgetpgrp(self._typed) == os.getpgrp()

@@ -1,10 +1,11 @@
 """The emulated bench in real time: the board on a line, its pictures in a file, for any client."""
 
-from __future__ import annotations
-
+import json
 import logging
 import math
+import os
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -13,17 +14,117 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.bench.bench_record import BenchRecord
-from wristctl.bench.bench_wrist import MotorMotion, Truth
-from wristctl.bench.bystander import Bystander
-from wristctl.bench.line import FaultyLine
+from wristctl.bench.bench_wrist import BenchWrist, MotorMotion, Truth
+from wristctl.bench.faults import Faults
 from wristctl.bench.motors import PERIOD
-from wristctl.bench.rig import Rig
+from wristctl.bench.rig import Bystander, Rig
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, serve
-from wristctl.config.errors import UserError
 from wristctl.config.plant import Disturbances
+from wristctl.errors import UserError
 from wristctl.seeds import Entropy
+
+_AT_ONCE = 1e-3
+"""A latency timer [s] that is no longer than this is that of USB itself: nothing is held back."""
+
+
+class FaultyLine:
+    """Another line with faults: port-lost, for good, and host-silent; `clock` is the board's.
+
+    What the board says is handed over every `latency_timer` seconds of it, by `pass_on`.
+    """
+
+    def __init__(self, line: Line, faults: Faults, clock: Callable[[], float], latency_timer: float = 0.0) -> None:
+        self.address = line.address
+        self.there = False
+        """Whether a client is there."""
+        self.heard: float | None = None
+        """When the board was last sent something [s on its clock]; None: never."""
+        self._line, self._faults, self._clock = line, faults, clock
+        self._lost = False
+        self._latency_timer, self._held, self._due = latency_timer, b"", 0.0
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
+        if not self._lost and self._faults.on("port-lost", self._clock()):
+            self.close()
+        if self._lost:
+            time.sleep(timeout)  # the board still has its power: it is not to be reset
+        else:
+            self.there = self._line.wait(timeout)
+        return self.there
+
+    def receive(self) -> bytes:
+        """What clients have sent, as far as the board hears it."""
+        received = b"" if self._lost else self._line.receive()
+        if not received or self._faults.on("host-silent", self._clock()):
+            return b""
+        self.heard = self._clock()
+        return received
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to every client, once their time has come."""
+        if not self._held:
+            timer = self._latency_timer
+            self._due = (self._clock() // timer + 1) * timer if timer > _AT_ONCE else 0.0
+        self._held += data
+        self.pass_on()
+
+    def pass_on(self) -> None:
+        """Hand over what is held, if it is time."""
+        if self._held and not self._lost and self._clock() >= self._due:
+            self._line.send(self._held)
+            self._held = b""
+
+    def close(self) -> None:
+        """Send the clients away."""
+        if not self._lost:
+            self._lost = True
+            self._line.close()
+
+
+SCHEMA = "wristctl.bench/1"
+_LEAST_INTERVAL = 0.05
+
+
+class BenchRecord:
+    """A JSON file, written anew when motors have moved or been switched, at most 20 times a second.
+
+    Times are of `time.monotonic`; lists are by axis.
+    """
+
+    def __init__(self, path: Path, wrist: BenchWrist, line: FaultyLine) -> None:
+        self._path, self._wrist, self._line = path, wrist, line
+        self._written, self._last = -math.inf, wrist.motion
+
+    def look(self, start: float) -> None:
+        """Write if there is something new; the board's clock was 0 at `start`."""
+        if time.monotonic() - self._written >= _LEAST_INTERVAL and self._wrist.motion != self._last:
+            self.write(start, ended=False)
+
+    def write(self, start: float, ended: bool) -> None:
+        """Write, in one piece."""
+        self._last, self._written = self._wrist.motion, time.monotonic()
+        newest = self._wrist.truth(self._wrist.time - PERIOD)
+        said = {
+            "schema": SCHEMA,
+            "ended": ended,
+            "time": self._written,
+            "last_heard": _moved(self._line.heard, start),
+            "last_step": [_moved(at, start) for at in self._last.last_step],
+            "steps": self._last.steps,
+            "energised": self._last.energised,
+            "theta": float(newest.angle[-1]),
+            "pull": newest.pull.sum(axis=0).tolist(),
+        }
+        part = self._path.with_name(f".{self._path.name}.part")
+        part.write_text(json.dumps(said, indent=2) + "\n")
+        os.replace(part, self._path)
+
+
+def _moved(time: float | None, start: float) -> float | None:
+    return None if time is None else start + time
+
 
 log = logging.getLogger(__name__)
 

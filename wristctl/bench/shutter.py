@@ -1,17 +1,98 @@
 """The shutter of the bench's camera: which frames it takes, what they show, and when they arrive."""
 
-from __future__ import annotations
-
 import math
+from typing import NamedTuple, Protocol
 
+import cv2
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.bench.bench_wrist import BenchWrist
-from wristctl.bench.exposure import Exposure
-from wristctl.bench.fault_injection import Faults
-from wristctl.bench.picture_faults import PICTURE_FAULTS
-from wristctl.config.bench import RenderedCamera
+from wristctl.bench.faults import Faults
+from wristctl.config.bench import FaultKind, RenderedCamera
 from wristctl.seeds import Entropy
+from wristctl.vision.camera import Frame, Image
+from wristctl.vision.detector import print_of
+
+PICTURE_FAULTS: tuple[FaultKind, ...] = (
+    "camera-frozen-clock", "picture-dark", "picture-bright", "picture-blurred", "picture-smeared", "picture-mirrored",
+    "picture-turned", "picture-shifted", "picture-other", "marker-twice",
+)  # fmt: skip
+_HAZE, _SIDE, _CORNER = 60.0, 64, 20
+
+
+def spoiled(image: Image, kind: FaultKind, size: float, number: int, rng: np.random.Generator) -> Image:
+    """The picture (height, width) of frame `number` under a fault of this kind."""
+    height, width = image.shape
+    if kind in ("picture-dark", "picture-bright"):
+        haze = _HAZE if kind == "picture-bright" and size > 2.0 else 0.0
+        lit: Image = np.clip(size * image.astype(np.float32) + haze, 0, 255).astype(np.uint8)
+        return lit
+    if kind == "picture-blurred":
+        return cv2.GaussianBlur(image, (0, 0), size).astype(np.uint8, copy=False)
+    if kind == "picture-smeared":
+        return cv2.blur(image, (round(size), 1)).astype(np.uint8, copy=False)
+    if kind == "picture-mirrored":
+        return cv2.flip(image, 1).astype(np.uint8, copy=False)
+    if kind == "picture-turned":
+        turn = cv2.getRotationMatrix2D((0.5 * width, 0.5 * height), size, 1.0)
+        return cv2.warpAffine(image, turn, (width, height), borderMode=cv2.BORDER_REPLICATE).astype(np.uint8)
+    if kind == "picture-shifted":
+        rolled: Image = np.roll(image, round(size), axis=1)
+        return rolled
+    if kind == "picture-other":
+        return rng.integers(0, 255, image.shape, np.uint8)
+    image = image.copy()
+    if kind == "marker-twice":
+        part = cv2.resize(print_of(round(size)), (_SIDE, _SIDE), interpolation=cv2.INTER_NEAREST)
+        image[_CORNER : _CORNER + _SIDE, _CORNER : _CORNER + _SIDE] = part
+    else:
+        image[0, 0] = number % 256
+    return image
+
+
+class Painter(Protocol):
+    """What draws the wrist: `vision.scene.Scene`."""
+
+    def render(
+        self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
+        across: float = 0.0, turned: float = 0.0,
+    ) -> Image:  # fmt: skip
+        """The picture of segment angles (k, n) at k instants of the exposure."""
+
+
+class Exposure(NamedTuple):
+    """All that a frame's picture is made of; what a frozen camera shows is another frame's."""
+
+    number: int
+    time: float
+    """middle of the exposure [s]"""
+    shown: int
+    theta: Array
+    """(k, n) of k parts of the exposure [rad]"""
+    covered: bool
+    swapped: bool
+    noise: Entropy
+    """of the `shown` frame's random stream: its first number decides whether it is lost, the others are its noise"""
+    across: float = 0.0
+    """bend across the plane, away from the camera [rad]"""
+    turned: float = 0.0
+    """by how much the tip's marker has slipped [rad]"""
+    spoiled: tuple[tuple[FaultKind, float], ...] = ()
+    """kinds and sizes of what spoils the picture"""
+
+
+def picture(exposure: Exposure, painter: Painter) -> Frame:
+    """Draw it; of one `shown` frame always the same."""
+    rng = np.random.default_rng(exposure.noise)
+    rng.random()
+    image = painter.render(
+        exposure.theta, rng, exposure.covered, exposure.swapped, exposure.across, exposure.turned
+    )  # fmt: skip
+    for kind, size in exposure.spoiled:
+        image = spoiled(image, kind, size, exposure.number, rng)
+    return Frame(image, exposure.time, exposure.number)
+
 
 _SMEAR, _MOST_INSTANTS, _WITHIN = np.deg2rad(0.25), 8, 8
 """Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how

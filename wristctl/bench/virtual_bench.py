@@ -1,16 +1,139 @@
 """The emulated bench in virtual time: board, wrist and camera in this process, the same in every run."""
 
-from __future__ import annotations
+import math
+from collections import deque
 
-from wristctl.bench.bench_transport import BenchTransport
+import numpy as np
+
 from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.faults import Faults
 from wristctl.bench.rig import Rig
-from wristctl.bench.virtual_camera import VirtualCamera
-from wristctl.config.bench import BenchSettings
+from wristctl.bench.shutter import picture
+from wristctl.board.board_errors import PortLost
+from wristctl.board.emulator.atmega2560 import Atmega2560, VirtualTransport
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.config.bench import BenchSettings, FaultKind
 from wristctl.config.plant import Disturbances
 from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
+from wristctl.vision.camera import CameraError, Frame
+
+_BUTTON = "G", 0
+
+
+class BenchTransport(VirtualTransport):
+    """The wire to an emulated chip in the same process, with the faults of cable, host and board.
+
+    A lost port stays lost; the board runs on, also while the host can only `wait`. What the board says is handed over
+    every `latency_timer` seconds, by the board's USB chip.
+    """
+
+    def __init__(self, chip: Atmega2560, faults: Faults, latency_timer: float = 1e-3) -> None:
+        super().__init__(chip)
+        self._handed_over = round(latency_timer * FREQUENCY)
+        self._faults, self._lost, self._reset = faults, False, -math.inf
+        self._noise = np.random.default_rng(0)
+        self._happened: set[tuple[FaultKind, float]] = set()
+        self._pressed = False
+        self._on_the_way: deque[tuple[int, bytes]] = deque()
+
+    def write(self, data: bytes) -> None:
+        """Put bytes on the line. Raises PortLost."""
+        self._see_port()
+        if not self._faults.on("host-silent", self.now()):
+            super().write(self._garbled(data))
+
+    def read(self, timeout: float) -> bytes:
+        """What the chip has sent; runs it for up to `timeout` s until there is something. Raises PortLost."""
+        self._see_port()
+        self._stand_still("answers-held")
+        end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
+        late = round(1e-3 * self._sizes("answers-late") * FREQUENCY)
+        every = max(self._handed_over, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
+        while not (data := self._arrived(late)) and self.chip.cycles < end:
+            due = self._on_the_way[0][0] if self._on_the_way else end
+            self._run(min(end, due, (self.chip.cycles // every + 1) * every))
+            self._see_port()
+        return self._garbled(data)
+
+    def _arrived(self, late: int) -> bytes:
+        """What the chip has sent and the cable, which takes so many cycles, has handed over by now."""
+        if sent := self.chip.read():
+            self._on_the_way.append((self.chip.cycles + late, sent))
+        data = b""
+        while self._on_the_way and self._on_the_way[0][0] <= self.chip.cycles:
+            data += self._on_the_way.popleft()[1]
+        return data
+
+    def wait(self, seconds: float) -> None:
+        """Run the chip for so long."""
+        self._run_until(self.chip.cycles + round(seconds * FREQUENCY))
+        self._stand_still("host-pause")
+
+    def _run_until(self, end: int) -> None:
+        while self.chip.cycles < end:
+            self._run(end)
+
+    def _run(self, end: int) -> None:
+        """Run towards `end`, at most to the next reset or press of the button that is due, and do that."""
+        pressing = self._faults.next("estop-pressed", -math.inf) if not self._pressed else math.inf
+        reset = self._faults.next("board-reset", self._reset)
+        due = min(reset, max(pressing, self.now()))
+        cycle = math.inf if math.isinf(due) else round(due * FREQUENCY)
+        self.chip.run(max(0, int(min(end, cycle)) - self.chip.cycles))
+        if self.chip.cycles < cycle:
+            return
+        if pressing <= due:
+            self.chip.drive(*_BUTTON, True)
+            self._pressed = True
+        else:
+            self.chip.reset()
+            self._reset = due
+
+    def _see_port(self) -> None:
+        self._lost = self._lost or self._faults.on("port-lost", self.now())
+        if self._lost:
+            raise PortLost(self.name, OSError("injected fault"))
+
+    def _sizes(self, kind: FaultKind) -> float:
+        return sum(fault.size for fault in self._faults.active((kind,), self.now()))
+
+    def _stand_still(self, kind: FaultKind) -> None:
+        for fault in self._faults.active((kind,), self.now()):
+            if (kind, begun := self._faults.begun(fault)) not in self._happened:
+                self._happened.add((kind, begun))
+                self._run_until(self.chip.cycles + round(1e-3 * fault.size * FREQUENCY))
+
+    def _garbled(self, data: bytes) -> bytes:
+        if not data or not (probability := self._sizes("bytes-garbled")):
+            return data
+        hit = self._noise.random(len(data)) < probability
+        flipped = hit.astype(np.uint8) << self._noise.integers(0, 8, len(data), np.uint8)
+        return bytes(np.frombuffer(data, np.uint8) ^ flipped)
+
+
+class VirtualCamera:
+    """Sees what stands on a rig; frames arrive as the chip's clock goes on."""
+
+    name = "rendered"
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig, self._seen = rig, -1
+
+    def newest(self) -> Frame | None:
+        """The newest frame that has arrived since the last call, None if none has. Raises CameraError."""
+        self._rig.catch_up()
+        if self._rig.faults.on("camera-lost", self._rig.wrist.time):
+            raise CameraError("the camera gives no more pictures", self.name, "injected fault")
+        shutter = self._rig.shutter
+        newest = shutter.newest(shutter.delay)
+        unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
+        number = next(filter(shutter.arrives, unseen), None)
+        return None if number is None else picture(shutter.expose(number), self._rig.scene)
+
+    def close(self) -> None:
+        """Nothing to give back."""
 
 
 class VirtualBench:

@@ -1,7 +1,5 @@
 """What can go wrong between host and board; each error says whether host, cable or firmware is to blame."""
 
-from __future__ import annotations
-
 import errno
 
 from wristctl.board.messages import (
@@ -13,7 +11,7 @@ from wristctl.board.messages import (
     Fault,
     Result,
 )
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 HARDWARE, SAFETY_STOP = 4, 5
 """Exit codes."""

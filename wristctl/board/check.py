@@ -1,7 +1,6 @@
 """Is the board well: round-trip times, and a look at the wiring of one drive."""
 
-from __future__ import annotations
-
+from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.board.driver import Board
@@ -41,3 +40,23 @@ def move_a_little(board: Board, axis: int) -> Status:
     board.jog(there)
     board.jog(start)
     return board.disable()
+
+
+SYSTEM = Path("/sys/bus/usb-serial/devices")
+
+
+def latency_timer(port: str, system: Path = SYSTEM) -> float | None:
+    """Seconds for which the adapter holds back what the board says while its buffer is not full; None: unknown.
+
+    FTDI's adapters have one, of 16 ms unless told; a Mega's own USB chip has none.
+    """
+    try:
+        return 1e-3 * int((system / Path(port).resolve().name / "latency_timer").read_text())
+    except (OSError, ValueError):
+        return None
+
+
+def shorter(port: str, system: Path = SYSTEM) -> str:
+    """How to have it hand over at once."""
+    file = system / Path(port).resolve().name / "latency_timer"
+    return f"echo 1 | sudo tee {file}; for good: the udev rule of docs/hardware/rig.md"

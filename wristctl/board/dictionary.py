@@ -6,8 +6,6 @@ Standard library only, so that the firmware builds with nothing but Python and a
     python3 wristctl/board/dictionary.py python > wristctl/board/messages.py
 """
 
-from __future__ import annotations
-
 import binascii
 import hashlib
 import json

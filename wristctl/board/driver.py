@@ -1,16 +1,14 @@
 """The driver of the motor board: the same for a real one and an emulated one."""
 
-from __future__ import annotations
-
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.exchange import Exchange, Overheard, Traffic, nobody
-from wristctl.board.framing import crc
+from wristctl.board.framing import Decoder, crc, encode
 from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
@@ -18,7 +16,10 @@ from wristctl.board.messages import (
     COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
+    FEEDS_WATCHDOG,
     LAYOUTS,
+    MAX_RATE,
+    TOTAL_RATE,
     Command,
     Configure,
     Connect,
@@ -35,8 +36,110 @@ from wristctl.board.messages import (
     Status,
     Target,
 )
-from wristctl.board.rates import LEAST_LIFE, Axes, four, within_reach
 from wristctl.board.transport import Transport
+
+_ANSWER = 0x80
+
+Overheard = Callable[[float, str, bytes], None]
+"""Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises."""
+
+
+def nobody(time: float, way: str, data: bytes) -> None:
+    """Overhears nothing."""
+
+
+@dataclass
+class Traffic:
+    """What the driver has seen on the wire since it was made."""
+
+    sent: int = 0
+    resent: int = 0
+    answers: int = 0
+    stale: int = 0  # answers that came after the command had been sent again, or to nobody
+    bytes_read: int = 0
+
+
+class Exchange:
+    """Commands and answers in turn over a transport."""
+
+    def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
+        self.transport, self._overheard = transport, overheard
+        self.traffic = Traffic()
+        self.round_trip = 0.0
+        """Seconds from the last command to its answer."""
+        self.silence = 0.0
+        """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
+        longer."""
+        self._decoder = Decoder()
+        self._sequence = 0
+        self._last_fed = 0.0
+
+    @property
+    def bad_frames(self) -> int:
+        """Pieces that came from the board and were no frame, or had a wrong CRC."""
+        return self._decoder.bad_frames + self._decoder.bad_crc
+
+    def ask(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:
+        """Result and payload of the answer, each attempt waited for `patience` seconds. Raises NoAnswer."""
+        self._sequence = (self._sequence + 1) & 0xFF
+        frame, seen, began = (
+            encode(command, self._sequence, payload),
+            self.traffic.bytes_read,
+            self.transport.now(),
+        )
+        gap = began - self._last_fed if self._last_fed else 0.0
+        self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
+        for attempt in range(attempts):
+            self._overheard(self.transport.now(), "sent", frame)
+            self.transport.write(frame)
+            self.traffic.sent += 1
+            self.traffic.resent += attempt > 0
+            if (answer := self._answer(command, self.transport.now() + patience)) is not None:
+                self.round_trip = self.transport.now() - began
+                if command in FEEDS_WATCHDOG:
+                    self._last_fed = began
+                return answer
+        overslept = self.transport.now() - began - attempts * patience
+        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen, overslept)
+
+    def _answer(self, command: Command, deadline: float) -> bytes | None:
+        found = None
+        while found is None and (left := deadline - self.transport.now()) > 0:
+            data = self.transport.read(left)
+            self.traffic.bytes_read += len(data)
+            if data:
+                self._overheard(self.transport.now(), "came", data)
+            for frame in self._decoder.feed(data):
+                if (
+                    found is None
+                    and (frame.code, frame.sequence) == (command | _ANSWER, self._sequence)
+                    and frame.payload
+                ):
+                    found = frame.payload
+                    self.traffic.answers += 1
+                else:
+                    self.traffic.stale += 1
+        return found
+
+
+LEAST_LIFE: float = Rate._field_defaults["life"]
+"""Seconds for which a step rate lives where nobody says otherwise."""
+
+Axes = tuple[float, float, float, float]
+
+
+def within_reach(rates: Sequence[float]) -> Axes:
+    """Rates (steps/s) with each within MAX_RATE, and all scaled down together where they exceed TOTAL_RATE."""
+    single = [max(-MAX_RATE, min(MAX_RATE, float(rate))) for rate in rates]
+    total = sum(map(abs, single))
+    return four([rate * min(1.0, TOTAL_RATE / total) if total else 0.0 for rate in single], float)
+
+
+def four(values: Sequence[float], kind: Callable[[float], Any]) -> tuple[Any, Any, Any, Any]:
+    """Four values as the messages have them. ValueError for another number."""
+    first, second, third, fourth = (kind(value) for value in values)
+    return first, second, third, fourth
+
 
 ATTEMPTS = 3
 """Times a command is sent before the driver gives up, all of them within the board's watchdog time."""

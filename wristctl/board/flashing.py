@@ -1,7 +1,5 @@
 """Writing the firmware into a Mega 2560 through its boot loader, with avrdude."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 import subprocess
@@ -9,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wristctl.board.board_errors import BoardError
-from wristctl.config.no_hardware import check_hardware_allowed
+from wristctl.processes import check_hardware_allowed
 
 IMAGE = Path(__file__).with_name("firmware") / "wrist.hex"
 _BOOT_LOADER_BAUD = 115_200

@@ -4,8 +4,6 @@ COBS (Cheshire and Baker, 1999) keeps zeros out of a frame, so that a zero alway
 ends whatever a cut-off frame has left behind. The CRC is CRC-16/CCITT-FALSE, high byte first.
 """
 
-from __future__ import annotations
-
 from binascii import crc_hqx
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """How a message lies in its bytes: little-endian, no padding, values scaled to whole counts."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

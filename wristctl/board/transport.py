@@ -1,7 +1,5 @@
 """The wire to a board: a serial port or a `socket://` address (the one place that knows pyserial)."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +9,7 @@ import serial
 from serial.tools import list_ports
 
 from wristctl.board.board_errors import BoardError, PortLost, PortUnusable
-from wristctl.config.no_hardware import check_hardware_allowed
+from wristctl.processes import check_hardware_allowed
 
 BOOT_TIME = 2.0
 """Seconds that a Mega's boot loader waits for a program after a reset, and some more."""
@@ -133,7 +131,7 @@ def open_transport(port: str | None, baud: int, exclusive: bool = True) -> Trans
     Raises PortUnusable, and BoardError where None finds no board or several.
     """
     if port == EMULATED:
-        from wristctl.board.emulator.virtual import VirtualTransport
+        from wristctl.board.emulator.atmega2560 import VirtualTransport
 
         return VirtualTransport()
     return SerialTransport(port or only_board(), baud, exclusive)

@@ -1,54 +1,59 @@
-"""`wristctl`: the table of commands, and the way every one of them ends."""
-
-from __future__ import annotations
+"""`wristctl`: the program, and the way every command ends."""
 
 import gc
 import signal
 import sys
 import traceback
-from typing import NoReturn
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, NoReturn
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from wristctl import __version__
-from wristctl.cli.lazy_commands import lazy_group
-from wristctl.config.errors import UserError
-from wristctl.config.printable import printable
-from wristctl.config.system_errors import error_of_the_system
+from wristctl.cli.commands import COMMANDS, Entry
+from wristctl.errors import UserError, error_of_the_system
+from wristctl.escape import printable
 from wristctl.interrupt import again, interrupts
+from wristctl.version import __version__
 
-_REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
 
-COMMANDS = {
-    "init": ("wristctl.cli.init", _REPRODUCE, "Lay out the study files in a folder, for you to change."),
-    "gen-data": (
-        "wristctl.cli.gen_data",
-        _REPRODUCE,
-        "Sample tip positions and bending angles of the wrist's model.",
-    ),
-    "train": ("wristctl.cli.train", _REPRODUCE, "Train the network from tip position to bending angle."),
-    "tune": ("wristctl.cli.tune", _REPRODUCE, "Search the gains of controllers."),
-    "compare": ("wristctl.cli.compare", _REPRODUCE, "Compare controllers, the paper's numbers beside ours."),
-    "study": ("wristctl.cli.study", _REPRODUCE, "Tune and judge all laws at equal budget: which is for which rig."),
-    "simulate": ("wristctl.cli.simulate", _REPRODUCE, "Simulate one closed loop, with pictures."),
-    "analyse": ("wristctl.cli.analyse", _REPRODUCE, "Find the margins of one loop, with pictures."),
-    "hysteresis": (
-        "wristctl.cli.hysteresis",
-        _REPRODUCE,
-        "Drive the wrist through hysteresis loops; fit a measured one.",
-    ),
-    "audit": ("wristctl.cli.audit", _REPRODUCE, "Judge the paper's claims one by one."),
-    "hw-run": ("wristctl.cli.hw_run", _HARDWARE, "Perform the paper's experiment, on hardware or all emulated."),
-    "identify": ("wristctl.cli.identify", _HARDWARE, "Find a real wrist's parameters from logged trials."),
-    "hw": ("wristctl.cli.hw", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."),
-    "track": ("wristctl.cli.track", _HARDWARE, "Find the wrist's angle in a recorded video."),
-    "export-model": ("wristctl.cli.export_model", _RESULTS, "Write the wrist of a run for MuJoCo or MATLAB."),
-    "new": ("wristctl.cli.new", _OWN, "Write a controller, reference or optimiser of your own to begin from."),
-    "check-law": ("wristctl.cli.check_law", _OWN, "Check a law of your own, and print its certificate."),
-    "runs": ("wristctl.cli.runs", _RESULTS, "Find, compare, verify and repeat runs."),
-}
-"""Name -> module (its `app` is a typer.Typer, imported when called), panel and line in the help."""
+def typer_of(entry: Entry) -> typer.Typer:
+    """The command of an entry, imported now."""
+    module, _, name = entry.place.partition(":")
+    found = getattr(import_module(module), name)
+    if isinstance(found, typer.Typer):
+        return found
+    from wristctl.cli.command import study_command
+
+    return study_command(found, entry.shortcuts, entry.flags, entry.examples, entry.argument)
+
+
+class _OnCall(TyperCommand):
+    """A command known by its line in the help; its module is imported when it is called."""
+
+    def __init__(self, name: str, entry: Entry) -> None:
+        super().__init__(name, help=entry.line, rich_help_panel=entry.panel)
+        self.entry = entry
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        real = get_command(typer_of(self.entry))
+        real.name = self.name
+        return real.make_context(info_name, args, parent=parent, **extra)
+
+
+def lazy_group(commands: Mapping[str, Entry]) -> type[TyperGroup]:
+    """A group of these commands, for `typer.Typer(cls=...)`."""
+
+    class Commands(TyperGroup):
+        def __init__(self, **attributes: Any) -> None:
+            super().__init__(**attributes)
+            for name, entry in commands.items():
+                self.add_command(_OnCall(name, entry))
+
+    return Commands
+
 
 _EXAMPLES = r"""
 Examples:

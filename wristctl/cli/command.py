@@ -1,7 +1,5 @@
 """The one place that makes a command of a study: its options, its dry run, its run directory, what it prints."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import re
@@ -13,21 +11,27 @@ from typing import Any, get_origin
 
 import typer
 
-from wristctl.cli.completion import controllers, run_ids
-from wristctl.cli.operator import TerminalOperator
-from wristctl.cli.options import Options, Own, signature
+from wristctl.cli.operator import TerminalOperator, idle, typed_line
+from wristctl.cli.options import Options, Own, controllers, run_ids, signature
 from wristctl.cli.output import print_plan, print_result
 from wristctl.cli.progress import PLAIN, listening, progress
-from wristctl.cli.trust_code import asked_to_trust
-from wristctl.config.errors import UserError
-from wristctl.config.explain import located
-from wristctl.config.keys import section_keys
-from wristctl.config.load import read_study, whole_key
-from wristctl.config.plausible import check_sizes
-from wristctl.config.trust import asking
-from wristctl.studies.in_python import check_executor
-from wristctl.studies.perform import perform, prepare, recording
-from wristctl.studies.procedure import Procedure
+from wristctl.commands.perform import check_executor, perform, prepare, recording
+from wristctl.commands.procedure import Procedure
+from wristctl.errors import UserError
+from wristctl.plugins.trust import asking
+from wristctl.study_files.explain import check_sizes, located
+from wristctl.study_files.keys import section_keys
+from wristctl.study_files.load import read_study, whole_key
+
+
+def asked_to_trust(given: bool, shown: str) -> bool:
+    """Shows what would run; yes where --trust-code was `given`, or where it is typed at a terminal, and never else."""
+    typer.echo(shown, err=True)
+    if given or not sys.stdin.isatty():
+        return given
+    typer.echo("Read it. Type yes to let it run: ", nl=False, err=True)
+    return typed_line(idle) == "yes"
+
 
 _SWEEP = "A leaf at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
 _EXECUTOR = "Who does the work: serial, processes[:N], dask://host:port or module:factory."

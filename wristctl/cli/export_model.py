@@ -1,18 +1,15 @@
 """`wristctl export-model`: the wrist of a run for another program."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from wristctl.cli.options import Debug, Out, TrustCode
-from wristctl.cli.runs.run_options import RESULTS, Ref
-from wristctl.cli.say import say
-from wristctl.cli.trust_code import asked_to_trust
-from wristctl.config.trust import asking
+from wristctl.cli.command import asked_to_trust
+from wristctl.cli.options import RESULTS, Debug, Out, Ref, TrustCode
+from wristctl.cli.output import say
+from wristctl.plugins.trust import asking
 
 app = typer.Typer(add_completion=False)
 
@@ -40,8 +37,8 @@ def export_model(
     For MuJoCo a model with tendons, whose two actuators take tensions; for MATLAB (or Octave) a function with the
     equations of motion. docs/models.md says how far they are from the wrist here.
     """
+    from wristctl.commands.export.model import export_wrist
     from wristctl.records import require
-    from wristctl.studies.exported_model import export_wrist
 
     with asking(partial(asked_to_trust, trust_code)):
         say(export_wrist(require(ref, None, out), to, file, segments, direction))

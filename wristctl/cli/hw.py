@@ -1,17 +1,95 @@
-"""`wristctl hw`: the motor board, and what to calibrate."""
+"""`wristctl hw`: the motor board listed, flashed and stopped, and the commands beside."""
 
-from __future__ import annotations
+import json
+import logging
+from typing import Annotated
 
 import typer
 
+from wristctl.cli.hw_bench import emulate, watch
 from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken
 from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
-from wristctl.cli.hw_emulate import emulate
-from wristctl.cli.hw_flash import flash
-from wristctl.cli.hw_ports import ports
-from wristctl.cli.hw_stop import stop
-from wristctl.cli.hw_watch import watch
+from wristctl.cli.options import BAUD, Baud, Debug, Image, Json, Port, Quiet, facts_of
+from wristctl.cli.progress import listening, progress
+from wristctl.commands.printed_table import Table
+from wristctl.commands.progress import no_event
+from wristctl.errors import UserError
+
+
+def ports(
+    find: Annotated[bool, typer.Option("--find", help="Find the board's port by unplugging it.")] = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """List the serial ports of this computer, those that may be a board first."""
+    from wristctl.board.transport import ports as serial_ports
+
+    found = serial_ports()
+    if find:
+        typer.prompt("Unplug the board, then press Enter", default="", show_default=False, err=True)
+        left = {port.device for port in serial_ports()}
+        found = [port for port in found if port.device not in left]
+        if len(found) != 1:
+            what = f"{len(found)} ports went away" if found else "no port went away"
+            raise UserError(what, fix="plug the board in, start again, and unplug only the board", exit_code=4)
+    if as_json:
+        print(json.dumps({"schema": "wristctl.ports/1", "ports": [port._asdict() for port in found]}, indent=2))
+    elif find:
+        print(found[0].device)
+    elif found:
+        columns = ("port", "may be a board", "description", "serial number")
+        print(Table("", columns, [(p.device, p.board_like, p.description, p.serial_number) for p in found]).text())
+    else:
+        print("no serial ports; wristctl hw emulate serves a board without hardware")
+
+
+log = logging.getLogger(__name__)
+
+
+def flash(
+    port: Port = None, image: Image = None, as_json: Json = False, quiet: Quiet = False, debug: Debug = False
+) -> None:
+    """Write the firmware into the board, read it back, and see that it answers."""
+    from wristctl.board.driver import Board
+    from wristctl.board.flashing import IMAGE
+    from wristctl.board.flashing import flash as write
+    from wristctl.board.transport import BOOT_TIME, SerialTransport, only_board
+
+    with listening(quiet, False) as console:
+        place = port or only_board()
+        with progress(console, no_event, f"flashing the board at {place}", None, "", quiet):
+            write(place, image or IMAGE, log.info)
+        if image is not None:
+            return
+        transport = SerialTransport(place, BAUD)
+        transport.boot_time = BOOT_TIME
+        with Board(transport) as board:
+            assert board.hello is not None
+            facts = facts_of(board.hello._asdict())
+    if as_json:
+        print(json.dumps({"schema": "wristctl.flashed/1", "port": place, **facts}, indent=2))
+    else:
+        print(f"firmware {facts['firmware']} written, verified and answering at {place}")
+
+
+def stop(port: Port = None, baud: Baud = BAUD, debug: Debug = False) -> None:
+    """Emergency stop: no further step, drives released. Works beside a running program."""
+    from wristctl.board.board_errors import PortUnusable
+    from wristctl.board.driver import Board
+    from wristctl.board.transport import open_transport
+
+    try:
+        transport = open_transport(port, baud)
+    except PortUnusable:  # a program of ours has it: opening it a second time resets nothing, and every moment counts
+        transport = open_transport(port, baud, exclusive=False)
+        transport.boot_time = 0.0
+    try:
+        result = Board(transport).stop_whatever_runs()
+    finally:
+        transport.close()
+    print(f"stopped ({result.name}); the fault is latched until cleared")
+
 
 app = typer.Typer(
     help="The motor board: find, check, flash, emulate, stop; move by hand; calibrate; watch trials.",

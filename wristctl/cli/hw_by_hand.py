@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wristctl.cli.hw_options import BAUD, Baud, Port
-from wristctl.cli.options import Debug, Out
-from wristctl.cli.runs.run_options import RESULTS
-from wristctl.cli.typed import idle, typed_line
-from wristctl.config.errors import UserError
-from wristctl.config.load import load_study
+from wristctl.cli.operator import idle, typed_line
+from wristctl.cli.options import BAUD, RESULTS, Baud, Debug, Out, Port
+from wristctl.errors import UserError
+from wristctl.study_files.load import load_study
 
 if TYPE_CHECKING:
     from wristctl.trial.by_hand import ByHand
@@ -136,7 +134,7 @@ def _session(
     from wristctl.records import open_run
     from wristctl.trial.by_hand import ByHand
     from wristctl.trial.calibration import WristCalibration
-    from wristctl.trial.patience import Patience
+    from wristctl.trial.supervised_wait import Patience
 
     signs = WristCalibration.load(open_run(calibration, out)).zero.signs if calibration else (1, 1, 1, 1)
     with Board(open_transport(port, baud)) as board:

@@ -1,19 +1,25 @@
-"""`wristctl hw check`."""
+"""`wristctl hw check`: is the board well, and can the rig run the configured loop?"""
 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wristctl.cli.hw_options import BAUD, Baud, Port, facts_of
-from wristctl.cli.options import Debug, Json, Quiet
+from wristctl.cli.operator import typed_line
+from wristctl.cli.options import BAUD, Baud, Debug, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
-from wristctl.config.errors import UserError
-from wristctl.report.printed_table import Table
-from wristctl.studies.counting import no_event
+from wristctl.commands.printed_table import Table
+from wristctl.commands.progress import no_event
+from wristctl.errors import UserError
+from wristctl.study_files.load import load_study
+
+if TYPE_CHECKING:
+    from wristctl.config.hw_run import HwRunSettings
+    from wristctl.trial.rig_facts import RigFacts, Trouble
 
 
 def check(
@@ -38,8 +44,6 @@ def check(
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
     if rig:
-        from wristctl.cli.hw_check_rig import check_rig
-
         return check_rig(port, baud, camera, override or [], axis, yes, as_json, quiet)
     from wristctl.board.check import move_a_little, round_trips
     from wristctl.board.driver import Board
@@ -87,3 +91,114 @@ def _ask_before_moving(axis: int) -> None:
     typer.echo(f"Axis {axis} will creep a twentieth of a turn forward and back. Keep clear of the tendons.", err=True)
     if typer.prompt("Type yes to move it", default="no", show_default=False, err=True) != "yes":
         raise UserError("nothing was moved", fix="type yes, or leave out --wiring", exit_code=3)
+
+
+UNFIT = 3
+"""Exit code of a rig that cannot run the loop."""
+
+
+def check_rig(
+    port: str | None, baud: int, camera: str | None, override: list[str], axis: int, yes: bool, as_json: bool,
+    quiet: bool,
+) -> None:  # fmt: skip
+    """Measure, and print the answer first. Exits with 3 where the loop cannot run."""
+    from wristctl.board.driver import Board
+    from wristctl.board.transport import EMULATED, only_board
+    from wristctl.loop_priority import prioritised
+    from wristctl.trial.rig_facts import Pictures, measure, troubles
+    from wristctl.trial.supervised_wait import Patience
+    from wristctl.trial.testbeds import open_testbed
+    from wristctl.vision.view import View
+
+    study = load_study((), override, "hw-run")
+    given: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
+    settings = study.hw_run.model_copy(update=given | ({"camera": camera} if camera is not None else {}))
+    pictures = Pictures()
+    with listening(quiet, False) as console, prioritised(settings.priority) as priority:
+        if priority:
+            typer.echo(priority, err=True)
+        with progress(console, no_event, "opening board and camera", None, "", quiet):
+            testbed = open_testbed(settings, study.wrist, study.seed, View(), lambda what, meanwhile: None, pictures)
+        try:
+            with Board(testbed.transport) as board:
+                moved = yes or _agreed(axis, Patience(board).pulse)
+                with progress(console, no_event, "measuring", None, "strokes", quiet) as done:
+                    facts = measure(testbed, board, pictures, settings, axis if moved else None, done)
+        finally:
+            testbed.close()
+    found = troubles(facts, settings, testbed.transport.name)
+    if as_json:
+        print(json.dumps(_plain(facts, found), indent=2))
+    else:
+        _print(facts, found, settings)
+    if any(each.grave for each in found):
+        raise typer.Exit(UNFIT)
+
+
+def _agreed(axis: int, meanwhile: Any) -> bool:
+    what = (
+        f"To see how old pictures are, axis {axis} will take its tendon up until the wrist bends by 3 deg\n"
+        "and bend it to 6 deg, 24 to 96 times. All other tendons slack, emergency stop within reach."
+    )
+    typer.echo(what, err=True)
+    typer.echo("Type yes to let it move, anything else to measure without: ", nl=False, err=True)
+    return typed_line(meanwhile) == "yes"
+
+
+def _print(facts: RigFacts, found: list[Trouble], settings: HwRunSettings) -> None:
+    loop = f"the loop of {1e3 * settings.control_period:g} ms"
+    grave = any(each.grave for each in found)
+    print(f"This rig can{'not' if grave else ''} run {loop}{'.' if grave or not found else ', and could be better.'}")
+    for each in found:
+        print(f"- {each.what}\n  {each.fix}")
+    print()
+    print(Table("Measured", ("what", "value"), _rows(facts)).text())
+
+
+def _rows(facts: RigFacts) -> list[tuple[str, str]]:
+    trips, pace, quality, latency = facts.trips, facts.pace, facts.quality, facts.latency
+    import numpy as np
+
+    median, most = (1e3 * float(np.quantile(facts.woken, share)) for share in (0.5, 0.99))
+    timer = "unknown" if facts.timer is None else f"{1e3 * facts.timer:g} ms"
+    rows = [
+        ("round trip of STATUS", f"{1e3 * trips.median:.2f} ms, p99 {1e3 * trips.p99:.2f} ms"),
+        ("USB adapter's latency timer", timer),
+        ("computer wakes late by", f"{median:.2f} ms, p99 {most:.2f} ms"),
+        ("camera", f"{pace.rate:.1f} pictures/s, uneven by {1e3 * pace.jitter:.1f} ms"),
+        ("age of pictures when they come, by their stamps", f"{1e3 * pace.latency:.1f} ms"),
+    ]
+    told = "not measured" if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
+    rows.append(("age that stamps do not tell, by strokes", told))
+    if latency is not None:
+        rows.append(("age of pictures when they come", f"{1e3 * (pace.latency + latency.delay):.1f} ms"))
+    if quality is not None:
+        grey = f"{quality.black:.0f} to {quality.white:.0f} of 255"
+        rows += [("tip's marker", f"{quality.side:.0f} px, blurred by {quality.blur:.1f} px, grey {grey}"),
+                 ("scatter of the resting angle", f"{math.degrees(facts.noise):.3f} deg")]  # fmt: skip
+    return rows
+
+
+def _plain(facts: RigFacts, found: list[Trouble]) -> dict[str, Any]:
+    """For JSON; seconds, radians, pixels."""
+    import numpy as np
+
+    from wristctl.records.journal import jsonable
+
+    pace = facts.pace
+    median, most = (float(np.quantile(facts.woken, share)) for share in (0.5, 0.99))
+    plain: dict[str, Any] = jsonable(
+        {
+            "schema": "wristctl.rig/1",
+            "fit": not any(each.grave for each in found),
+            "troubles": [each._asdict() for each in found],
+            "round_trip": facts.trips._asdict(),
+            "latency_timer": facts.timer,
+            "woken_late": {"median": median, "p99": most},
+            "camera": {"rate": pace.rate, "jitter": pace.jitter, "stamped_age": pace.latency},
+            "latency": None if facts.latency is None else facts.latency._asdict(),
+            "marker": None if facts.quality is None else facts.quality._asdict(),
+            "noise": facts.noise,
+        }
+    )
+    return plain

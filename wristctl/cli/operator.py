@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import os
+import select
+import sys
+import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -10,17 +15,41 @@ from typing import TYPE_CHECKING
 import typer
 
 from wristctl.cli.progress import PLAIN, Terminal
-from wristctl.cli.typed import idle, typed_line
-from wristctl.config.errors import UserError
-from wristctl.studies.session import Session
+from wristctl.commands.session import Session
+from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.trial.control_loop import Shown
-    from wristctl.trial.patience import Meanwhile
+    from wristctl.trial.supervised_wait import Meanwhile
     from wristctl.trial.trials import Trial
 
-YES = {"yes": "Ask nobody before the motors of real hardware move."}
-"""The flag of commands that move motors, and its help."""
+
+_MOMENT = 0.02
+
+
+def typed_line(meanwhile: Meanwhile) -> str:
+    """The next line of stdin, its end cut off; empty where stdin has ended.
+
+    `meanwhile` is called until the line is there, and may raise: reading never waits, not even for half a line.
+    """
+    try:
+        stdin = sys.stdin.fileno()
+    except (io.UnsupportedOperation, ValueError):  # no file of the system: what is in it has come already
+        return sys.stdin.readline().rstrip("\r\n")
+    typed = bytearray()
+    while not typed.endswith(b"\n"):
+        if not select.select([stdin], [], [], 0.0)[0]:
+            meanwhile()
+        elif byte := os.read(stdin, 1):
+            typed += byte
+        else:
+            break
+    return typed.decode(errors="replace").rstrip("\r\n")
+
+
+def idle() -> None:
+    """A moment in which nothing else goes on."""
+    time.sleep(_MOMENT)
 
 
 @dataclass(frozen=True)

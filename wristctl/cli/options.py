@@ -1,16 +1,57 @@
 """The options that every command has, and how a command's own ones join them."""
 
-from __future__ import annotations
-
 import inspect
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from wristctl.cli.completion import study_files
+from wristctl.config.choices import CONTROLLERS
+from wristctl.study_files.shipped import shipped_names
+
+MOST = 200
+"""Runs offered: of many thousands nobody reads the list, and a shell asks at every key."""
+
+
+def run_ids(context: typer.Context, incomplete: str) -> list[str]:
+    """Run directories of the folder given with --out, the newest first, and latest:KIND."""
+    out = Path(context.params.get("out") or "results")
+    try:
+        names = sorted((name for name in os.listdir(out) if not name.startswith(".")), reverse=True)
+    except OSError:
+        return []
+    kinds = {f"latest:{kind}" for kind in _commands() if any(f"-{kind}-" in name for name in names)}
+    fitting = (name for name in names if name.startswith(incomplete) and (out / name / "run.json").is_file())
+    return [*islice(fitting, MOST), *(name for name in sorted(kinds) if name.startswith(incomplete))]
+
+
+def study_files(incomplete: str) -> list[str]:
+    """Folders and YAML files, those of experiments/ where nothing is typed yet; else names of experiments."""
+    typed = Path(incomplete or "experiments/")
+    folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
+    try:
+        found = [path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") or path.is_dir()]
+    except OSError:
+        found = []
+    names = sorted(f"{path}/" if path.is_dir() else str(path) for path in found)
+    fitting = [name for name in names if name.startswith(incomplete)]
+    return fitting or [name for name in shipped_names() if name.startswith(incomplete)]
+
+
+def controllers(incomplete: str) -> list[str]:
+    """Names of the table of controllers."""
+    return sorted(name for name in CONTROLLERS if name.startswith(incomplete))
+
+
+def _commands() -> list[str]:
+    from wristctl.cli.commands import COMMANDS
+
+    return list(COMMANDS)
+
 
 Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
@@ -100,3 +141,42 @@ def _parameter(own: Own, first: bool) -> Any:
     if first:
         return typer.Argument(metavar=own.leaf.upper(), help=own.help, autocompletion=own.completed)
     return typer.Option(f"--{own.leaf.replace('_', '-')}", help=own.help, autocompletion=own.completed)
+
+
+RESULTS = Path("results")
+
+Ref = Annotated[
+    str,
+    typer.Argument(
+        metavar="RUN", help="Path, id, beginning of an id, latest:KIND or latest:KIND:LABEL.", autocompletion=run_ids
+    ),
+]
+Refs = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="RUN...",
+        help="Paths, ids, beginnings of ids, latest:KIND or latest:KIND:LABEL.",
+        autocompletion=run_ids,
+    ),
+]
+
+
+Port = Annotated[
+    str | None,
+    typer.Option("--port", help="Serial port, socket://host:port, or emulated; without it the only board found."),
+]
+Baud = Annotated[int, typer.Option("--baud", help="Of the serial line.")]
+Image = Annotated[Path | None, typer.Option("--image", help="Another program than the packaged firmware (Intel hex).")]
+
+BAUD = 250_000
+
+
+def facts_of(values: dict[str, Any]) -> dict[str, Any]:
+    """Names for states, faults and flags; why the board started in words; the dictionary in hex."""
+    from wristctl.board.messages import RESET_MEANING, Reset
+
+    named = {key: value.name or "none" if hasattr(value, "name") else value for key, value in values.items()}
+    if isinstance(cause := values.get("reset_cause"), Reset):
+        why = [RESET_MEANING[each] for each in cause & ~Reset.WARM] or ["hidden by the boot loader"]
+        named["reset_cause"] = "; ".join(why + [RESET_MEANING[Reset.WARM]] * (Reset.WARM in cause))
+    return {**named, "dictionary": f"{values['dictionary']:08x}", "firmware": ".".join(map(str, values["firmware"]))}

@@ -1,21 +1,19 @@
 """What a command leaves on stdout: its plan, or its tables and the run directory."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from wristctl.config.printable import printable
-from wristctl.config.resolved import resolved_yaml
+from wristctl.commands.adoption import with_places
+from wristctl.commands.perform import plain_tables
+from wristctl.commands.printed_table import Table
 from wristctl.config.study import Study
+from wristctl.escape import printable
 from wristctl.records import Run
 from wristctl.records.journal import jsonable
-from wristctl.report.printed_table import Table
-from wristctl.studies.adopted import with_places
-from wristctl.studies.perform import plain_tables
+from wristctl.study_files.resolved import resolved_yaml
 
 
 def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> None:
@@ -58,3 +56,8 @@ def print_result(
     for table in tables if everything or not answer else ():
         print(table.text(width), end="\n\n")
     print(path)
+
+
+def say(text: object) -> None:
+    """Print one line, whatever is in it."""
+    print(printable(text))

@@ -1,7 +1,5 @@
 """Messages and progress on stderr: live on a terminal, plain lines elsewhere."""
 
-from __future__ import annotations
-
 import logging
 import os
 import sys
@@ -23,9 +21,9 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from wristctl.config.printable import printable_lines
-from wristctl.studies.counting import Count, counting
-from wristctl.studies.session import Done, Event
+from wristctl.commands.progress import Count, counting
+from wristctl.commands.session import Done, Event
+from wristctl.escape import printable_lines
 
 PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
 """How the console prints text that is not rich's markup."""

@@ -1,7 +1,5 @@
 """The trials while they go on: a live panel on a terminal, plain lines elsewhere."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +11,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table as Grid
 
 from wristctl.cli.progress import Terminal
-from wristctl.studies.session import Session
+from wristctl.commands.session import Session
 from wristctl.trial.control_loop import Shown
 from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import ACTIVE

@@ -5,8 +5,7 @@ asked of them. So a setting counts where the same wrist follows other angles too
 the integration step never counts.
 """
 
-from __future__ import annotations
-
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -15,14 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.box import courses
 from wristctl.comparison.paper import FACTOR, T2
-from wristctl.comparison.readings import Courses, readings, usual
-from wristctl.config.control import Row
-from wristctl.config.unstated import STRATA, Box, PaperSetting
+from wristctl.comparison.unknowns_sampling import Courses, courses, readings, usual
+from wristctl.config.controllers import Row
+from wristctl.config.unknowns_box import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
+from wristctl.control.smc import SMC
 from wristctl.seeds import stream
 from wristctl.tuning.optimisers.differential_evolution import DifferentialEvolution
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.holding import shortfall
+from wristctl.wrist.segments import segments
 
 Reading = Literal["strict", "usual"]
 GUARD_DEG = (-30.0, 15.0, -15.0, 20.0, -20.0)
@@ -167,3 +169,27 @@ def _near(
         )
     factors, _, _ = closest(_courses(row, moved), row.controller, reading)
     return float((factors < FACTOR).mean())
+
+
+def overshoot_of_a_tick(setting: PaperSetting, gains: str = "exchanged") -> float:
+    """How many times too far one held tick goes; infinite without a tension limit."""
+    wrist, loop, own = setting.wrist, setting.loop, SMC.presets[gains]
+    if not loop.limits:
+        return math.inf
+    n = loop.plant_segments
+    arms = wrist.length * (n - np.arange(n) - 0.5) / n + wrist.hand_offset
+    turned = 1.0 - float(arms.mean() ** 2 / (arms**2).mean())
+    inertia = float(terms(segments(wrist, 1), [0.0], [0.0]).mass[0, 0])
+    pull = 2.0 * wrist.tendon_offset * wrist.tension_limit
+    return pull * (turned / wrist.damping + 0.5 * loop.control_period / inertia) / (own["P3"] / own["P1"])
+
+
+def holds(setting: PaperSetting) -> bool:
+    """Whether the tendons can hold 30 deg toward the reference's side."""
+    theta = math.radians(setting.reference.end_deg)
+    return not setting.loop.limits or shortfall(setting.wrist, theta, theta) is None
+
+
+def arrives_by_rule(setting: PaperSetting, gains: str = "exchanged") -> bool:
+    """Strong enough to hold, and no tick too far."""
+    return holds(setting) and overshoot_of_a_tick(setting, gains) < 1.0

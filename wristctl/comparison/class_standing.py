@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.condition_classes import CLASSES, class_of
+from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
 from wristctl.comparison.geometric_means import (
     MEASURABLE,
     GeometricMean,
@@ -24,7 +23,7 @@ from wristctl.comparison.geometric_means import (
 )  # fmt: skip
 from wristctl.comparison.tie_groups import Standing, standing
 from wristctl.comparison.world_ranking import WorldRanking
-from wristctl.config.control import CompareSettings
+from wristctl.config.controllers import CompareSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter
 from wristctl.simulation.repetitions import Repeated

@@ -7,19 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wristctl.config.control import CompareSettings, TuneSettings
-from wristctl.config.errors import UserError
+from wristctl.config.controllers import CompareSettings, TuneSettings
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import TunedGains, controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import repeat, scenario_of
+from wristctl.simulation.disturbances import DISTURBANCES
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import jumps, motion, reference_name, toward
 from wristctl.simulation.repetitions import Repeated, Simulation
-from wristctl.simulation.worlds import loop_facing
+from wristctl.simulation.worlds import World, loop_facing, mismatches
 from wristctl.wrist.kinematics import Inverse
 
 
@@ -179,3 +180,56 @@ def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[C
             chosen.inverses.index(r.inverse),
         ),
     )
+
+
+CLASSES = ("ideal", "sampled", "camera and tendons", "pushed", "off-nominal")
+"""From what a law is designed for to what it meets."""
+_CONTINUOUS = 1e-4
+"""Control period [s] up to which a torque is held so briefly that a law need not know of it."""
+
+
+def class_of(loop: Loop, wrist: WristParameters) -> str:
+    """The class of a loop: what is hardest about it.
+
+    pushed: a force acts. camera and tendons: motors and tendons, or a camera, are simulated. off-nominal: the plant is
+    not what its controller believes. ideal: it is, to the last segment, in nearly continuous time and without a limit
+    of tension. sampled: the rest.
+    """
+    acting = [each for each in DISTURBANCES.values() if each.acts(loop.disturbances)]
+    if any(each.force is not None for each in acting):
+        return "pushed"
+    if loop.actuator.level == "tendon" or loop.sensor.level == "camera":
+        return "camera and tendons"
+    if acting or loop.actuator.level != "ideal" or mismatches(World(loop, wrist)):
+        return "off-nominal"
+    nearly = loop.plant_segments == 1 and not loop.limits and loop.control_period <= _CONTINUOUS
+    return "ideal" if nearly else "sampled"
+
+
+_PRINTED = ("discs", "springs", "tendons", "stiffness", "damping")
+"""Of the wrist what the paper prints; what it does not (C10) may be anything."""
+_MOVE_DEG = 30.0
+
+
+def paper_cells(study: Study) -> frozenset[tuple[str, str]]:
+    """Loops and references, by their names in a comparison, whose numbers may be those of T2: simulated, ulnar, 30 deg.
+
+    A push, a payload, softer springs, motors or a camera are no part of it, nor is a motion that never rests.
+    """
+    chosen = study.compare
+    if any(_differs(study.wrist, name) for name in _PRINTED):
+        return frozenset()
+    loops = [name for name, loop in chosen.loops.items() if class_of(loop, study.wrist) in ("ideal", "sampled")]
+    moves = [each for each in chosen.references if _papers_move(each)]
+    names = [course_name(each, "ulnar", chosen) for each in moves if "ulnar" in chosen.directions]
+    return frozenset((loop, name) for loop in loops for name in names)
+
+
+def _differs(wrist: WristParameters, name: str) -> bool:
+    field = WristParameters.model_fields.get(name)
+    return field is not None and getattr(wrist, name) != field.default
+
+
+def _papers_move(reference: Reference) -> bool:
+    single = reference.kind in ("step", "minimum-jerk") and reference.tip is None
+    return single and abs(reference.end_deg - _MOVE_DEG) < 1e-9

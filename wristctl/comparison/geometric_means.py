@@ -4,8 +4,6 @@ A world is what was drawn as a whole: where several scores share a draw (targets
 geometric mean is that world's score, since worlds are resampled as if each were drawn by itself.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

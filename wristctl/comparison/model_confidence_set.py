@@ -5,8 +5,6 @@ comes of flips of the signs of whole worlds. So the rate at which an equally goo
 the number of rows, however rows are correlated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations

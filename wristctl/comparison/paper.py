@@ -1,7 +1,5 @@
 """The paper's numbers (T2: simulation, ulnar, 30 deg) and what counts as having reproduced them."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal
 from typing import NamedTuple

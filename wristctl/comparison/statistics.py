@@ -1,7 +1,5 @@
 """What several repetitions say of a number."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

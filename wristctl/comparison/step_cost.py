@@ -1,7 +1,5 @@
 """What a control step costs on this machine: the law and its allocation, for one wrist."""
 
-from __future__ import annotations
-
 import time
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ All are two-sided and on a log scale. What fails or never settles is nan, worse 
 A printed number stands for all that its digits may have been rounded from: no verdict turns on them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The ledger of the paper's claims, and how it is audited."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Annotated, Literal, Self
 
@@ -9,7 +7,7 @@ from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.loop import DirectionName
 from wristctl.config.section import Section, choice, quantity
-from wristctl.config.unstated import Box
+from wristctl.config.unknowns_box import Box
 
 VerdictName = Literal[
     "reproduced",
@@ -71,7 +69,7 @@ class Claim(Section):
     than: str | None = None
     """Of an ordering: controller/gains whose metric is the larger one, as the paper has it."""
     metric: str | None = None
-    """Of a loop or a run; of an equation its name in wristctl.comparison.equations."""
+    """Of a loop or a run; of an equation its name in wristctl.comparison.derived_claims."""
     direction: DirectionName | None = None
     """Of hardware: trials in this direction only."""
     pushed: bool = False

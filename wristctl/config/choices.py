@@ -7,18 +7,17 @@ place, `path/to/file.py:NAME`, by the name of an entry point of an installed pac
 come from these tables.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
-from wristctl.config import foreign
-from wristctl.config.entry_points import entry_point, entry_point_names
-from wristctl.config.errors import UserError, meant
 from wristctl.config.foreign import Foreign, is_reference
+from wristctl.errors import UserError, meant
 
 T = TypeVar("T")
+
+_LOADER = "wristctl.plugins.places"
+"""The module that loads what is from elsewhere; imported, as every entry is, when a name first asks for it."""
 
 
 class Choices(MutableMapping[str, T], Generic[T]):
@@ -54,7 +53,7 @@ class Choices(MutableMapping[str, T], Generic[T]):
     def __contains__(self, name: object) -> bool:
         if name in self._entries or not self.group or not isinstance(name, str):
             return name in self._entries
-        return is_reference(name) or name in entry_point_names(self.group)
+        return is_reference(name) or name in self._installed()
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._entries)
@@ -70,11 +69,18 @@ class Choices(MutableMapping[str, T], Generic[T]):
 
     def known(self) -> list[str]:
         """Every name, those of entry points too."""
-        return [*self, *(entry_point_names(self.group) if self.group else ())]
+        return [*self, *(self._installed() if self.group else ())]
 
     def loaded(self, name: str) -> tuple[T, Foreign]:
         """The object of a file.py:NAME or of an entry point, and where it is from."""
-        return foreign.load(name) if is_reference(name) else entry_point(self.group, name)
+        loader = import_module(_LOADER)
+        loaded: tuple[T, Foreign] = loader.load(name) if is_reference(name) else loader.entry_point(self.group, name)
+        return loaded
+
+    def _installed(self) -> Sequence[str]:
+        """Names of the entry points of installed packages."""
+        names: Sequence[str] = import_module(_LOADER).entry_point_names(self.group)
+        return names
 
     def lend(self, name: str, entry: T, origin: Foreign) -> None:
         """Know what is from elsewhere by its own name, until another is lent under it."""

@@ -1,13 +1,11 @@
 """The study of all laws: which are tuned and judged on which families of worlds, and at what budget."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import model_validator
 
 from wristctl.config.choices import OPTIMISERS
-from wristctl.config.control import ControllerName, Objective, Row
+from wristctl.config.controllers import ControllerName, Objective, Row
 from wristctl.config.section import OneOf, Section, choice
 
 

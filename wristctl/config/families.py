@@ -1,7 +1,5 @@
 """Families of worlds: a loop whose leaves are drawn anew for each world, so that nothing is tuned or judged on one."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Files that a study names: looked for beside the study that names them, and sealed into the runs made of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,18 +1,16 @@
 """Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
-from wristctl.config.control import Row
-from wristctl.config.errors import Unfitting
+from wristctl.config.controllers import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
+from wristctl.errors import Unfitting
 
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
 """Of a step rate on the board: seconds at least, and ticks."""

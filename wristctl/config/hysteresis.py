@@ -1,7 +1,5 @@
 """Hysteresis of a wrist on its tendons: the loops that it is driven through, and a measured loop to be fitted."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Identification: which runs, what is held fixed, what is known how well, and what counts as identified."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from wristctl.config.section import Section, choice, quantity

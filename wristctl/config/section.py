@@ -1,7 +1,5 @@
 """The base of every configuration section and the way a leaf states its unit and source."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self

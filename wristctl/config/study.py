@@ -1,15 +1,12 @@
 """A study: the wrist and what each command does with it. One file may hold one section or all of them."""
 
-from __future__ import annotations
-
 import re
 
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
-from wristctl.config.analyse import AnalyseSettings
 from wristctl.config.audit import AuditSettings
-from wristctl.config.control import CompareSettings, SimulateSettings, TuneSettings
+from wristctl.config.controllers import AnalyseSettings, CompareSettings, SimulateSettings, TuneSettings
 from wristctl.config.fair_study import FairStudySettings
 from wristctl.config.families import Family
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings

@@ -1,7 +1,5 @@
 """What the camera sees and how it is read: markers, gates, the rendered scene, calibration, recordings."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import model_validator

@@ -1,7 +1,5 @@
 """The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
-from __future__ import annotations
-
 import math
 from typing import Self
 

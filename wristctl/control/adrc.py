@@ -1,7 +1,5 @@
 """Active disturbance rejection: no model but an inertia; all else is one load that an observer estimates."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain

@@ -3,8 +3,6 @@
 Conditional integration, or clamping: Astrom and Hagglund, PID Controllers (1995), section 3.5.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -1,7 +1,5 @@
 """Computed torque: the one-segment model cancelled exactly, and a linear error equation in its place."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller, Gain

@@ -1,7 +1,5 @@
 """Computed torque with a disturbance observer: the model cancelled, and what it lacks measured and cancelled too."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember

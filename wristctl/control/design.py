@@ -1,14 +1,13 @@
 """A law that is made from settings of its own, which stand in a study with units: weights, horizons, sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from wristctl.config.errors import UserError, meant
-from wristctl.config.foreign import PLAIN, contained
+from wristctl.config.foreign import PLAIN
 from wristctl.config.section import Parameter
 from wristctl.control.law import Controller
+from wristctl.errors import UserError, meant
+from wristctl.plugins.places import contained
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """A law whose rate is the difference of two angles, as where nothing measures the rate."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

@@ -4,8 +4,6 @@ Ohnishi, Shibata and Murakami, IEEE/ASME Trans. Mechatronics 1 (1996) 54, on the
 ICRA 2003), so that no acceleration is measured. It needs three values of memory, from `at` on.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.model import one_segment_terms

@@ -1,7 +1,5 @@
 """Stiffness and gravity feedforward: the baseline that every feedback law has to beat."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller

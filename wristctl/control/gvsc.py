@@ -5,8 +5,6 @@ phi(u) = theta u + beta (u^2 - u) and the tip by theta, whatever beta (Legendre 
 Stiffness and damping are diagonal: K, K/3 and D, D/3. A tendon parallel to the wrist pulls on theta alone.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

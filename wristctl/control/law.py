@@ -6,8 +6,6 @@ controller asks for a preview; `wrist` is the Segments of the controller's one-s
 own by name; `memory` is indexed, and the law may write it. What a law may call is in docs/lanes.md.
 """
 
-from __future__ import annotations
-
 import keyword
 import re
 from collections.abc import Callable, Mapping
@@ -21,10 +19,10 @@ from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.core.sigutils import normalize_signature
 
-from wristctl.config.errors import UserError
 from wristctl.config.foreign import PLAIN
 from wristctl.config.section import Parameter
 from wristctl.control.plain_law import PlainLaw
+from wristctl.errors import UserError
 from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import compiled, keep
 from wristctl.lanes.frozen_values import frozen_values

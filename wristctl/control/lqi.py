@@ -1,7 +1,5 @@
 """Linear quadratic control with an integral: feedforward, and the optimal feedback of the wrist's linear model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.clamped_integral import held, integrated

@@ -4,8 +4,6 @@ It is the model of `wrist.arcs` and `wrist.dynamics` written a second time, shor
 against the other.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -7,8 +7,6 @@ period, two sweeps of vectors a turn, no branch (TinyMPC: Nguyen et al., ICRA 20
 (arXiv 2510.19541) does not print horizon, weights or period.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember

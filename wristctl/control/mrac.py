@@ -1,7 +1,5 @@
 """Model reference adaptive control on the reduced one-segment (RPPR) model. The group's own law is not printed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller, Gain

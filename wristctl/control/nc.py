@@ -1,7 +1,5 @@
 """An adaptive neuro-controller: no model of the wrist, a network learns the torque. The group's law is not printed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

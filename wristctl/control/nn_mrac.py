@@ -7,8 +7,6 @@ by the gradient of that difference (the MIT rule); its width, its initial weight
 (the torque in reach); and a unit gain of 5/5 where theirs is 4/5 or 4.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

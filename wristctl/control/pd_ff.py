@@ -1,7 +1,5 @@
 """Feedforward and PD: the first rung of feedback above `feedforward`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain

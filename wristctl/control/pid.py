@@ -1,7 +1,5 @@
 """The paper's rival: a PID controller, E22 read as a torque (C12) with the sign that stabilises (C7)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.clamped_integral import held, integrated

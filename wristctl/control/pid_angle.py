@@ -1,7 +1,5 @@
 """The paper's rival as it is printed: E22 gives a bending angle (C12's second reading)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.clamped_integral import held, integrated

@@ -1,7 +1,5 @@
 """Feedforward, PID and a disturbance observer: what such an observer adds to `pid-ff`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control import pid_ff

@@ -1,7 +1,5 @@
 """Feedforward and PID: what an integral adds to `pd-ff`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control import pd_ff

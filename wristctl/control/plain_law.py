@@ -1,7 +1,5 @@
 """A law that is plain Python: a way out of compiled code, one rollout at a time, that no compiling is needed for."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 from collections import namedtuple
@@ -13,8 +11,8 @@ import numpy as np
 from numba.core import types
 from numba.experimental import function_type
 
-from wristctl.config.errors import UserError
-from wristctl.config.foreign import contained
+from wristctl.errors import UserError
+from wristctl.plugins.places import contained
 
 __all__ = ["PlainLaw"]
 _TEACHES_NUMBA = function_type

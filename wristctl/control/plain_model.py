@@ -1,7 +1,5 @@
 """The one-segment wrist for laws of plain Python."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One control tick, in simulation and on hardware: what the law sees, its torque, and the pulls that give it."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of

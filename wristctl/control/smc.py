@@ -1,7 +1,5 @@
 """The paper's sliding mode controller, E12-E21."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller, Gain, Surface

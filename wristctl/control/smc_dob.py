@@ -1,7 +1,5 @@
 """Feedforward, PID, a disturbance observer and a sliding term: what the sliding term adds to `pid-dob`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES

@@ -1,7 +1,5 @@
 """Sliding mode control that tracks: integral surface on the error, reference fed forward, boundary layer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller, Gain, Surface

@@ -1,7 +1,5 @@
 """Super-twisting: a second-order sliding mode whose torque is continuous."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.control.law import Conditions, Controller, Gain, Surface

@@ -1,14 +1,15 @@
 """The table of controllers: a newcomer is one file, and one line in `wristctl.config.choices`."""
 
-from __future__ import annotations
-
+import json
 from collections.abc import Mapping
+from pathlib import Path
 
 from wristctl.config.choices import CONTROLLERS as _TABLE
 from wristctl.config.choices import Choices
-from wristctl.config.errors import UserError, meant
 from wristctl.control.law import Controller
 from wristctl.control.vetting import law_of
+from wristctl.errors import Call, UserError, meant
+from wristctl.records.files import write_text
 
 CONTROLLERS: Choices[Controller] = _TABLE
 
@@ -51,3 +52,20 @@ def gains_of(
     if missing:
         raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", "gains", "give every gain by name")
     return chosen.values(gains)
+
+
+Gains = Mapping[str, Mapping[str, float]]
+
+
+def write_gains(path: Path, gains: Gains) -> None:
+    """Write gains by controller and name; floats round-trip exactly."""
+    write_text(path, json.dumps(gains, indent=2) + "\n")
+
+
+def read_gains(path: Path) -> Gains:
+    """Read a file of tuned gains; UserError if it is none."""
+    try:
+        gains = json.loads(path.read_bytes())
+        return {str(name): {str(k): float(v) for k, v in each.items()} for name, each in gains.items()}
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise UserError("not a file of tuned gains", str(path), ("name a run of `", Call("tune"), "`")) from error

@@ -1,7 +1,5 @@
 """Is a law from elsewhere what a law is? It is tried on a few states before anything relies on it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -9,11 +7,11 @@ import numpy as np
 from numba.core.runtime import _nrt_python, rtsys
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.foreign import PLAIN
 from wristctl.config.wrist import WristParameters
 from wristctl.control.design import LawDesign
 from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
+from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of

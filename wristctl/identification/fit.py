@@ -1,7 +1,5 @@
 """Nonlinear least squares of the forward model's angle against the marker's, at the times of the frames."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ from wristctl.config.plant import Actuator
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, tendons_of_values
-from wristctl.lanes.cores import cores
+from wristctl.processes import cores
 
 _NUDGE, _NUDGE_M = 1e-4, 1e-6
 """Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""

@@ -3,8 +3,6 @@
 Candidates run side by side, one a lane: a Jacobian costs a block or two. Actuator and integrator are the simulation's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

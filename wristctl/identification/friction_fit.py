@@ -5,8 +5,6 @@ Intervals come from the sandwich covariance of `wristctl.identification.interval
 of the sheath's may be infinite.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

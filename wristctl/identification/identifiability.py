@@ -5,18 +5,15 @@ their scale, and it has to act differently in different trials. Damping and dela
 whether a parameter can be found is a question to the Jacobian, and so is which further trials would help.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import TrueWrist
-from wristctl.config.wording import Setting
+from wristctl.errors import Setting, UserError
 from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
 from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, inverse, promised

@@ -7,8 +7,6 @@ residuals are worth: small errors that last (the average of the base's marker, a
 the noise of single frames, and show in the sum of the autocorrelations over half a second.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

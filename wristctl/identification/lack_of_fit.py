@@ -6,8 +6,6 @@ Soc. 44 (1948) 50) with the covariance of `intervals`, so that residuals that ar
 matters to a user is by how much each parameter would move if the cause were so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.plant import TendonFacts, TrueWrist
-from wristctl.config.wording import Setting
+from wristctl.errors import Setting, UserError
 from wristctl.identification.fit import Fit, frame_noise
 from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, sandwich
 from wristctl.identification.measured_trials import MeasuredTrial
-from wristctl.lanes.cores import cores
+from wristctl.processes import cores
 
 EVIDENT = 3.5
 """Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""

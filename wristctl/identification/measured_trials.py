@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.wrist.directions import DIRECTIONS, in_plane, tendons_of
 
 if TYPE_CHECKING:
@@ -102,3 +102,23 @@ def measured_trials(
             f"no trial without a push has {_FEWEST} usable frames", label, "name an hw-run run with trials that ended"
         )
     return found
+
+
+MOST_DELAYED = 20.0
+"""Frames of delay that a simulated camera may have."""
+
+
+def camera_parameters(frames: pd.DataFrame, delay: float, noise: float) -> dict[str, float]:
+    """Frame rate [1/s], delay in frames from exposure to use, noise [deg], dropped share: as `loop.sensor` has them.
+
+    `frames` has a row for each frame: run, trial, the time stamp `captured` and the time `used` [s], and the verdict.
+    `delay` is how much older a picture is than its time stamp [s], `noise` the standard deviation of an angle [rad].
+    """
+    rate = 1.0 / float(frames.groupby(["run", "trial"]).captured.diff().median())
+    used = float((frames.used - frames.captured).mean())
+    return {
+        "frame_rate": rate,
+        "delay_frames": float(np.clip((used + delay) * rate, 0.0, MOST_DELAYED)),
+        "noise_deg": float(np.degrees(noise)),
+        "dropped": float((frames.verdict != "ok").mean()),
+    }

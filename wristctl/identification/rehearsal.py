@@ -13,11 +13,11 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
-from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
+from wristctl.errors import UserError
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of

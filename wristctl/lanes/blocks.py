@@ -4,8 +4,6 @@ A block holds LANES rollouts along its last axis; a rollout alone is a block wit
 filled up with the last rollout.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ folder's name holds a hash of the file and of all files that it imports, theirs 
 Where the package lies is no part of it: checkouts, copies and installed packages of the same sources share a cache.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re
@@ -37,7 +35,7 @@ _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Of what compiled code alone calls: a way in from Python would be compiled for each of them, and never used."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
-_CONSTANT_FREE = ("wristctl.config", "wristctl.records")
+_CONSTANT_FREE = tuple(f"wristctl.{room}" for room in ("config", "errors", "plugins", "records", "study_files"))
 """Packages that compiled code takes nothing from, neither a function nor a number."""
 
 if not numba.__version__.startswith(f"{TRIED}."):

@@ -4,8 +4,6 @@ numba keeps compiled code by a function's own bytecode and closure. What that ca
 from a file or worked out when it was imported, decide the result as well.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Elementary functions of lanes, branch-free, with their error in units in the last place (ulp)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

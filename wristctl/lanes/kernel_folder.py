@@ -4,8 +4,6 @@ On a network's file system several machines would write the same index, each for
 another is replacing.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from pathlib import Path

@@ -3,8 +3,6 @@
 A product next to a sum becomes one fused multiply-add, rounded once; of two products the first fuses.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any

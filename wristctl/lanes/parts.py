@@ -3,8 +3,6 @@
 What a NamedTuple holds is listed once, in its class; everything here goes by that list.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

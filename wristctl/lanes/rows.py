@@ -5,8 +5,6 @@ length is part of their type where it is the number of segments, so that loops o
 long as the function that asks for it.
 """
 
-from __future__ import annotations
-
 import operator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Series of E_n(x) = j_n(x)/x^n in x^2, spherical Bessel functions over powers: coefficients, lowest power first."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

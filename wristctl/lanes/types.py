@@ -6,8 +6,6 @@ Arithmetic on it is vertical and without fast-math; a product and a sum fuse whe
 bit, on its neighbours, on the batch, on the thread count or on the processor's registers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

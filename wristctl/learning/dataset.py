@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.learning import DataSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.wrist.kinematics import arc_tip, chain_tip, exact_angle, exact_arc
+from wristctl.wrist.segments import Segments, segments
+from wristctl.wrist.statics import equilibria_at
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 LEAST_SHARE = 2
 """Samples that validation and test need at least: one sample has no spread to explain."""
@@ -175,3 +178,54 @@ def _samples(
     return Samples(
         tip, theta, arc, domain or Domain.around(tip, others), others, (), np.zeros(count, np.int64), segments
     )
+
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
+BLOCK = 20_000
+"""Equilibria that are searched together: a bound on memory."""
+
+
+def draw_equilibria(
+    settings: DataSettings, wrist: WristParameters, rng: np.random.Generator, done: Callable[[int], object] = int
+) -> Samples:
+    """Stable equilibria with the angle in +-range_deg, poses in turn, payloads in their range; `done` gets their count.
+
+    What the tendons cannot hold within their limit, or what buckles, is left out. Raises UserError where that is
+    more than half.
+    """
+    count, n = settings.samples, settings.segments
+    unit = unit_cube(settings.sampling, count, 2, rng)
+    theta = math.radians(wrist.range_deg) * (2.0 * unit[:, 0] - 1.0)
+    low, high = settings.payload
+    payload = low + (high - low) * unit[:, 1]
+    tilts = np.radians([*settings.poses, *settings.held_out_poses])
+    which = np.arange(count) % len(tilts)
+    pose, hand = tilts[which], wrist.hand_mass * (1.0 + payload)
+
+    found = []
+    for begin in range(0, count, BLOCK):
+        some = slice(begin, begin + BLOCK)
+        parameters = np.tile(segments(wrist, n), (len(theta[some]), 1))
+        parameters[:, Segments._fields.index("hand_mass")] = hand[some]
+        parameters[:, Segments._fields.index("gravity_x")] = -GRAVITY * np.cos(pose[some])
+        parameters[:, Segments._fields.index("gravity_y")] = GRAVITY * np.sin(pose[some])
+        found.append(equilibria_at(parameters, n, theta[some], TENDONS_PER_SIDE * wrist.pretension))
+        done(begin + len(parameters))
+    bent, pulls, stable = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    held = stable & (pulls.max(axis=1) <= TENDONS_PER_SIDE * wrist.tension_limit)
+    if 2 * held.sum() < count:
+        raise UserError(
+            f"{count - held.sum()} of {count} equilibria buckle or need more than {wrist.tension_limit:g} N",
+            where="gen-data.payload",
+            fix="lower the payload or wrist.hand_mass, or leave out the upright pose",
+        )
+    first, last = settings.held_out_payload
+    code = np.where((payload >= first) & (payload <= last), HELD_PAYLOAD, 0)
+    code = np.where(which >= len(settings.poses), HELD_POSE, code)[held]
+    tip = chain_tip(bent[held], wrist.length)
+    others = np.column_stack([pose, hand])[held]
+    inside = code != HELD_POSE
+    domain = Domain.around(tip[inside], others[inside])
+    return Samples(tip, theta[held], exact_arc(tip)[1], domain, others, tuple(OTHERS), code, n)

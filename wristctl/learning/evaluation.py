@@ -1,25 +1,87 @@
 """What is said of every trained network, and of what stands beside it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.learning.angle_errors import MEASURES as OF_ANGLES
-from wristctl.learning.angle_errors import angle_errors, error_map
-from wristctl.learning.baseline import Polynomial
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
-from wristctl.learning.inference import compiled_network
+from wristctl.learning.domain import Domain
+from wristctl.learning.inference import Polynomial, compiled_network
 from wristctl.learning.training_result import TrainingResult
-from wristctl.wrist.kinematics import exact_angle
+from wristctl.wrist.kinematics import arc_tip, exact_angle
+
+CLOSE_DEG = 0.5
+"""An error up to this counts as close."""
+
+
+@dataclass(frozen=True)
+class AngleErrors:
+    """Errors of predicted bending angles over a set of samples."""
+
+    r2: float
+    """1 - sum of squared errors / sum of squared deviations from the mean"""
+    rmse_deg: float
+    """root of the mean squared error [deg]"""
+    max_error_deg: float
+    """largest absolute error [deg]"""
+    close_share: float
+    """share of samples with an absolute error of at most 0.5 deg"""
+
+
+ANGLE_MEASURES: dict[str, tuple[str, Literal["lower", "higher"], str]] = {
+    "r2": ("", "higher", "coefficient of determination of the angle"),
+    "rmse_deg": ("deg", "lower", "root mean squared error of the angle"),
+    "max_error_deg": ("deg", "lower", "largest absolute error of the angle"),
+    "close_share": ("1", "higher", "share of samples with an error of at most 0.5 deg"),
+}
+"""Unit, better direction and meaning of each of AngleErrors' fields."""
+
+
+@dataclass(frozen=True)
+class ErrorMap:
+    """Errors on a grid that fills a domain: A angles from end to end by L arc lengths."""
+
+    tip: Array
+    """(A, L, 2) [m]"""
+    theta: Array
+    """(A, L) true angle [rad]"""
+    error: Array
+    """(A, L) predicted minus true angle [rad]"""
+
+
+def angle_errors(predicted: Array, true: Array) -> AngleErrors:
+    """Measures of predicted against true angles of one shape [rad]; r2 is NaN where all true ones are equal."""
+    error = predicted - true
+    deviation = true - true.mean()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r2 = 1.0 - float(np.sum(error**2) / np.sum(deviation**2))
+    degrees = np.abs(np.degrees(error))
+    return AngleErrors(
+        r2=r2,
+        rmse_deg=float(np.sqrt(np.mean(degrees**2))),
+        max_error_deg=float(degrees.max()),
+        close_share=float(np.mean(degrees <= CLOSE_DEG)),
+    )
+
+
+def error_map(inverse: Callable[[Array], Array], domain: Domain, angles: int = 201, lengths: int = 41) -> ErrorMap:
+    """Errors of `inverse`, tips (..., 2) [m] to angles (...) [rad], over the whole domain, edges included."""
+    theta, length = np.meshgrid(
+        np.linspace(*domain.theta, angles), np.linspace(*domain.arc_length, lengths), indexing="ij"
+    )
+    tip = arc_tip(theta, length)
+    return ErrorMap(tip, theta, inverse(tip) - theta)
+
 
 HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
 """Names of the places where samples were held out, by why."""
 
 MEASURES: dict[str, tuple[str, str]] = {
-    **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in OF_ANGLES.items()},
+    **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in ANGLE_MEASURES.items()},
     "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
     "workspace_max_error_deg": ("deg", "largest error on a dense grid over the whole domain"),
     "held_out_payloads_rmse_deg": ("deg", "RMSE of the angle at payloads kept from training"),

@@ -3,8 +3,6 @@
 A fit without noise ends in a long flat valley. First-order methods crawl along it; J^T J knows its shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import torch

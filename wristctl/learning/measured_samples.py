@@ -1,7 +1,5 @@
 """Samples that were measured: tips and angles of recordings, from tables of runs or from CSV files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.records.measured_table import ANGLE, LENGTH, NUMBER, TIME, Expected

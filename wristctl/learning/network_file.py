@@ -1,7 +1,5 @@
 """Network files: safetensors whose header says what the numbers mean and where they come from."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,10 +10,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
-from wristctl.config.wording import Call
+from wristctl.errors import Call, UserError
 from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing

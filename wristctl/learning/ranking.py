@@ -1,7 +1,5 @@
 """What a comparison of trainings supports: means with intervals, and tests between rows paired by seed or fold."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

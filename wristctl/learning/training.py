@@ -1,14 +1,16 @@
 """Training a network with torch: on one thread and seeded, so that the same settings give the same bytes."""
 
-from __future__ import annotations
-
+import hashlib
+import io
 import math
+import pickle
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import torch
@@ -16,11 +18,47 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from wristctl.config.learning import Activation
-from wristctl.learning.checkpoint import fingerprint, read_checkpoint, write_checkpoint
+from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt, blocks
 from wristctl.learning.network import LEAK, Network, Scaler
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
+from wristctl.records.files import replacing
+
+
+def fingerprint(samples: Samples, job: Job) -> str:
+    """A hash of everything that a training depends on."""
+    digest = hashlib.sha256(job.settings.model_dump_json().encode())
+    split = job.split
+    for array in (samples.inputs, samples.theta, split.train, split.validation, job.seed.generate_state(4)):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def write_checkpoint(file: Path, mark: str, state: dict[str, object]) -> None:
+    """Put away the state of the training with this fingerprint, in one piece."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    content = io.BytesIO()
+    torch.save({"training": mark, "state": state}, content)
+    with replacing(file) as temporary:  # by Python: where the disk refuses, torch says RuntimeError and no errno
+        temporary.write_bytes(content.getvalue())
+
+
+def read_checkpoint(file: Path, mark: str) -> dict[str, Any]:
+    """The state of the training with this fingerprint; UserError where it is another's or cannot be read."""
+    try:
+        found = torch.load(file, weights_only=True, map_location="cpu")
+        training, state = found["training"], found["state"]
+    except (RuntimeError, OSError, EOFError, KeyError, TypeError, BadZipFile, pickle.UnpicklingError) as error:
+        raise UserError("not a readable checkpoint", str(file), "delete it, or train without resume") from error
+    if training != mark:
+        raise UserError(
+            "the checkpoint is of a training with other settings, data or seed",
+            str(file),
+            "resume with the config.yaml of the run that was stopped",
+        )
+    return dict(state)
+
 
 DTYPE = torch.float64
 """Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding."""

@@ -1,14 +1,12 @@
 """Trainings: what each is given, and what came of it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from wristctl.config.errors import UserError
 from wristctl.config.learning import NetworkSettings
+from wristctl.errors import UserError
 from wristctl.learning.dataset import Split
 from wristctl.learning.network import Network
 

@@ -4,8 +4,6 @@ What comes out of an archive is somebody's word: it is written where names insid
 else, nothing of it is run or loaded, and a run whose files are not those sealed does not arrive.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -19,16 +17,14 @@ from os.path import lexists
 from pathlib import Path
 from typing import NamedTuple
 
-from wristctl.config.errors import UserError
-from wristctl.config.sha256sums import read_seal, unreadable
-from wristctl.config.system_errors import writing
-from wristctl.config.wording import FILE
+from wristctl.errors import FILE, UserError, writing
 from wristctl.records.files import PART, replacing, sync, sync_all
 from wristctl.records.index import dated
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
+from wristctl.sha256sums import read_seal, unreadable
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
 MOST_FILES = 50_000

@@ -1,15 +1,13 @@
 """What differs between two runs, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wristctl.config.strict_yaml import parse_yaml
 from wristctl.records.manifest import CONFIG, PACKAGES, SOURCES
 from wristctl.records.run import Run
+from wristctl.study_files.strict_yaml import parse_yaml
 
 _FACTS = ("python", "os", "machine", "cpu", "cores")
 

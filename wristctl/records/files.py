@@ -1,7 +1,5 @@
 """Files that are either whole or absent, even after a power cut, and their hashes."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os
@@ -11,9 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from wristctl.config.errors import UserError
-from wristctl.config.system_errors import writing
-from wristctl.config.wording import OUT, Phrase
+from wristctl.errors import OUT, Phrase, UserError, writing
 
 PART = ".part"
 """End of the hidden name of a file that is being written."""

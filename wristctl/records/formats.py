@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.records.files import replacing
 
 if TYPE_CHECKING:

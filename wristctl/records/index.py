@@ -1,7 +1,5 @@
 """One line about each run of a results folder, from the manifests or from a disposable index of them."""
 
-from __future__ import annotations
-
 import json
 import os
 import stat
@@ -12,10 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from wristctl.config.errors import UserError
-from wristctl.config.wording import OUT
-from wristctl.records.manifest import MANIFEST, SUMS
-from wristctl.records.overview import read_overview
+from wristctl.errors import OUT, UserError
+from wristctl.records.manifest import MANIFEST, SUMS, read_overview
 from wristctl.records.run import Run
 
 RESULTS = Path("results")

@@ -1,7 +1,5 @@
 """What happens during a run as lines: events.jsonl for programs, console.log for people."""
 
-from __future__ import annotations
-
 import json
 import logging
 import math

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.records.index import indexed
 from wristctl.records.manifest import Input
 from wristctl.records.run import Run

@@ -3,8 +3,6 @@
 Where a file system has no locks (some NFS, FUSE), the file itself has to do: its run goes on while it is there.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

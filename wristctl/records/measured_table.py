@@ -4,8 +4,6 @@ Columns stand in any order; lines that begin with # say nothing. A table of a ru
 units in run.json.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -16,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError, meant
+from wristctl.errors import UserError, meant
 from wristctl.records.files import sha256_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import Run

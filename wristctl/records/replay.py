@@ -2,15 +2,136 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.records.difference import Change, difference
-from wristctl.records.file_comparison import compare_files
+from wristctl.records.files import sha256_of
+from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lineage import input_run
 from wristctl.records.manifest import CONFIG, MANIFEST
 from wristctl.records.run import Run
 from wristctl.records.seal import CHANGED
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+
+RELATIVE, ABSOLUTE = 1e-6, 1e-9
+"""Numbers alike: |now - before| <= ABSOLUTE + RELATIVE |before|; other processors and libraries round differently."""
+_PIXELS = 0.02
+"""Pictures alike: mean difference of their pixels, of 1."""
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+class FileComparison(NamedTuple):
+    """A verdict, and where the files differ or by how much."""
+
+    verdict: Literal["identical", "within tolerance", "differs"]
+    detail: str = ""
+
+
+def compare_files(before: Path, after: Path) -> FileComparison:
+    """Compare two files of the same name by what they hold."""
+    if sha256_of(before) == sha256_of(after):
+        return FileComparison("identical")
+    try:
+        match before.suffix:
+            case ".csv":
+                return _compare_tables(read_table(before), read_table(after))
+            case ".npz":
+                return _compare_arrays(read_arrays(before), read_arrays(after))
+            case ".safetensors":
+                from safetensors.numpy import load_file
+
+                return _compare_arrays(load_file(before), load_file(after))
+            case ".png":
+                from matplotlib.image import imread
+
+                return _compare_pictures(imread(before), imread(after))
+            case _:
+                return _compare_texts(before.read_text(encoding="utf-8"), after.read_text(encoding="utf-8"))
+    except Exception as error:  # each format's reader has errors of its own for a file that is damaged
+        return FileComparison("differs", f"cannot be compared by content: {error}")
+
+
+def _compare_tables(a: pd.DataFrame, b: pd.DataFrame) -> FileComparison:
+    if a.shape != b.shape:
+        return FileComparison("differs", f"{_size(a)} before, {_size(b)} now")
+    renamed = [f"column {x} before, {y} now" for x, y in zip(a.columns, b.columns, strict=True) if x != y]
+    if renamed:
+        return FileComparison("differs", renamed[0])
+    columns = {str(name): (a[name].to_numpy(), b[name].to_numpy()) for name in a.columns}
+    return _first_difference(columns, a["time"].to_numpy() if "time" in a else None, "column")
+
+
+def _size(frame: pd.DataFrame) -> str:
+    return f"{len(frame)} rows of {len(frame.columns)} columns"
+
+
+def _compare_arrays(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> FileComparison:
+    shapes = [{name: array.shape for name, array in each.items()} for each in (a, b)]
+    if shapes[0] != shapes[1]:
+        unlike = sorted(name for name in shapes[0] | shapes[1] if shapes[0].get(name) != shapes[1].get(name))
+        return FileComparison(
+            "differs", f"array {unlike[0]}: {shapes[0].get(unlike[0])} before, {shapes[1].get(unlike[0])} now"
+        )
+    return _first_difference({name: (a[name], b[name]) for name in a}, a.get("time"), "array")
+
+
+def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -> FileComparison:
+    """The earliest place at which any pair of arrays differs; the first of the pairs where several do."""
+    import numpy as np
+
+    places, largest = [], 0.0
+    for name, (a, b) in pairs.items():
+        if np.issubdtype(a.dtype, np.number) and np.issubdtype(b.dtype, np.number):
+            alike = np.isclose(b, a, rtol=RELATIVE, atol=ABSOLUTE, equal_nan=True)
+            with np.errstate(invalid="ignore", over="ignore"):  # infinities, which are left out below
+                differences = np.abs(a.astype(float) - b.astype(float))
+            largest = max(largest, float(np.nanmax(differences[np.isfinite(differences)], initial=0.0)))
+        else:
+            alike = (a == b) | ((a != a) & (b != b))
+        if not np.all(alike):
+            at = tuple(int(k) for k in np.argwhere(~np.atleast_1d(alike))[0])
+            known = time is not None and (time.shape == a.shape or time.shape == a.shape[:1])
+            instant = float(time[at] if known and time.shape == a.shape else time[at[0]]) if known else math.inf
+            row = at[0] if len(at) == 1 else list(at)
+            places.append((instant, at, f"{what} {name} from " + (f"time {instant:g} s" if known else f"row {row}")))
+    if not places:
+        return FileComparison("within tolerance", f"largest difference {largest:.2g}")
+    *_, place = min(places, key=lambda found: found[:2])
+    return FileComparison("differs", f"{place}; largest difference {largest:.2g}")
+
+
+def _compare_pictures(a: np.ndarray, b: np.ndarray) -> FileComparison:
+    import numpy as np
+
+    if a.shape != b.shape:
+        return FileComparison("differs", f"{a.shape[1]} x {a.shape[0]} pixels before, {b.shape[1]} x {b.shape[0]} now")
+    mean = float(np.abs(a.astype(float) - b.astype(float)).mean())
+    return FileComparison(
+        "within tolerance" if mean <= _PIXELS else "differs", f"mean difference of pixels {mean:.2g} of 1"
+    )
+
+
+def _compare_texts(a: str, b: str) -> FileComparison:
+    """Text alike but for numbers within tolerance: JSON, SVG."""
+    if _NUMBER.sub("0", a) != _NUMBER.sub("0", b):
+        line = next((n for n, (x, y) in enumerate(zip(a.splitlines(), b.splitlines(), strict=False), 1) if x != y), 1)
+        return FileComparison("differs", f"from line {line}")
+    numbers_a, numbers_b = list(_NUMBER.finditer(a)), list(_NUMBER.finditer(b))
+    largest = 0.0
+    for x, y in zip(numbers_a, numbers_b, strict=True):
+        difference = abs(float(x[0]) - float(y[0]))
+        if difference > ABSOLUTE + RELATIVE * abs(float(x[0])):
+            return FileComparison("differs", f"line {a.count(chr(10), 0, x.start()) + 1}: {x[0]} before, {y[0]} now")
+        largest = max(largest, difference)
+    return FileComparison("within tolerance", f"largest difference {largest:.2g}")
 
 
 class ReplayVerdict(NamedTuple):

@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError
 
-from wristctl.config.errors import UserError, meant
-from wristctl.config.load import load_study
-from wristctl.config.sha256sums import read_seal, unreadable
 from wristctl.config.study import Study
-from wristctl.config.wording import Call
+from wristctl.errors import Call, UserError, meant
 from wristctl.records.files import LINK, files_below
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
@@ -28,6 +25,8 @@ from wristctl.records.seal import (
     faults_of_files,
     faults_of_manifest,
 )
+from wristctl.sha256sums import read_seal, unreadable
+from wristctl.study_files.load import load_study
 
 if TYPE_CHECKING:
     import numpy as np

@@ -4,8 +4,6 @@ It shows accidents: a lost, changed, swapped or added file, a copy cut short. It
 can seal a directory anew, which is what `wristctl runs sign` and `verify --signed` are for (records/signature.py).
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ The seal finds accidents; a signature finds people. It says that the holder of a
 run as it is, and needs somebody who says whose key that is: an allowed signers file, as git and ssh-keygen have it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -13,9 +11,7 @@ import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
-from wristctl.config.errors import UserError
-from wristctl.config.system_errors import error_of_the_system
-from wristctl.config.wording import Call
+from wristctl.errors import Call, UserError, error_of_the_system
 from wristctl.records.files import write_text
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run

@@ -1,7 +1,5 @@
 """Begin a run and see to its end, whichever way it ends."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -13,19 +11,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from wristctl.config.errors import UserError
 from wristctl.config.foreign import Foreign
-from wristctl.config.resolved import config_hash, resolved_yaml
 from wristctl.config.study import Study
-from wristctl.config.system_errors import error_of_the_system
-from wristctl.config.wording import OUT, Argument
+from wristctl.errors import OUT, Argument, UserError, error_of_the_system
 from wristctl.interrupt import deferred, interrupts, undisturbed
-from wristctl.records.code import code_state
-from wristctl.records.environment import environment_state
+from wristctl.records.copied_inputs import SealedFiles, copy_code, sealed_files, write_files
 from wristctl.records.files import replacing, sha256_of, sync, write_text
-from wristctl.records.foreign_code import copy_code
 from wristctl.records.journal import now
-from wristctl.records.live import LiveRun, Page
 from wristctl.records.lock import RunLock
 from wristctl.records.manifest import (
     CONFIG,
@@ -39,8 +31,10 @@ from wristctl.records.manifest import (
     Manifest,
     Timing,
 )
+from wristctl.records.provenance import code_state, environment_state
 from wristctl.records.run import Run
-from wristctl.records.sealed_files import SealedFiles, sealed_files, write_files
+from wristctl.records.run_writer import LiveRun, Page
+from wristctl.study_files.resolved import config_hash, resolved_yaml
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,12 @@
 """Tags of runs: in `tags.json` beside the run directories, because a sealed directory does not change."""
 
-from __future__ import annotations
-
 import json
 import logging
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.records.files import write_text
 from wristctl.records.lock import locked
 

@@ -9,8 +9,6 @@ A host sends steps and believes what they are: it counts in lengths and pulls of
 deliver for that count is the world's (`Winding`).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Does a loop get where it is asked to, and if not, why: told from its course, never from saturation alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.simulation.trajectory import Trajectory, rests

@@ -1,7 +1,5 @@
 """A batch of rollouts as the kernel wants it: its parts as blocks of lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Closed loops out of rollouts: trajectories, and the loop of a study's `simulate` section, repeated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 
@@ -10,12 +8,12 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
-from wristctl.config.errors import UserError
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.errors import UserError
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import of_trajectory

@@ -9,8 +9,6 @@ doubt as well.
 A rollout in doubt runs again with 2, 4, 8, ... times as many steps, until its numbers stay what they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import Event
 

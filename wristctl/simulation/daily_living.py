@@ -6,8 +6,6 @@ extension -, ulnar deviation + and radial deviation - (Wu et al., ISB, J. Biomec
 its plane is named. Two-plane motions are shown by the component that their plane has.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

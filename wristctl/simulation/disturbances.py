@@ -3,8 +3,6 @@
 The entries of `wristctl.config.choices.DISTURBANCES`: their forces add, their scales of the stiffness multiply.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ Another leaf, reference or world changes nothing for those that were there. What
 are draws of different names.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.config.families import Family

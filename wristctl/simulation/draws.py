@@ -4,8 +4,6 @@ Nothing here knows of rows: in a repetition all controllers, gains, inverses and
 draw of the plant (common random numbers), and another row, loop or reference changes nothing for those that were there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

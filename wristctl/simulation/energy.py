@@ -1,7 +1,5 @@
 """The work that is done on a wrist."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,13 +1,11 @@
 """References that never rest, or rest nowhere in particular: what a loop is tried and identified with."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
+from wristctl.errors import UserError
 from wristctl.seeds import stream
 from wristctl.simulation.reference import ReferenceKind
 

@@ -1,7 +1,5 @@
 """The camera: when frames are taken and used, and what each rollout's frames add to the angle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 All that the study will run is compiled by them.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence

@@ -3,8 +3,6 @@
 reference -> law -> allocation -> actuator -> plant with its disturbances -> metrics, sensor and observer -> law.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from wristctl.control.law import now_of

@@ -5,8 +5,6 @@ rests; a reference that does not rest before the horizon has neither settling ti
 that act, of one tendon of each side. Of all metrics less is better.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The smooth move of a hand."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.arrays import Array

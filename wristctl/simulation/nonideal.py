@@ -1,7 +1,5 @@
 """What ideal tendons and springs leave out, from a study's leaves: values, states, and spools that slip."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

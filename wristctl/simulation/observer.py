@@ -5,8 +5,6 @@ would otherwise stay as an error. A frame is fused at its capture time; from the
 what the motors have delivered since. The gain is the stationary one for the frame rate.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment

@@ -4,8 +4,6 @@ Half the peak-to-peak of the angle over the last second, its trend removed. Of a
 error's, over the last second or the last two of its periods, with all up to four times its frequency removed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import lru_cache

@@ -6,8 +6,6 @@ are the rate and the acceleration. With `noise_deg` a quintic smoothing spline p
 Curve and Surface Fitting with Splines, 1993). Time counts from the first sample; after the last the angle is held.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError, meant
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
+from wristctl.errors import UserError, meant
 from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected, MeasuredTable
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.wrist.kinematics import exact_arc

@@ -1,7 +1,5 @@
 """References: wanted angles or tip positions, evaluated into theta_ref and its derivatives before the loop runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -13,12 +11,12 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.choices import REFERENCES as _TABLE
 from wristctl.config.choices import Choices
-from wristctl.config.errors import UserError
-from wristctl.config.foreign import raised_at
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.interrupt import from_outside
+from wristctl.plugins.places import raised_at
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.targets import Targets, targets_of
 from wristctl.wrist.directions import DIRECTIONS

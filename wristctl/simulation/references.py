@@ -1,7 +1,5 @@
 """The kinds of references: the entries of `wristctl.config.choices.REFERENCES`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.arrays import Array

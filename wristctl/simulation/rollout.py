@@ -1,7 +1,5 @@
 """Rollouts: many closed loops of one controller at once, as blocks of lanes over threads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from threading import Event
 from typing import Literal
@@ -15,8 +13,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_rows
-from wristctl.lanes.cores import cores
-from wristctl.lanes.stoppable_threads import stoppable
+from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled

@@ -1,7 +1,5 @@
 """The settling time that is left when the reference's own motion is over."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.arrays import Array

@@ -1,13 +1,11 @@
 """What a study asks of a computer, before anything is allocated: steps to integrate, and memory for its courses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Loop
-from wristctl.lanes.cores import cores
+from wristctl.errors import UserError
+from wristctl.processes import cores
 from wristctl.simulation.batch import sample_period
 
 MOST_STEPS = 1e10

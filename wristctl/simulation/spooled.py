@@ -4,8 +4,6 @@ A winch that keeps a pull P is a spool behind a tendon so soft that nothing the 
 reeled in anew before each step: the element with its friction is the same for both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from threading import Event
 from typing import Any, NamedTuple
@@ -17,10 +15,9 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
-from wristctl.lanes.cores import cores
 from wristctl.lanes.lane import where
 from wristctl.lanes.rows import part, rows_of
-from wristctl.lanes.stoppable_threads import stoppable
+from wristctl.processes import cores, stoppable
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.wrist.elastic import Nonideal, Tendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
 from wristctl.wrist.moving import advance_or_stop

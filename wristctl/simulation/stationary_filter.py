@@ -1,7 +1,5 @@
 """The stationary Kalman filter behind a camera: its gain, and the error that it expects of itself."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple

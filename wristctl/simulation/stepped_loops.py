@@ -4,8 +4,6 @@ They are the loops of `rollout`, in its kernel: the law there reads the torque t
 next is looked up between two samples by what the kernel itself calls; a frame is taken and fused once, whoever asks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

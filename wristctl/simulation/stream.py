@@ -1,7 +1,5 @@
 """Streams of rollouts: as many as one likes in the memory of one batch."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import numpy as np

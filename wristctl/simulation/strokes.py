@@ -3,8 +3,6 @@
 The side that does not pull stays at pretension. What friction does is what differs from that.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.simulation.spooled import SpooledWrist
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dead_band import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with

@@ -4,8 +4,6 @@ e = theta - theta_ref (E12), sampled at the control ticks. The move is the time 
 those that act, of one tendon of each side.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

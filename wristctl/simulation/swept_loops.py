@@ -1,7 +1,5 @@
 """Closed loops that differ in any of their numbers, run beside each other as lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import NamedTuple

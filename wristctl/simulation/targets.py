@@ -1,16 +1,14 @@
 """Targets of a reference: where its moves end."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from wristctl.config.errors import UserError
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.wrist.kinematics import arc_tip, exact_arc
 
 Targets = Literal["end", "angles_deg", "tips", "none"]

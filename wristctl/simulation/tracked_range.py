@@ -1,7 +1,5 @@
 """How much of a motion's range a wrist really follows: of daily living, where its two degrees are what hands notice."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.simulation.metrics import Metric

@@ -1,7 +1,5 @@
 """The world that a rollout runs in, which may differ from what its controller knows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
@@ -9,14 +7,13 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
-from wristctl.config.keys import unit_of
 from wristctl.config.loop import Loop
-from wristctl.config.plant import Actuator, Sensor, TrueWrist
+from wristctl.config.plant import Actuator, Sensor, TrueWrist, is_unsaid
 from wristctl.config.section import Section
-from wristctl.config.truth import is_unsaid
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.seeds import Entropy
+from wristctl.study_files.keys import unit_of
 from wristctl.wrist.directions import in_plane
 
 P = TypeVar("P", bound=TrueWrist)

@@ -1,7 +1,5 @@
 """From and up to which swing of the wrist a loop is as its linearisation says, where it begins to swing."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
-"""All that the linearised loop tells about one resting point."""
+"""All that the linearised loop tells about one resting point, with its answer to a step and its root locus."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +13,126 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.stability.linear_range import LinearityLimit, Swing, linearity_limits
 from wristctl.stability.linearise import LinearLoop, linearise
-from wristctl.stability.margins import Margins, frequencies, margins
-from wristctl.stability.root_locus import RootLocus, root_locus
-from wristctl.stability.sampled_loop import Complex, SampledLoop
+from wristctl.stability.margins import NEUTRAL, Margins, frequencies, margins
+from wristctl.stability.sampled_loop import Complex, Mode, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading
-from wristctl.stability.step_response import StepResponse, step_response
+
+_DECAYED, _LONGEST, _SAMPLES = 1e-5, 60.0, 20_000
+_SLOW = 30.0 * NEUTRAL
+"""Decay [1/s] of what does not end within the longest time [s]: it is left out of how long to look."""
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """The angle after a step of 1 of its reference at 0, (T,) at times [s], and what is told of it.
+
+    Rise from 10 to 90 %, overshoot, and the time until it stays within 2 %, all of where it ends; `final` is that, as a
+    share of the step. nan where the loop is unstable.
+    """
+
+    time: Array
+    angle: Array
+    rise: float
+    overshoot: float
+    settling: float
+    final: float
+
+
+def step_response(loop: SampledLoop) -> StepResponse:
+    """The step response of a loop until it has settled, sampled at its ticks (every so many in a long one)."""
+    rates = [mode.growth for mode in loop.modes()]
+    if max(rates) > NEUTRAL:
+        return StepResponse(np.zeros(0), np.zeros(0), *(4 * [math.nan]))
+    slowest = min((-rate for rate in rates if rate < -_SLOW), default=1.0)
+    lasts = min(-math.log(_DECAYED) / slowest, _LONGEST)
+    time, angle = _course(loop, lasts)
+    return StepResponse(time, angle, *step_info(time, angle))
+
+
+def step_info(time: Array, angle: Array) -> tuple[float, float, float, float]:
+    """Rise [s], overshoot (share), settling [s] and final value of a response (T,), which ends at its last sample."""
+    final = float(angle[-1])
+    share = angle / final
+    rise = float(time[np.argmax(share >= 0.9)] - time[np.argmax(share >= 0.1)])
+    outside = np.flatnonzero(np.abs(share - 1.0) >= 0.02)
+    settling = float(time[outside[-1] + 1]) if len(outside) else 0.0
+    return rise, max(float(share.max()) - 1.0, 0.0), settling, final
+
+
+def _course(loop: SampledLoop, lasts: float) -> tuple[Array, Array]:
+    """Every tick, or, where that were too many, every so many cycles; from one to the next they are one map."""
+    count, cycle = math.ceil(lasts / loop.period), len(loop.ticks)
+    whole, forced = np.eye(len(loop.ticks[0].into)), np.zeros(len(loop.ticks[0].into))
+    rows, pushes = [], []
+    for tick in loop.ticks:
+        rows.append(tick.outputs["theta"] @ whole)
+        pushes.append(tick.outputs["theta"] @ forced)
+        whole, forced = tick.transition @ whole, tick.transition @ forced + tick.reference
+    stride = max(1, count // (_SAMPLES * cycle))
+    if stride > 1:
+        rows, pushes = rows[:1], pushes[:1]
+        one, push = whole, forced
+        for _ in range(stride - 1):
+            whole, forced = one @ whole, one @ forced + push
+    state, found = np.zeros(len(forced)), []
+    for _ in range(math.ceil(count / (cycle * stride)) + 1):
+        found.append(np.array(rows) @ state + pushes)
+        state = whole @ state + forced
+    angle = np.concatenate(found)
+    each = loop.period * (cycle * stride if stride > 1 else 1)
+    return each * np.arange(len(angle), dtype=np.float64), angle
+
+
+_POINTS, _HALVINGS = 41, 12
+At = Callable[[float], SampledLoop | None]
+"""The closed loop with a gain times a factor; None where it rests nowhere near."""
+
+
+@dataclass(frozen=True)
+class RootLocus:
+    """Poles as (growth [1/s], frequency [Hz]) rows (poles, 2) at each of the factors (G,) of the gain.
+
+    `least` and `most` are the factors between which it is stable, about 1; 0 and inf where no limit was met within
+    what was looked at, nan where it is not stable at 1. `swings` are the frequencies [Hz] at these limits.
+    """
+
+    over: str
+    factors: Array
+    poles: Sequence[Array]
+    least: float
+    most: float
+    swings: tuple[float, float]
+
+
+def root_locus(over: str, at: At, span: float) -> RootLocus:
+    """The locus from 1/span to span times the gain, of the loop that `at` gives."""
+    factors = np.geomspace(1.0 / span, span, _POINTS)
+    modes = [_modes(at, float(each)) for each in factors]
+    poles = [np.array([(mode.growth, mode.frequency) for mode in each]).reshape(-1, 2) for each in modes]
+    stable = [bool(each) and each[0].growth < NEUTRAL for each in modes]
+    middle = _POINTS // 2
+    if not stable[middle]:
+        return RootLocus(over, factors, poles, math.nan, math.nan, (math.nan, math.nan))
+    low = next((k for k in range(middle, -1, -1) if not stable[k]), None)
+    high = next((k for k in range(middle, _POINTS) if not stable[k]), None)
+    least, slow = (0.0, math.nan) if low is None else _limit(at, float(factors[low + 1]), float(factors[low]))
+    most, fast = (math.inf, math.nan) if high is None else _limit(at, float(factors[high - 1]), float(factors[high]))
+    return RootLocus(over, factors, poles, least, most, (slow, fast))
+
+
+def _modes(at: At, factor: float) -> list[Mode]:
+    loop = at(factor)
+    return [] if loop is None else loop.modes()
+
+
+def _limit(at: At, good: float, bad: float) -> tuple[float, float]:
+    """The limit between a factor with which it is stable and one with which it is not, and its swing there [Hz]."""
+    for _ in range(_HALVINGS):
+        middle = math.sqrt(good * bad)
+        modes = _modes(at, middle)
+        good, bad = (middle, bad) if modes and modes[0].growth < NEUTRAL else (good, middle)
+    found = _modes(at, bad)
+    return good, found[0].frequency if found else math.nan
 
 
 @dataclass(frozen=True)

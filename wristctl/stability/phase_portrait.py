@@ -1,7 +1,5 @@
 """How the nonlinear loop comes to its sliding surface, from angles to both sides of where it rests."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

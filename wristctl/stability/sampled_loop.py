@@ -1,7 +1,5 @@
 """A linear loop in discrete time that repeats after a cycle of ticks: its poles, and its answer to a cut."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

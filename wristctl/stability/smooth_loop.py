@@ -1,7 +1,5 @@
 """A loop without what has no derivative, so that its compiled code can be differentiated at rest."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Literal

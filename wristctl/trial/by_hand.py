@@ -1,16 +1,14 @@
 """Motors moved by a person's word: before anything is known of the wrist, or after something went wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from wristctl.board.board_errors import BoardError, Refused
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Result, Target
 from wristctl.config.hw_run import RigSettings
-from wristctl.trial.patience import Patience
-from wristctl.trial.prepare import prepare
+from wristctl.trial.motors_ready import prepare
 from wristctl.trial.spools import spools_of
+from wristctl.trial.supervised_wait import Patience
 
 MOST = 5e-3
 """Tendon [m] that one word may move."""

@@ -1,20 +1,17 @@
 """A rig's calibration as a run keeps it: what stays true of the rig, and where its motors stood."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any, Self
 
 from wristctl.board.board_errors import BoardError
 from wristctl.board.driver import Board
-from wristctl.config.errors import UserError
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.trial.homing import Zero, find_zero, slacken
-from wristctl.trial.in_sight import in_sight
-from wristctl.trial.prepare import prepare
+from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.testbeds import Testbed
 

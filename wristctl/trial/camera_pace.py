@@ -1,7 +1,5 @@
 """What a camera gives: how many pictures, how old they are when they come, and what is wrong with them, in words."""
 
-from __future__ import annotations
-
 from collections import Counter, deque
 
 import numpy as np

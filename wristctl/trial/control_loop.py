@@ -4,8 +4,6 @@ One tick is one exchange with the board: step rates out, status back. What the s
 input, a frame is fused at its capture time. Everything runs on the transport's clock.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -15,22 +13,21 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag
-from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
+from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
-from wristctl.trial.following import Following
-from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog, of_axes
-from wristctl.trial.oddities import Oddities
-from wristctl.trial.patience import InSight, Patience
 from wristctl.trial.safety import Monitor, SafetyStop, Seen
 from wristctl.trial.spools import Paths, spools_of
-from wristctl.trial.steering import Answer, Steering
+from wristctl.trial.steering import Answer, HostFaults, Steering
+from wristctl.trial.supervised_wait import InSight, Patience
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
+from wristctl.trial.tracking_monitor import Following
+from wristctl.trial.warnings_report import Oddities
 
 Shown = Callable[[dict[str, Any]], None]
 """Takes each tick's row of the log, to show it."""

@@ -1,7 +1,5 @@
 """The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,31 +7,27 @@ import numpy as np
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES
-from wristctl.config.errors import UserError
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Disturbances
-from wristctl.config.system_errors import fix_of
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.draws import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
-from wristctl.trial.following import Following, Greatest
-from wristctl.trial.halt import Halt, halt
 from wristctl.trial.homing import Zero, check_zero, find_zero, slacken
-from wristctl.trial.host_faults import HostFaults
 from wristctl.trial.log import TrialLog
-from wristctl.trial.patience import Patience
-from wristctl.trial.prepare import prepare
+from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
-from wristctl.trial.steering import Steering
+from wristctl.trial.steering import HostFaults, Steering
+from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.trial_motions import at_rest, back, motion_of
-from wristctl.trial.trials import Trial
+from wristctl.trial.tracking_monitor import Following, Greatest
+from wristctl.trial.trials import Trial, at_rest, back, motion_of
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 

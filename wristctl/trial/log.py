@@ -1,7 +1,5 @@
 """The log of trials: tables that are written as they come, and lose nothing when the disk is full."""
 
-from __future__ import annotations
-
 import errno
 import math
 import os
@@ -15,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.records.live import RESERVE
+from wristctl.records.run_writer import RESERVE
 from wristctl.wrist.directions import ACTIVE
 
 Columns = Mapping[str, tuple[str, str]]

@@ -1,7 +1,5 @@
 """Can this rig run the configured loop? What its link, camera and computer do, measured, and what is wrong with it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,21 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.check import RoundTrips, round_trips
+from wristctl.board.check import RoundTrips, latency_timer, round_trips, shorter
 from wristctl.board.driver import Board
 from wristctl.board.messages import LAYOUTS, Command, Rate
-from wristctl.board.usb_adapter import latency_timer, shorter
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.camera_pace import FIX, CameraPace
-from wristctl.trial.rig_strokes import RigStrokes
-from wristctl.trial.step_latency import Latency, find_latency
+from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
 from wristctl.trial.tick_timing import SCHEDULING
 from wristctl.trial.tracking import Tracking
 from wristctl.vision.camera import CameraError, Frame
+from wristctl.vision.detector import PictureQuality, quality_of
 from wristctl.vision.marker import Sighting, SightingVerdict
-from wristctl.vision.picture_quality import PictureQuality, quality_of
 
 _TRIPS, _WATCHED, _SLEPT = 100, 2.0, 1.0
 """Commands timed; seconds for which the camera is watched, and for which the computer is woken every period."""

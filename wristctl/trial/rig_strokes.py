@@ -1,22 +1,149 @@
-"""Strokes of one motor before the camera: it takes its tendon up until the wrist bends, then reels in fast."""
-
-from __future__ import annotations
+"""Strokes of one motor before the camera, and the picture's age that they show."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import OptimizeResult, least_squares, minimize_scalar
+from scipy.signal import bilinear, lfilter
 
+from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
-from wristctl.config.hw_run import RigSettings
-from wristctl.trial.patience import Patience
-from wristctl.trial.prepare import prepare
-from wristctl.trial.ramped_move import RampedMove
+from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
+from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.step_latency import MotorStroke
+from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tracking import Tracking
+
+_BRAKING = 0.9
+"""Of its acceleration the board plans to brake with (motion.c)."""
+_EARLY, _LATE = 0.1, 0.05
+"""Seconds before and after the first answer between which it is looked for when a move began."""
+
+
+class RampedMove(NamedTuple):
+    """From rest to rest, `distance` steps away, either sign; rates in steps/s, acceleration in steps/s^2."""
+
+    distance: float
+    rate: float
+    acceleration: float
+
+    def course(self, time: Array) -> Array:
+        """Steps made (n,), so many seconds (n,) after it began."""
+        far, speeding, braking = abs(self.distance), self.acceleration, _BRAKING * self.acceleration
+        top = min(self.rate, math.sqrt(2.0 * far * speeding * braking / (speeding + braking)))
+        up, down = top / speeding, top / braking
+        level = (far - 0.5 * top * (up + down)) / top
+        left = up + level + down - time
+        going = 0.5 * speeding * np.clip(time, 0.0, up) ** 2 + top * np.clip(time - up, 0.0, level)
+        made = np.where(time < up + level, going, far - 0.5 * braking * np.clip(left, 0.0, down) ** 2)
+        return np.asarray(math.copysign(1.0, self.distance) * made)
+
+    def began(self, time: Array, made: Array) -> float:
+        """When it began [s], by the steps made (n,) at times (n,) [s], the first of them where it was asked for."""
+
+        def misfit(begin: float) -> float:
+            return float(np.sum((self.course(time - begin) - made) ** 2))
+
+        bounds = float(time[0]) - _EARLY, float(time[0]) + _LATE
+        return float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
+
+
+_STEP = 1e-3
+"""Seconds between two samples of the model's course."""
+_SLOW = 0.15
+"""Time constant [s] of the slow part. Without one an age comes out 2 to 3 ms too large on the emulated rig, 5 where
+sheaths rub, and off by 6 to 8 where one plane is half as stiff as the other; half or twice as long a time changes 1."""
+_LATEST = 0.5
+"""Delay [s] beyond which nothing is looked for."""
+_DELAYS, _RATES, _DAMPING = np.arange(0.0, 0.4, 0.02).tolist(), (15.0, 30.0, 60.0, 120.0), 0.5
+"""Delays [s] and natural frequencies [rad/s] of which the best begins the fit."""
+
+
+class MotorStroke(NamedTuple):
+    """One stroke of the motor: positions (n,) [steps] at times (n,) [s], and angles (m,) [rad] stamped (m,) [s]."""
+
+    time: Array
+    position: Array
+    stamped: Array
+    angle: Array
+
+
+class Latency(NamedTuple):
+    """What strokes tell."""
+
+    delay: float
+    """From the middle of an exposure to its time stamp [s]."""
+    sd: float
+    """Standard deviation of that [s], by the fit's residuals."""
+    rate: float
+    """The wrist's natural frequency on this tendon [rad/s]."""
+    scatter: float
+    """Of the angles about the fit [rad], a standard deviation."""
+    pictures: int
+
+
+def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
+    """The delay by which strokes were seen. ValueError for fewer than twenty pictures."""
+    count = sum(len(each.angle) for each in strokes)
+    if count < 20:
+        raise ValueError(f"{count} pictures are too few")
+
+    def fitted(begin: Array, parts: int) -> OptimizeResult:
+        def errors(x: Array) -> Array:
+            return _errors(strokes, _courses(strokes, float(np.exp(x[1])), float(np.exp(x[2]))), float(x[0]), parts)
+
+        bounds = [-0.05, np.log(3.0), np.log(0.02)], [_LATEST, np.log(1000.0), np.log(20.0)]
+        return least_squares(errors, begin, bounds=bounds, x_scale=[1e-3, 0.1, 0.1])
+
+    tried = []
+    for rate in _RATES:
+        courses = _courses(strokes, rate, _DAMPING)
+        tried += [(float(np.sum(_errors(strokes, courses, delay, 1) ** 2)), delay, rate) for delay in _DELAYS]
+    _, begin, rate = min(tried)
+    swing = fitted(np.array([begin, np.log(rate), np.log(_DAMPING)]), 1)  # alone, lest it be taken for the slow part
+    found = fitted(swing.x, 2)
+    free = max(1, count - len(strokes) - 5)
+    variance = 2.0 * float(found.cost) / free
+    slope = np.asarray(found.jac, np.float64)
+    covariance = variance * np.linalg.pinv(slope.T @ slope)
+    delay, rate = float(found.x[0]), float(np.exp(found.x[1]))
+    return Latency(delay, float(np.sqrt(covariance[0, 0])), rate, float(np.sqrt(variance)), count)
+
+
+class _Course(NamedTuple):
+    """How the model answers a stroke, from rest: at times (n,) [s], and so much of it slowly, (n,) each."""
+
+    time: Array
+    parts: tuple[Array, Array]
+
+
+def _errors(strokes: Sequence[MotorStroke], courses: Sequence[_Course], delay: float, parts: int) -> Array:
+    """Angles less the model's first parts; each stroke has its own angle to begin from, all have one gain of each."""
+    seen, shown = [], []
+    for each, course in zip(strokes, courses, strict=True):
+        model = np.array([np.interp(each.stamped - delay, course.time, part) for part in course.parts[:parts]]).T
+        seen.append(each.angle - each.angle.mean())
+        shown.append(model - model.mean(axis=0))
+    angle, model = np.concatenate(seen), np.concatenate(shown)
+    gains: Array = np.linalg.lstsq(model, angle, rcond=1e-9)[0]
+    return angle - model @ gains
+
+
+def _courses(strokes: Sequence[MotorStroke], rate: float, damping: float) -> list[_Course]:
+    swing = bilinear([rate**2], [1.0, 2.0 * damping * rate, rate**2], 1.0 / _STEP)
+    slow = bilinear([1.0], [_SLOW, 1.0], 1.0 / _STEP)
+    made = []
+    for each in strokes:
+        time = np.arange(each.time[0], each.time[-1], _STEP)
+        answer = lfilter(*swing, np.interp(time, each.time, each.position) - each.position[0])
+        made.append(_Course(time, (answer, lfilter(*slow, answer))))
+    return made
+
 
 COUNT, MOST = 24, 96
 """Strokes after which one may know enough; that are made at most."""
@@ -138,3 +265,26 @@ class RigStrokes:
             angles += [(each.time, each.theta) for each in self._tracking.look() if math.isfinite(each.theta)]
             clock.wait(1e-3)
         return np.array(positions, float).reshape(-1, 2), np.array(angles, float).reshape(-1, 2)
+
+
+class AxisTried(NamedTuple):
+    """What one motor does."""
+
+    sense: int
+    """1 where positive steps reel in, -1 where they pay out."""
+    taken_up: float
+    """Tendon [m] until the wrist bent by half of what it may."""
+    bend: float
+    """Of the wrist then [rad], + as the markers count."""
+
+
+def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, axis: int) -> AxisTried:
+    """Try an axis, let its tendon go again, and release the drives. Closes the testbed.
+
+    Raises SafetyStop where it bends the wrist too far, or not at all; BoardError and CameraError.
+    """
+    with in_sight(testbed, settings) as (board, _, tracking):
+        strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
+        steps, bend = strokes.taken_up()
+        strokes.let_go()
+    return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend)

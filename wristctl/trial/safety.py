@@ -1,7 +1,5 @@
 """When trials must stop: limits on what is measured, commanded and late."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from typing import NamedTuple
@@ -11,10 +9,9 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.board_errors import SAFETY_STOP
 from wristctl.board.messages import State
-from wristctl.config.errors import UserError
 from wristctl.config.hw_run import Safety
-from wristctl.config.wording import Phrase
 from wristctl.control.response import Estimate
+from wristctl.errors import Phrase, UserError
 from wristctl.trial.spools import Spools
 from wristctl.trial.steering import Answer
 

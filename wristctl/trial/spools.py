@@ -10,8 +10,6 @@ counted positive reeling in and zero where the tendon of the straight wrist is j
 delayed, `taut` would feed back positively with a gain near 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

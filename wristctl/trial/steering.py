@@ -1,7 +1,5 @@
 """The controller on hardware: the same compiled law, allocation and observer as in simulation, tick by tick."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -9,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.bench.faults import Faults
+from wristctl.config.bench import InjectedFault
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
@@ -123,3 +123,21 @@ def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minu
     known = load_segments(rows_of(model))
     zero = 0.0 * known.length
     predict(observer, drive, known, tick, plus + zero, minus + zero, h)
+
+
+class HostFaults:
+    """Those of the bench's faults that happen in the control loop; times count from the trial's motion."""
+
+    def __init__(self, faults: Sequence[InjectedFault]) -> None:
+        self._faults = Faults(faults)
+        self._faults.begin(0.0)
+
+    def answer(self, answer: Answer, time: float) -> Answer:
+        """The law's answer; NaN under model-nan. Raises ArithmeticError under controller-exception."""
+        if self._faults.on("controller-exception", time):
+            raise ArithmeticError("injected fault")
+        return answer._replace(torque_wanted=math.nan) if self._faults.on("model-nan", time) else answer
+
+    def disk(self, time: float) -> bool:
+        """Whether the disk is full."""
+        return self._faults.on("disk-full", time)

@@ -1,7 +1,5 @@
 """What trials stand on: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol
 
@@ -15,7 +13,7 @@ from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
-from wristctl.trial.patience import Meanwhile
+from wristctl.trial.supervised_wait import Meanwhile
 from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
 from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker

@@ -1,7 +1,5 @@
 """When the ticks of a loop began, against when they were due; who made them late; and when that must end a trial."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, deque
 from dataclasses import dataclass, field

@@ -1,16 +1,34 @@
-"""The trials of an experiment: which there are, in what order, and what one of them shows."""
+"""The trials of an experiment: their order, their motions, what the log shows of them, and each in simulation."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.config.controllers import SimulateSettings
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
-from wristctl.config.plant import Push
-from wristctl.wrist.directions import DIRECTIONS
+from wristctl.config.plant import Disturbances, Push
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.metrics import metrics_of, summed
+from wristctl.simulation.minimum_jerk import minimum_jerk
+from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.reference import motion
+from wristctl.simulation.repetitions import Simulation
+from wristctl.trial.spools import on_plus_side
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane
+from wristctl.wrist.kinematics import Inverse
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 _BEFORE = 0.5
 """Seconds before the push over which the load is taken as quiet."""
@@ -93,3 +111,102 @@ def recovery(time: Array, error: Array, move: float, end: float) -> float:
     if not len(outside):
         return 0.0
     return float(time[outside[-1] + 1] - end) if outside[-1] + 1 < len(time) else float("nan")
+
+
+def motion_of(
+    settings: HwRunSettings, wrist: WristParameters, direction: DirectionName, network: Inverse | None = None
+) -> Motion:
+    """A trial's motion in this direction, sampled at the control period, and worked out before any motor turns.
+
+    Raises UserError for one out of reach.
+    """
+    reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()
+    found = motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
+    if not np.isfinite(found.angles.rows).all():
+        raise UserError(
+            "the reference has samples that are no number", "reference", "a course that is finite everywhere"
+        )
+    return found
+
+
+def back(theta: float, duration: float, rest: float, period: float) -> Motion:
+    """From theta [rad] to straight in `duration` [s], and rest there."""
+    time: Array = np.arange(round((duration + rest) / period), dtype=np.float64) * period
+    course = -theta * minimum_jerk(time, duration)
+    course[0] += theta
+    angles = Angles.of(course)
+    return Motion(
+        time, angles, np.zeros((len(time), 2)),
+        turn=-theta, begin=0.0, rest=duration, horizon=duration + rest,
+    )  # fmt: skip
+
+
+def at_rest(duration: float, period: float) -> Motion:
+    """Straight for so long [s]."""
+    return back(0.0, duration, 0.0, period)
+
+
+JUDGED = ("rmse", "settling", "steady_state")
+"""The metrics of the paper's tables; also told of the true angle, where it is known."""
+
+_EARLY = 0.5
+"""Seconds by which a person may push too early."""
+_LEAST_PUSH = 0.01
+"""Load torque [N m] that counts as a push."""
+
+
+def evaluated(
+    trial: Trial, course: pd.DataFrame, followed: Motion, push: Push, period: float, truth: pd.DataFrame | None
+) -> dict[str, float]:
+    """Metrics of one whole trial by the estimated angle, of the true one as `true_...`, and what became of a push.
+
+    `course` holds its rows of the log, `truth` those of an emulated bench, whose push ends when it should; by the log
+    it ends when the estimated load has fallen again. All values are nan where the log is not whole.
+    """
+    time, theta, error = (course[name].to_numpy(float) for name in ("time", "theta", "error"))
+    names = [*summed(), *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
+    found = dict.fromkeys(names, math.nan)
+    if not len(time) or time[-1] < followed.horizon - 1.5 * period:
+        return found
+    grid, goals = followed.time, followed.goals
+    tensions = course[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
+    plus = on_plus_side(trial.plane)
+    sides = np.stack([tensions[:, plus].mean(axis=1), tensions[:, ~plus].mean(axis=1)], axis=1)
+    tension = np.stack([np.interp(grid, time, side) for side in sides.T], axis=1)
+    saturated = np.abs(course["torque_wanted"].to_numpy(float) - course["torque"].to_numpy(float)) > 1e-9
+
+    def judged(angle: Array) -> dict[str, float]:
+        flags = np.interp(grid, time, saturated.astype(float)) > 0.5
+        return metrics_of(period, angle, followed.theta_ref, tension, goals, flags)
+
+    found |= judged(np.interp(grid, time, theta))
+    if trial.push:
+        seen = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - _EARLY), _LEAST_PUSH)
+        if seen is not None:
+            found["push_torque"] = seen.torque
+            found["recovery"] = recovery(time, error, goals.move, seen.end)
+    if truth is not None and len(truth):
+        angle = np.interp(grid, truth["time"], truth["theta"])
+        found |= {f"true_{name}": value for name, value in judged(angle).items() if name in JUDGED}
+        if trial.push:
+            ended = push.start + push.duration
+            found["true_recovery"] = recovery(grid, angle - followed.theta_ref, goals.move, ended)
+    return found
+
+
+def twin(
+    study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None
+) -> Simulation:
+    """Simulate a trial of the study's hw-run section."""
+    settings = study.hw_run
+    row = settings.rows[trial.row]
+    disturbances = Disturbances(push=trial.pushed(settings.push))
+    chosen = SimulateSettings(
+        controller=row.controller,
+        gains=row.gains,
+        loop=settings.loop.model_copy(update={"disturbances": disturbances}),
+        reference=settings.reference,
+        direction=trial.direction,
+        horizon=settings.horizon,
+    )
+    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned).first

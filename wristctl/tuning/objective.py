@@ -1,13 +1,11 @@
 """What gains are worth: their metrics on many cases beside those of `feedforward` there, in decades."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.control import Objective
+from wristctl.config.controllers import Objective
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller

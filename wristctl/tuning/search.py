@@ -6,19 +6,23 @@ seen, among its best candidates and the law's presets, so that gains are not the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from wristctl.arrays import Array
-from wristctl.config.control import TuneSettings
-from wristctl.config.errors import UserError, meant
-from wristctl.config.foreign import contained
+from wristctl.config.controllers import TuneSettings
 from wristctl.config.study import Study
 from wristctl.control.law import Controller
+from wristctl.control.table import controller
+from wristctl.errors import UserError, meant
+from wristctl.plugins.places import contained
+from wristctl.seeds import stream
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case
 from wristctl.simulation.closed_loop import scenario_of
@@ -28,8 +32,46 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import loops_of
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
-from wristctl.tuning.space import GainSpace
+from wristctl.work.worker import Unit
 from wristctl.wrist.kinematics import Inverse
+
+if TYPE_CHECKING:
+    from wristctl.control.law import Gain
+
+
+@dataclass(frozen=True)
+class GainSpace:
+    """Boxes of g positive gains; a coordinate u in [0, 1] is the gain low * (high / low)^u."""
+
+    names: tuple[str, ...]
+    low: Array
+    """(g,)"""
+    high: Array
+    """(g,)"""
+
+    @classmethod
+    def of(cls, gains: Mapping[str, Gain]) -> GainSpace:
+        """The search boxes of a controller's gains, in their order."""
+        low, high = (np.array([getattr(gain, side) for gain in gains.values()]) for side in ("low", "high"))
+        return cls(tuple(gains), low, high)
+
+    @property
+    def decades(self) -> Array:
+        """Width of each box in powers of ten, (g,)."""
+        return np.log10(self.high / self.low)
+
+    def gains(self, unit: Array) -> Array:
+        """Gains (..., g) at points (..., g) of the unit cube; never outside the box by rounding."""
+        return np.clip(self.low * 10.0 ** (self.decades * unit), self.low, self.high)
+
+    def unit(self, gains: Array) -> Array:
+        """Points (..., g) of the unit cube of gains (..., g); UserError for a gain outside its box."""
+        outside = ~((gains >= self.low) & (gains <= self.high))
+        if outside.any():
+            at = int(np.argmax(outside.reshape(-1, len(self.names)).any(axis=0)))
+            box = f"{self.low[at]:g} to {self.high[at]:g}"
+            raise UserError(f"gain {self.names[at]} outside its search box", fix=f"start within {box}")
+        return np.log10(gains / self.low) / self.decades
 
 
 class Tried(NamedTuple):
@@ -233,3 +275,82 @@ def _chosen(controller: Controller, found: Search, judge: Judge, choose: Judge |
     return Search(
         controller.name, best, ordered[0].validated, found.evaluations, found.tried, found.restarts, ordered
     )  # fmt: skip
+
+
+def search_unit(study: Study, law: str) -> Unit:
+    """The search for gains of a law by the study's `tune` section, on worlds of the family that it names."""
+    family, settings = study.tune.worlds.family, study.tune
+    needed = study.model_copy(
+        update={
+            "families": {family: study.families[family]},
+            "tune": settings.model_copy(update={"controllers": (law,)}),
+        }
+    )
+    content = json.loads(needed.model_dump_json(by_alias=True, include={"seed", "wrist", "families", "tune"}))
+    rollouts = settings.candidates * settings.iterations * settings.restarts * settings.worlds.draws
+    rollouts += settings.finalists * settings.worlds.validation
+    size = rollouts * len(study.families[family].references)
+    spec = {"study": content, "law": law}
+    return Unit("wristctl.tuning.search:searched", spec, f"search for gains of {law} on {family}", size)
+
+
+def searched(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """What `search_unit` asks for: all that was tried, and the finalists, best first."""
+    study, law = Study.model_validate_json(json.dumps(spec["study"])), controller(spec["law"])
+    cases, others = tuning_cases(study)
+    judges = Judge(cases, study.wrist, study.tune.objective), Judge(others, study.wrist, study.tune.objective)
+    found = search(study, law, lambda name: stream(study.seed, name), judges)
+    return {
+        "values": found.tried.values,
+        "gains": found.tried.gains,
+        "finalists": np.array([each.gains for each in found.finalists]),
+        "origins": np.array([each.origin for each in found.finalists]),
+        "judged": np.array([(each.objective, each.validated) for each in found.finalists]),
+    }
+
+
+def search_of(arrays: Mapping[str, np.ndarray], law: str, restarts: int) -> Search:
+    """The search that gave these arrays."""
+    tried = Tried(arrays["values"], arrays["gains"])
+    finalists = tuple(
+        Finalist(tuple(map(float, gains)), str(origin), float(objective), float(validated))
+        for gains, origin, (objective, validated) in zip(
+            arrays["finalists"], arrays["origins"], arrays["judged"], strict=True
+        )
+    )
+    best = dict(zip(controller(law).gains, finalists[0].gains, strict=True))
+    return Search(law, best, finalists[0].validated, tried.values.size, tried, restarts, finalists)
+
+
+def history(found: Search) -> pd.DataFrame:
+    """Every candidate of every search: restart, iteration, candidate, objective and gains."""
+    iterations, candidates = found.tried.values.shape
+    each = -(-iterations // found.restarts)
+    at = np.repeat(np.arange(iterations), candidates)
+    columns = {
+        "restart": at // each,
+        "iteration": at % each,
+        "candidate": np.tile(np.arange(candidates), iterations),
+        "objective": found.tried.values.ravel(),
+    }
+    gains = np.concatenate(found.tried.gains).T
+    return pd.DataFrame(columns | dict(zip(found.gains, gains, strict=True)))
+
+
+def tried_of(table: pd.DataFrame, gains: Sequence[str]) -> Tried:
+    """What a history says was tried, as far as its iterations are whole."""
+    candidates = int(table["candidate"].max()) + 1
+    whole = len(table) // candidates
+    rows = table.iloc[: whole * candidates]
+    values = rows["objective"].to_numpy(float).reshape(whole, candidates)
+    return Tried(values, rows[list(gains)].to_numpy(float).reshape(whole, candidates, len(gains)))
+
+
+def finalists(found: Search) -> pd.DataFrame:
+    """The gains that were judged anew, best first."""
+    rows = [
+        {"origin": each.origin, "objective": each.objective, "validated": each.validated}
+        | dict(zip(found.gains, each.gains, strict=True))
+        for each in found.finalists
+    ]
+    return pd.DataFrame(rows)

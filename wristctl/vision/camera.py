@@ -1,7 +1,5 @@
 """What a camera is to the loop, and recordings as cameras: a video file, a folder of pictures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 Image = NDArray[np.uint8]
 

@@ -1,7 +1,5 @@
 """The calibration board (ChArUco), seen in pictures, and the camera that those views tell."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard
+from wristctl.errors import UserError
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.view import View
 

@@ -1,13 +1,62 @@
 """Finding square markers in a picture, their print, and the angle of a square."""
 
-from __future__ import annotations
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.vision.camera import Image
-from wristctl.vision.outline import outlined
+
+_ROUNDS = 2
+"""Each looks along the lines of the one before; a rough corner may be off by 2 px."""
+_FINE, _PLACES = 0.5, 32
+"""Distance of samples across a side [px]; places along a side at which it is looked for, at most."""
+
+
+def outlined(image: NDArray[Any], corners: Array, cells: int) -> Array:
+    """Corners (4, 2) [px], clockwise, of a black square of `cells` cells a side, found from rough ones.
+
+    White is expected beyond the square, and looked for up to half a cell to either side of its rough outline; half a
+    cell at either end of a side is left out, since corners are rounded by blur.
+    """
+    at = corners[:, 0] + 1j * corners[:, 1]
+    for _ in range(_ROUNDS):
+        at = _meeting(*_lines(image, at, 0.5 / cells))
+    return np.stack([at.real, at.imag], axis=1)
+
+
+def _lines(image: NDArray[Any], at: NDArray[np.complex128], margin: float) -> tuple[Any, Any]:
+    """A point on, and the direction of, each side (4,) of the square of corners `at`.
+
+    Across each of many places along a side, the edge is the centre of the rise to white, wherever it lies between
+    pixels; a place counts by how much rise there is.
+    """
+    side = np.roll(at, -1) - at
+    length = float(np.abs(side).mean())
+    out, reach = -1j * side / np.abs(side), margin * length
+    along = np.linspace(margin, 1.0 - margin, min(_PLACES, max(8, round(length))))
+    across = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / _FINE)) + 1)
+    places = (at[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
+    flat = places.reshape(-1, len(across)).astype(np.complex64)
+    grey = cv2.remap(image, flat.real, flat.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    rise = np.diff(grey.reshape(places.shape).astype(float), axis=2).clip(0.0)
+    weight = rise.sum(axis=2) + 1e-9
+    edge = rise @ (0.5 * (across[1:] + across[:-1])) / weight
+    middle, off = (np.average(np.broadcast_to(each, edge.shape), 1, weight)[:, None] for each in (along, edge))
+    from_middle = along - middle
+    slope = (weight * from_middle * (edge - off)).sum(axis=1) / (weight * from_middle**2).sum(axis=1)
+    return at + side * middle[:, 0] + out * off[:, 0], side + out * slope
+
+
+def _meeting(point: NDArray[np.complex128], along: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Where each line meets the one before."""
+    before, ahead = np.roll(point, 1), np.roll(along, 1)
+    share = ((point - before).conj() * along).imag / (ahead.conj() * along).imag
+    met: NDArray[np.complex128] = before + share * ahead
+    return met
+
 
 Found = dict[int, list[Array]]
 """Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print."""
@@ -96,3 +145,45 @@ def _detect(detector: cv2.aruco.ArucoDetector, image: Image, left: int, top: int
         exact = outlined(blurred, each.reshape(4, 2).astype(np.float64), CELLS)
         found.setdefault(int(number), []).append(exact + offset)
     return found
+
+
+_EDGE_PLACES, _EDGE_FINE = 24, 0.25
+"""Places along a side at which its outline is looked at; distance of samples across it [px]."""
+
+
+class PictureQuality(NamedTuple):
+    """Of one marker in one picture."""
+
+    side: float
+    """Of the black square [px]."""
+    blur: float
+    """Of its outline: standard deviation of a normal blur [px]."""
+    black: float
+    """Grey of its border, of 255."""
+    white: float
+    """Grey of the rim around it."""
+
+
+def quality_of(image: Image, corners: Array) -> PictureQuality:
+    """Of the marker with these corners (4, 2) [px]."""
+    side = float(np.hypot(*edges(corners).T).mean())
+    reach = 0.5 * side / CELLS
+    across = np.arange(-reach, reach + _EDGE_FINE, _EDGE_FINE)
+    at = corners[:, 0] + 1j * corners[:, 1]
+    along = np.roll(at, -1) - at
+    out = -1j * along / np.abs(along)
+    places = at[:, None] + along[:, None] * np.linspace(0.15, 0.85, _EDGE_PLACES)
+    points = (places[..., None] + across * out[:, None, None]).reshape(-1, len(across)).astype(np.complex64)
+    grey = cv2.remap(image, points.real, points.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    profile = grey.reshape(4, _EDGE_PLACES, -1).astype(float).mean(axis=1)
+    return PictureQuality(side, float(np.median([_width(each) for each in profile])),
+                          float(np.median(profile[:, :3])), float(np.median(profile[:, -3:])))  # fmt: skip
+
+
+def _width(profile: Array) -> float:
+    """Standard deviation [px] of a rise, about its middle."""
+    rise = np.diff(profile).clip(0.0)
+    at = _EDGE_FINE * np.arange(len(rise))
+    total = rise.sum() + 1e-9
+    middle = float(rise @ at) / total
+    return float(np.sqrt(rise @ (at - middle) ** 2 / total))

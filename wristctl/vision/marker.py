@@ -1,7 +1,5 @@
 """The wrist's angle from its two markers, frame by frame, and the gates that an angle must pass."""
 
-from __future__ import annotations
-
 import math
 from enum import StrEnum
 from typing import NamedTuple

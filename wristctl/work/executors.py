@@ -14,11 +14,9 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
-from wristctl.config.errors import UserError
-from wristctl.config.wording import Argument
+from wristctl.errors import Argument, UserError
 from wristctl.interrupt import deferred
-from wristctl.lanes.cores import cores
-from wristctl.work.serving import safe_path, serve_parent
+from wristctl.processes import cores, safe_path, serve_parent
 
 EXECUTOR = Argument("executor", metavar="WHO")
 KINDS = "serial, processes, processes:N, dask://host:port or module:factory"

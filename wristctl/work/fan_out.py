@@ -16,11 +16,20 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wristctl.config.errors import UserError
-from wristctl.config.wording import Argument
+from wristctl.errors import Argument, UserError
 from wristctl.work.executors import EXECUTOR, Pool, Workers
-from wristctl.work.unit import Unit, file_of, read_unit, same_arrays, write_unit
-from wristctl.work.worker import Computed, Furnish, Golden, WorkerDiffers, compute
+from wristctl.work.worker import (
+    Computed,
+    Furnish,
+    Golden,
+    Unit,
+    WorkerDiffers,
+    compute,
+    file_of,
+    read_unit,
+    same_arrays,
+    write_unit,
+)
 
 if TYPE_CHECKING:
     import numpy as np

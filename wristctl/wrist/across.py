@@ -1,7 +1,5 @@
 """What bends the wrist across the plane in which it moves: small bends, of constant curvature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 One side pulls, the other keeps its pretension. Both sides' pulls compress the arc, so both arms count.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -1,7 +1,5 @@
 """Constant-curvature arcs (E1) as chord vectors with their derivatives, written for lanes."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ Rows of the paper's DH table, conjugated by the quarter turn that points the str
 transforms of `_joint`. All angles in rad, one state at a time: theta, rate of shape (n,).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

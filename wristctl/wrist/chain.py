@@ -4,8 +4,6 @@ A part is bent by a coordinate of its own: its chord, from one disc's centre to 
 the tangent before it, as an arc's and as two links' with a hinge between them. Masses are at the chords' middles.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numba

@@ -3,8 +3,6 @@
 `parameters` is one value per field of Segments, shape (p,) or (..., p), as `segments` makes it.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -5,14 +5,12 @@ at the spool by at most exp(mu phi). Approached from below the + side slides tow
 it, z = (1, -1); from above it is (-1, 1). Between these two roots lies the dead band.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import linearised, terms
 from wristctl.wrist.segments import Segments
 

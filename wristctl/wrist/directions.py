@@ -1,7 +1,5 @@
 """The four anatomical directions: bending planes, tendons that pull, and gravity as each plane sees it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from wristctl.config.wrist import WristParameters

@@ -9,8 +9,6 @@ Q_i = P_i + i z_i' (P_i the segment's end, z_i' its chord's derivative), so J_ki
 masses beyond a segment give M and both Jacobians of r in O(n^2).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -6,8 +6,6 @@ never pushes, and pulls less at the wrist by its friction (tendon_friction). psi
 follows e with a time constant, so that the share f of the stiffness relaxes. Springs creep alike (yielding).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import compiled

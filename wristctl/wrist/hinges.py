@@ -7,8 +7,6 @@ tendons squeeze fewer parts than the discs' gaps more than the wrist. Masses are
 chords' middles, and the hand.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

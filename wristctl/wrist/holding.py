@@ -4,8 +4,6 @@ Springs, gravity and a constant force at the tip ask for a torque; both sides' p
 tension limit, give one. Friction is left out, which helps to hold and hinders to get there.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

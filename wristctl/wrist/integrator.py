@@ -8,8 +8,6 @@ order system the 2n equations of each stage reduce to n:
     k_theta = h gamma (R_theta + k_rate).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -5,8 +5,6 @@ would change; what is missing is one uniform field, w_j = b_j - i (a_j - g), wit
 b_j = d(z_j'')/d(theta_j). Likewise d(p_k'')/d(rate_j) = 2 dJ_kj/dt, and dJ_kj/dt = i v_k + u_j beyond segment j.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -1,7 +1,5 @@
 """One constant-curvature arc in the plane (E1), its inverse, and its tip along paths; NumPy, any batch shape."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

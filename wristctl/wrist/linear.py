@@ -1,7 +1,5 @@
 """Linear equations of lanes. The matrices are those of damped masses and springs: no pivoting is needed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

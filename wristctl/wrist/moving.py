@@ -1,7 +1,5 @@
 """One step of any plant, with its tendons' state and an end where it leaves what it can be."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import spelled_out

@@ -1,12 +1,10 @@
 """The planar wrist as a plant: piecewise constant curvature, n segments with their angles as coordinates (E1-E11)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.parts import replacing
 from wristctl.wrist.arcs import ARC_LIMIT, tip

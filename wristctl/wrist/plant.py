@@ -6,8 +6,6 @@ below; which plant's they are follows from the parameters' type, so that each ke
 `wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.choices.PLANTS`.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,8 +21,8 @@ from numba.extending import NativeValue, models, overload, register_model, typeo
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS as _TABLE
 from wristctl.config.choices import Choices
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.lane import dot, planar

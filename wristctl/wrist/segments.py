@@ -1,7 +1,5 @@
 """The n-segment wrist as the compiled model sees it: one row of lanes per parameter."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

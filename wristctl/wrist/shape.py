@@ -1,7 +1,5 @@
 """Where the parts of a bent wrist lie in its bending plane (E1), as complex positions x + iy in m."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Statics of the n-segment wrist: equilibria under tendons and gravity, stiffness and buckling."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -9,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE

@@ -6,8 +6,6 @@ and a sheath's), z in [-1, 1]. Dahl (A solid friction model, Aerospace Corp. TOR
 state (stiction), after a turn it needs some s to turn round (presliding), and how fast it goes does not matter.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -4,8 +4,6 @@ A segment holds g spans, each bending by theta/g over l/g; with y = theta/(2 g) 
 2 g (l/theta -+ c) sin(y) long and its moment arm is minus the derivative of that length by theta.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

@@ -4,8 +4,6 @@ End stops are Hunt and Crossley's contact, k d (1 + c d') at a depth d (J. Appl.
 segments; a spring's torque is K (theta - f psi), psi the creep of one Maxwell branch as in `wristctl.wrist.elastic`.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from wristctl.lanes.compiled import compiled

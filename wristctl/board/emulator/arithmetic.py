@@ -1,7 +1,5 @@
 """Results and flags of the arithmetic and logic instructions, by the manual's boolean formulas."""
 
-from __future__ import annotations
-
 from wristctl.board.emulator.instructions import Op
 from wristctl.lanes.compiled import compiled
 

@@ -1,19 +1,16 @@
 """An ATmega2560 at 16 MHz in virtual time: run cycles, write and read bytes, see and drive pins."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.board.emulator import chip as state
-from wristctl.board.emulator.decode import decode
-from wristctl.board.emulator.events import EXTERNAL, POWER_ON, reset
+from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.execute import run
-from wristctl.board.emulator.flash import self_program
-from wristctl.board.emulator.intel_hex import read_hex
-from wristctl.board.emulator.ports import LETTERS, levels
+from wristctl.board.emulator.interrupts import EXTERNAL, POWER_ON, reset
+from wristctl.board.emulator.peripherals import LETTERS, levels
+from wristctl.board.emulator.program import decode, read_hex, self_program
 from wristctl.board.emulator.registers import GLOBAL_INTERRUPT, SREG, read, write
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "wrist.hex"
@@ -158,3 +155,35 @@ class Atmega2560:
     def _keep_edges(self) -> None:
         self._edges.append(self._chip.edges[: self._chip.edge_count].copy())
         self._chip.edge_count = 0
+
+
+class VirtualTransport:
+    """The wire to an emulated chip in the same process."""
+
+    name = "emulated"
+    boot_time = 0.0
+
+    def __init__(self, chip: Atmega2560 | None = None) -> None:
+        self.chip = chip or Atmega2560()
+
+    def write(self, data: bytes) -> None:
+        """Put bytes on the line."""
+        self.chip.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What the chip has sent; runs it for up to `timeout` s until there is something."""
+        end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
+        while not (data := self.chip.read()) and self.chip.cycles < end:
+            self.chip.run(end - self.chip.cycles, until_sent=True)
+        return data
+
+    def now(self) -> float:
+        """Seconds on the chip's clock."""
+        return self.chip.cycles / FREQUENCY
+
+    def wait(self, seconds: float) -> None:
+        """Run the chip for so long."""
+        self.chip.run(round(seconds * FREQUENCY))
+
+    def close(self) -> None:
+        """Nothing to give back."""

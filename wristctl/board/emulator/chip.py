@@ -1,7 +1,5 @@
 """The state of the emulated ATmega2560: one record, which this package's compiled functions change in place."""
 
-from __future__ import annotations
-
 from typing import Protocol, cast
 
 import numpy as np

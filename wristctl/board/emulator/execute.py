@@ -1,7 +1,5 @@
 """The processor: fetch, execute, count cycles, serve interrupts (AVR manual, cycles of the ATmega2560)."""
 
-from __future__ import annotations
-
 from wristctl.board.emulator.arithmetic import T, add_word, multiply, one_operand, two_operands
 from wristctl.board.emulator.chip import (
     ASLEEP,
@@ -14,9 +12,9 @@ from wristctl.board.emulator.chip import (
     RUNNING,
     Chip,
 )
-from wristctl.board.emulator.events import happen
 from wristctl.board.emulator.instructions import Op
-from wristctl.board.emulator.interrupts import take_interrupt
+from wristctl.board.emulator.interrupts import happen, take_interrupt
+from wristctl.board.emulator.peripherals import restart_watchdog
 from wristctl.board.emulator.registers import (
     EIND,
     GLOBAL_INTERRUPT,
@@ -34,7 +32,6 @@ from wristctl.board.emulator.registers import (
     write,
 )
 from wristctl.board.emulator.usart import start_line
-from wristctl.board.emulator.watchdog import restart_watchdog
 from wristctl.lanes.compiled import compiled, kernel
 
 _X, _Y, _Z = 26, 28, 30

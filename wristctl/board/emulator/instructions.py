@@ -1,7 +1,5 @@
 """The instruction set: operations, and the bit patterns that mean them (AVR manual, DS40002198)."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 Op = IntEnum(

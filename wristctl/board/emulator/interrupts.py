@@ -1,14 +1,23 @@
 """Which interrupt is next, in the order of the vectors (data sheet, table 14-1)."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from wristctl.board.emulator.chip import Chip
-from wristctl.board.emulator.timers import TIFR, TIMERS, UNITS
-from wristctl.board.emulator.usart import RXC, TXC, UCSRA, UCSRB, UDRE
-from wristctl.board.emulator.watchdog import WDIE, WDIF, WDTCSR, watchdog_served
-from wristctl.lanes.compiled import compiled
+from wristctl.board.emulator.chip import NEVER, RX_BYTE, TX_BYTE, WATCHDOG, Chip
+from wristctl.board.emulator.peripherals import (
+    MCUSR,
+    WDE,
+    WDIE,
+    WDIF,
+    WDRF,
+    WDTCSR,
+    restart_watchdog,
+    watchdog_expired,
+    watchdog_served,
+)
+from wristctl.board.emulator.registers import IO_FIRST, IO_LAST, SPH, SPL
+from wristctl.board.emulator.timers import BASE, LIMIT, ORIGIN, PRESCALE, TEMP, TIFR, TIMERS, TOP, UNITS, timer_events
+from wristctl.board.emulator.usart import RXC, TXC, UCSRA, UCSRB, UDRE, byte_arrived, byte_sent
+from wristctl.lanes.compiled import compiled, kernel
 
 _TIMSK = 0x6E
 _COMPARE_A = (21, 17, 13, 32, 42, 47)
@@ -48,3 +57,44 @@ def take_interrupt(chip: Chip) -> int:
                 watchdog_served(chip)
             return source[_VECTOR]
     return 0
+
+
+POWER_ON, EXTERNAL = 0x01, 0x02
+"""Causes of a reset as MCUSR shows them, beside WDRF."""
+
+
+@kernel
+def reset(chip: Chip, cause: int) -> None:
+    """Reset: I/O registers and the program counter; registers and RAM keep what they hold."""
+    memory = chip.memory
+    causes = (memory[MCUSR] & 0x0F if cause != POWER_ON else 0) | cause
+    memory[IO_FIRST : IO_LAST + 1] = 0
+    memory[UCSRA], memory[SPL], memory[SPH], memory[MCUSR] = UDRE, 0xFF, 0x21, causes
+    chip.due[:] = NEVER
+    for k in range(6):
+        timer = chip.timers[k]
+        timer[PRESCALE] = timer[BASE] = timer[TEMP] = 0
+        timer[TOP], timer[ORIGIN] = TIMERS[k, LIMIT], chip.cycles
+    chip.pc, chip.check, chip.next = chip.reset_pc, 0, NEVER
+    chip.fifo_count, chip.held, chip.shifting, chip.waiting = 0, -1, -1, -1
+    chip.line_tail = chip.line_head
+    if causes & WDRF:
+        memory[WDTCSR] = WDE
+        restart_watchdog(chip)
+
+
+@compiled
+def happen(chip: Chip) -> None:
+    """Let everything happen that is due, and note when the next is."""
+    due = chip.due
+    chip.next = NEVER
+    for k in range(6):
+        if min(due[4 * k], due[4 * k + 1], due[4 * k + 2], due[4 * k + 3]) <= chip.cycles:
+            timer_events(chip, k)
+    if due[RX_BYTE] <= chip.cycles:
+        byte_arrived(chip)
+    if due[TX_BYTE] <= chip.cycles:
+        byte_sent(chip)
+    if due[WATCHDOG] <= chip.cycles and watchdog_expired(chip):
+        reset(chip, WDRF)
+    chip.next = 0 if chip.halt else due.min()

@@ -1,15 +1,20 @@
 """The data space: what reading and writing an address does beyond the memory behind it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.board.emulator.chip import DELAY, LOOK, Chip
-from wristctl.board.emulator.eeprom import EECR, read_eeprom, write_eeprom
-from wristctl.board.emulator.ports import PIN, levels, write_port
+from wristctl.board.emulator.peripherals import (
+    EECR,
+    PIN,
+    WDTCSR,
+    levels,
+    read_eeprom,
+    write_eeprom,
+    write_port,
+    write_watchdog,
+)
 from wristctl.board.emulator.timers import TIFR, TIMERS, read_timer, write_timer
 from wristctl.board.emulator.usart import UCSRA, UCSRB, UDR, read_byte, write_byte, write_control
-from wristctl.board.emulator.watchdog import WDTCSR, write_watchdog
 from wristctl.lanes.compiled import compiled, kernel
 
 SPL, SPH, SREG = 0x5D, 0x5E, 0x5F

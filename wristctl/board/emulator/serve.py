@@ -3,8 +3,6 @@
 As on a Mega, the first client to open the port resets the board.
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os
@@ -19,7 +17,7 @@ from numpy.typing import NDArray
 
 from wristctl.board.emulator.atmega2560 import Atmega2560, Halted
 from wristctl.board.emulator.chip import FREQUENCY
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.loop_priority import no_long_pauses
 
 log = logging.getLogger(__name__)

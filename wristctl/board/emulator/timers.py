@@ -4,8 +4,6 @@ A timer's count is not kept but worked out from the cycle at which it was last k
 pins, and input capture, are not emulated: a program that asks for them halts.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.board.emulator.chip import LOOK, NEVER, NOT_EMULATED, Chip

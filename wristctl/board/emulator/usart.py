@@ -3,8 +3,6 @@
 The receiver keeps a third byte in its shift register until the next start bit; then that byte is lost and DOR set.
 """
 
-from __future__ import annotations
-
 from wristctl.board.emulator.chip import BUFFER_FULL, BYTE_SENT, LOOK, NEVER, RX_BYTE, TX_BYTE, Chip
 from wristctl.lanes.compiled import compiled
 

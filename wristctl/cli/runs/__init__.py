@@ -1,31 +1,13 @@
 """`wristctl runs`: what earlier commands have left."""
 
-from __future__ import annotations
-
 import typer
 
-from wristctl.cli.runs import (
-    diff,
-    export,
-    figures,
-    gc,
-    lineage,
-    ls,
-    pack,
-    replay,
-    report,
-    rm,
-    run_tables,
-    show,
-    sign,
-    tag,
-    verify,
-)
+from wristctl.cli.runs.drawing import export, figures, report, table
+from wristctl.cli.runs.housekeeping import gc, pack, rm, unpack
+from wristctl.cli.runs.listing import diff, lineage, ls, show, tag
+from wristctl.cli.runs.verification import replay, sign, verify
 
 app = typer.Typer(help="Find, compare, verify and repeat runs.", no_args_is_help=True, add_completion=False)
 
-for module in (ls, show, lineage, diff, verify, sign, replay, report, figures, export, pack, tag, rm, gc):
-    name = module.__name__.rpartition(".")[2]
-    app.command(name)(getattr(module, name))
-app.command("unpack")(pack.unpack)
-app.command("table")(run_tables.table)
+for verb in (ls, show, lineage, diff, verify, sign, replay, report, figures, table, export, pack, unpack, tag, rm, gc):
+    app.command(verb.__name__)(verb)

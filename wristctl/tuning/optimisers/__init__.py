@@ -1,7 +1,5 @@
 """Optimisers behind one ask/tell face; a newcomer is one file, and one line in `wristctl.config.choices`."""
 
-from __future__ import annotations
-
 from wristctl.config.choices import OPTIMISERS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.tuning.optimisers.base import Best, Optimiser

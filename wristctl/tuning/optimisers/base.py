@@ -4,15 +4,13 @@ An optimiser never calls the objective (ask/tell), so a whole generation is eval
 class: how it proposes the next candidates and what it keeps of their values; `Optimiser` does the rest.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import NamedTuple, final
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 
 
 class Best(NamedTuple):

@@ -3,14 +3,12 @@
 Hansen and Ostermeier, Evolutionary Computation 9 (2001) 159; walls by pycma's transformation of the box.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.errors import UserError
+from wristctl.errors import UserError
 from wristctl.tuning.optimisers.base import Optimiser
 
 _STEP = 0.3

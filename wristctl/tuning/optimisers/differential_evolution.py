@@ -4,8 +4,6 @@ Storn and Price, J. Global Optimization 11 (1997) 341; the bounce off the walls 
 Differential Evolution (2005), section 4.3.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from wristctl.arrays import Array

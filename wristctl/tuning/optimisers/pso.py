@@ -5,8 +5,6 @@ Congress on Evolutionary Computation 2000, 84. The whole swarm knows the best po
 one coordinate at a time, as in elitist learning (Zhan et al., IEEE Trans. Systems, Man, Cybernetics B 39 (2009) 1362).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

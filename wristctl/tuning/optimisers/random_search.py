@@ -1,7 +1,5 @@
 """Random search: what every other method has to beat at the same budget."""
 
-from __future__ import annotations
-
 from wristctl.arrays import Array
 from wristctl.tuning.optimisers.base import Optimiser
 

@@ -1,0 +1,222 @@
+"""The study of all laws: one answer, whoever computes it, however often it is stopped, and named faults."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import wristctl
+from wristctl.commands.study.units import Studied
+from wristctl.comparison import world_ranking as judge_unit
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import Run, list_runs
+from wristctl.simulation import cases
+from wristctl.work import worker as unit
+
+SMALL = """
+seed: 3
+families:
+  rig:
+    about: a rig in small
+    loop: {plant_segments: 1, control_period: 5.0e-3, sensor: {level: camera}}
+    draw: {plant.stiffness: x0.6..1.3, plant.sensor.noise_deg: 0.03..0.1, reference.angle_deg: -40..40}
+    references: [{duration: 0.3}, {kind: sine, frequency: 1.0}]
+    horizon: 1.0
+study:
+  laws: [pd-ff, pid-ff]
+  presets: [{controller: feedforward}]
+  terms: {feedback: [feedforward/default, pd-ff/tuned], an integral: [pd-ff/tuned, pid-ff/tuned]}
+  variants:
+    RMSE alone: {objective: {steady_state: 0.0, worst: 0.0}}
+    random: {optimiser: random}
+    random again: {optimiser: random, beside: random}
+  budgets: {small: {candidates: 4, iterations: 2, finalists: 2, draws: 2, validation: 2, worlds: 10, noises: 2}}
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("fair") / "small.yaml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(file: Path) -> Study:
+    return wristctl.load_study(file)
+
+
+@pytest.fixture(scope="module")
+def done(study: Study, file: Path) -> Studied:
+    return wristctl.study(study, out=file.parent / "whole")
+
+
+def run_of(found: Studied) -> Run:
+    assert found.run is not None
+    return found.run
+
+
+def test_its_answer_names_the_rig_a_law_with_its_interval_and_what_each_term_buys(done: Studied) -> None:
+    text = (run_of(done).path / "README.md").read_text()
+    result = text[text.index("## Result") :]
+    first = " ".join(result.split("\n\n")[1].split())
+    assert first.startswith("``` rig (a rig in small): run p") and "times below feedforward's" in first
+    assert max(map(len, done.answer)) <= 100 and done.summary == done.answer
+    assert "figures/laws.png" in result and (run_of(done).path / "figures" / "laws.png").is_file()
+    assert "an integral (pd-ff/tuned -> pid-ff/tuned): rig " in result
+    assert result.count("run p") == 1, "said once"
+    assert "Tuned otherwise on rig (RMSE alone)" in result
+    assert "(random): " in result and "(random again beside random): " in result
+    assert str(done).startswith("rig (a rig in small): run p"), "the terminal begins with it too"
+
+
+def test_feedback_is_worth_what_the_worlds_say(done: Studied) -> None:
+    found = done.rankings["rig"]
+    errors = {row.label: row.rmse for row in found.rows}
+    (feedback,) = [each for each in done.terms if each.term == "feedback"]
+    ratio = np.exp(np.mean(np.log(errors["feedforward/default"] / errors["pd-ff/tuned"])))
+    assert feedback.times.value == pytest.approx(ratio) and feedback.times.low > 1.0
+
+
+def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
+    """The same search twice finds the same gains: nothing turns round, and no RMSE changes."""
+    table = pd.read_csv(run_of(done).path / "data" / "sensitivity.csv", comment="#").set_index("variant")
+    assert list(table.loc["random again beside random", ["tau", "reversed", "ratio"]]) == [1.0, 0, 1.0]
+    assert table.loc["random", "ratio"] != 1.0, "another search finds other gains"
+
+
+def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
+    done: Studied, study: Study, file: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "wristctl", "study", str(file), "--out", str(tmp_path), "-q"]
+    root = str(Path(wristctl.__file__).parents[1])
+    child = subprocess.Popen(command, env={**os.environ, "PYTHONPATH": root}, stdout=subprocess.DEVNULL)
+    begun = time.monotonic()
+    while len(list(tmp_path.glob("*/units/*.npz"))) < 2:
+        assert child.poll() is None and time.monotonic() - begun < 120.0
+        time.sleep(0.01)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    (stopped,) = list_runs(tmp_path)
+    kept = {each.name: each.read_bytes() for each in (stopped.path / "units").glob("*.npz")}
+    assert stopped.state == "crashed" and kept
+    again = wristctl.study(study, resume=stopped.path, executor="processes:2", out=tmp_path)
+    assert run_of(again).result_hash == run_of(done).result_hash
+    units = {each.name: each.read_bytes() for each in (run_of(again).path / "units").glob("*.npz")}
+    assert kept.items() <= units.items()
+    noted = run_of(again).manifest.units
+    assert noted is not None and noted.run == stopped.id and noted.computed_again >= 1
+    assert noted.taken_over + noted.computed_again == len(kept)
+    assert [each.role for each in run_of(again).manifest.inputs] == ["resume"]
+
+
+def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
+    done: Studied, study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(unit, "code_digest", lambda: "other")
+    again = wristctl.study(study, resume=run_of(done).path, out=tmp_path)
+    assert caplog.text.count(f"{run_of(done).id} was made by other code: none of its units can be taken over") == 1
+    assert run_of(again).result_hash == run_of(done).result_hash
+
+
+def test_in_memory_it_finds_the_same(done: Studied, study: Study) -> None:
+    assert wristctl.study(study).frame().equals(done.frame())
+
+
+def test_a_unit_that_fails_is_named_and_its_row_left_out(
+    done: Studied, study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = cases.measure
+
+    def failing(law: Any, *given: Any, **named: Any) -> Any:
+        if law.name == "pd-ff":
+            raise ArithmeticError("no number")
+        return known(law, *given, **named)
+
+    monkeypatch.setattr(judge_unit, "measure", failing)
+    found = wristctl.study(study)
+    assert found.fault is not None and found.fault.exit_code == 3
+    assert "pd-ff on worlds 0 to 9 of rig" in str(found.fault) and "ArithmeticError: no number" in str(found.fault)
+    rows = {row.label: row for row in found.rankings["rig"].rows}
+    assert set(rows) == {"pid-ff/tuned", "feedforward/default"}
+    before = {row.label: row for row in done.rankings["rig"].rows}
+    assert np.array_equal(rows["pid-ff/tuned"].rmse, before["pid-ff/tuned"].rmse)
+
+
+def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_motion(study: Study) -> None:
+    """Of the stored metrics alone: three worlds, the wrist's motions, three noises each."""
+    (unit,) = judge_unit.judge_units(study, "rig", "pd-ff", {"Kp": 4.0, "Kd": 0.2}, 3, 3)
+    pieces = judge_unit.judged(unit.spec)
+    still = {"oscillation": 0.0 * pieces["rmse"], "drift": 0.0 * pieces["rmse"], "chattering": 0.0 * pieces["rmse"]}
+    slams = {"chattering": still["chattering"].copy()}
+    slams["chattering"][1, -1, :2] = slams["chattering"][2, 0, 0] = 4.0 * 58.0 * 26.0
+    row = judge_unit.row_of("one", [pieces | still | slams], 58.0)
+    assert row.swings.tolist() == [False, True, False] and (row.measured.chatter > 0.0).sum() == 3
+    assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
+
+
+def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    gains = {"Kp": 4.0, "Kd": 0.2}
+    (whole,) = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)
+    (single,) = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 1)
+    monkeypatch.setattr(judge_unit, "_ROLLOUTS", 12)
+    parts = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)
+    assert [each.spec["worlds"] for each in parts] == [3, 3, 3, 1]
+    rows = [
+        judge_unit.row_of("one", [judge_unit.judged(each.spec) for each in units], 58.0) for units in ([whole], parts)
+    ]
+    assert np.array_equal(rows[0].rmse, rows[1].rmse) and np.array_equal(rows[0].swings, rows[1].swings)
+    first = judge_unit.row_of("one", [judge_unit.judged(whole.spec)], 58.0, noises=1)
+    assert np.array_equal(first.rmse, judge_unit.row_of("one", [judge_unit.judged(single.spec)], 58.0).rmse), (
+        "noise 0 is the same, alone or not"
+    )
+    assert not np.array_equal(first.rmse, rows[0].rmse)
+    pieces = judge_unit.judged(whole.spec)
+    for motion in range(pieces["rmse"].shape[1]):
+        alone = judge_unit.row_of("one", [pieces], 58.0, [motion])
+        assert alone.rmse == pytest.approx(np.exp(np.log(pieces["rmse"][:, motion]).mean(axis=1)))
+        assert alone.measured.failed.shape == (1, 20)
+
+
+@pytest.mark.parametrize(
+    "override, told",
+    [
+        ("study.families=[rigs]", r"unknown family of worlds 'rigs' - study.families - fix: did you mean 'rig'"),
+        ("study.laws=[pd-ff, feedforward]", r"feedforward has no gains to tune - study.laws.1"),
+        ("study.laws=[pd-ff, pd-ff]", r"pd-ff is among the laws twice"),
+        ("study.budget=ful", r"unknown budget 'ful' - study.budget - fix: one of small"),
+        ("study.presets=[{controller: smc, gains: tuned}]", r"no tuned gains of smc - study.presets.0"),
+        ("study.terms={x: [pd-ff/tuned, pid-ff/tunes]}", r"no row 'pid-ff/tunes' is judged - study.terms.x - fix: did"),
+        ("study.variants={x: {optimiser: psoo}}", r"unknown optimiser 'psoo'.*did you mean 'pso'"),
+        ("study.variants={x: {beside: y}, z: {}}", r"x beside 'y': one of RMSE alone, random, random again, z - "),
+        ("study.variants={x: {beside: x}}", r"x beside 'x': one of RMSE alone, random, random again - "),
+        ("study.budgets.small.candidates=2", r"at least 3 candidates, not 2 - study.budgets.small.candidates - fix"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_studied_is_named_before_anything_is_computed(file: Path, override: str, told: str) -> None:
+    with pytest.raises(UserError, match=told) as raised:
+        wristctl.study(wristctl.load_study(file, override))
+    assert raised.value.exit_code == 2
+
+
+def test_without_families_it_says_where_there_are_some() -> None:
+    with pytest.raises(UserError, match=r"no families of worlds - study.families - fix: include some"):
+        wristctl.study(wristctl.load_study())
+
+
+def test_the_committed_study_can_be_run_and_has_the_size_it_is_said_to_have() -> None:
+    study = wristctl.load_study(Path(wristctl.__file__).parents[1] / "experiments" / "fair_study.yaml")
+    full = study.study.budgets["full"]
+    assert len(study.study.laws) >= 16 and full.candidates * full.iterations == 2000
+    assert full.worlds * len(study.study.families) == 1000 and full.noises == 30
+    assert {"pd-ff", "pid-ff", "pid-dob", "smc-dob"} <= set(study.study.laws), "the ladder"

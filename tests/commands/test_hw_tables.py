@@ -1,0 +1,170 @@
+"""Tables of trials: means with and without a push, beside the paper's experiment and the same in simulation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import wristctl
+from tests.commands.conftest import repeated
+from wristctl.commands.hw_run import results as hw_tables
+from wristctl.commands.hw_run.command import Performed
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import Table
+from wristctl.commands.progress import watched
+from wristctl.commands.results import Findings
+from wristctl.commands.session import Session, Unattended
+from wristctl.records import start_run
+from wristctl.simulation.repetitions import Simulation
+from wristctl.trial.trials import Trial
+
+ROWS = "rows: [{controller: smc, gains: printed}, {controller: pid, gains: printed}]"
+FACTS = [
+    ("ulnar", 0.0, "smc", "ok"), ("radial", 0.0, "smc", "ok"), ("ulnar", 0.0, "smc", "stopped"),
+    ("ulnar", 5.0, "smc", "ok"), ("ulnar", 0.0, "pid", "ok"), ("ulnar", 0.0, "smc", "ok"),
+]  # fmt: skip
+"""Direction, push, controller and outcome of each trial; the last repeats the first."""
+
+
+def trials() -> pd.DataFrame:
+    table = pd.DataFrame(FACTS, columns=["direction", "push", "controller", "outcome"])
+    numbers = np.arange(1.0, len(FACTS) + 1.0)
+    names = "rmse steady_state settling recovery true_rmse true_steady_state overshoot peak_tension"
+    own = {name: 10.0**k * numbers for k, name in enumerate(names.split())}
+    return table.assign(trial=range(len(FACTS)), repetition=[0, 0, 0, 0, 0, 1], gains="printed", **own)
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
+    """The trials that were simulated; each comes out with an RMSE of one more than its number."""
+    found: list[Trial] = []
+
+    def twin(_study: Any, trial: Trial, *_: Any) -> Simulation:
+        found.append(trial)
+        return repeated("twin", [trial.number + 1.0], steady_state=0.5).first
+
+    monkeypatch.setattr(hw_tables, "twin", twin)
+    return found
+
+
+def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings, dict[int, Simulation]]:
+    study = wristctl.load_study(None, f"hw-run={{push: {{start: 2.0, duration: 0.5}}, {settings}}}")
+    time = 0.01 * np.arange(100.0)
+    log = [
+        pd.DataFrame({"trial": k, "time": time, "theta": 0.1 * k, "theta_ref": 0.2, "theta_desired": 0.3, "late": 1e-4})
+        .assign(**{f"tension_{tendon}": float(tendon) for tendon in (1, 2, 4, 5)})
+        for k in range(len(FACTS))
+    ]  # fmt: skip
+    with start_run("hw-run", study, "", tmp_path) as run:
+        for name in ("log", "between"):
+            pd.concat(log).to_csv(run.file(f"data/{name}.csv"), index=False)
+        findings = Findings(0, run)
+        findings.figure = lambda name, draw, *of, **how: findings.figures.add(name, lambda: draw(*of, **how))  # type: ignore[method-assign]
+        session = Session(study, Inputs(), findings, watched(None), Unattended())
+        found, twins = hw_tables.trial_tables(session, trials(), None, None)
+    return found, findings, twins
+
+
+def test_the_papers_numbers_stand_beside_its_own_law_alone(
+    tmp_path: Path, asked: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (theirs, _), _, _ = tables(tmp_path / "a")
+    of_pid = trials().assign(controller="pid")
+    monkeypatch.setattr("tests.commands.test_hw_tables.trials", lambda: of_pid)
+    (others, _), _, _ = tables(tmp_path / "b")
+    assert "paper" in theirs.title and "paper" not in others.title
+    assert not [row for row in others.rows if str(row[0]).startswith("paper")]
+
+
+def test_means_are_over_what_ended_well_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
+    (means, by_trial), _, twins = tables(tmp_path)
+    assert means.columns[:4] == ("", "trials", "RMSE [rad]", "steady state [rad]")
+    smc, pid, pushed, *papers = means.rows
+    number = 9.0 / 3.0  # of trials 1, 2 and 6, counted from 1
+    assert smc[:2] == ("smc/printed", 3)
+    assert smc[2:8] == pytest.approx([10.0**k * number for k in range(6)])
+    assert smc[8:] == pytest.approx((4.0 / 3.0, 0.5)), "the repetition shares the first one's simulation"
+    assert (pid[:3], pushed[:3]) == (("pid/printed", 1, 5.0), ("smc/printed, pushed", 1, 4.0))
+    assert [paper[:5] for paper in papers] == [
+        ("paper: four directions", 4, 0.157, 0.032, 3.0),
+        ("paper: pushed, radial", 1, 0.207, 0.029, 3.0),
+        ("paper: pushed, flexion", 1, 0.291, 0.031, 3.0),
+    ]
+    assert {len(row) for row in means.rows} == {len(means.columns)}
+    assert [row[0] for row in by_trial.rows] == [0, 1, 3, 4, 5]
+    first = dict(zip(by_trial.columns, by_trial.rows[2], strict=True))
+    assert (first["direction"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
+    assert (first["RMSE [rad]"], first["peak tension [N]"], first["outcome"]) == (4.0, 4e7, "ok")
+    simulated = [(each.number, each.push, each.row) for each in asked]
+    assert simulated == [(0, 0.0, 0), (1, 0.0, 0), (3, 5.0, 0), (4, 0.0, 1)]
+    assert twins[5] is twins[0] and set(twins) == {0, 1, 3, 4, 5}
+
+
+def test_each_mean_is_a_metric_named_by_push_and_where_there_are_several_by_controller(
+    tmp_path: Path, asked: list[Trial]
+) -> None:
+    _, findings, _ = tables(tmp_path)
+    metrics = findings.metrics
+    assert metrics["rmse_smc-printed"]["value"] == pytest.approx(3.0) and metrics["rmse_smc-printed"]["n"] == 3
+    assert metrics["pushed_recovery_smc-printed"]["value"] == 4000.0
+    assert "recovery_smc-printed" not in metrics, "of no push"
+    units = [metrics[f"{name}_pid-printed"]["unit"] for name in ("rmse", "steady_state", "settling", "true_rmse")]
+    assert units == ["rad", "rad", "s", "rad"]
+    assert metrics["pushed_rmse_smc-printed"]["meaning"] == "mean over trials with a push, smc/printed"
+
+
+def test_courses_are_drawn_by_their_log_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
+    _, findings, twins = tables(tmp_path)
+    kinds = ["directions", "errors", "tensions"]
+    assert list(findings.figures) == [*kinds, *(f"pushed-{name}" for name in kinds)]
+    ulnar = {axes.get_title("left"): axes for axes in findings.figures["directions"].axes}["ulnar"]
+    angles = [np.degrees(0.1 * k) for k in (0, 4, 5)]
+    drawn = [line for line in ulnar.lines if line.get_label() in ("smc/printed", "pid/printed")]
+    assert [float(np.asarray(line.get_ydata())[0]) for line in drawn] == pytest.approx(angles)
+    (simulated,) = (line for line in ulnar.lines if line.get_label() == "pid/printed, simulated")
+    np.testing.assert_allclose(np.asarray(simulated.get_ydata()), np.degrees(twins[4].trajectory.theta))
+    assert not ulnar.patches
+    (pushed,) = findings.figures["pushed-errors"].axes
+    (span,) = pushed.patches
+    assert (span.get_x(), span.get_width()) == pytest.approx((2.0, 0.5))  # type: ignore[attr-defined]
+    (tension,) = findings.figures["pushed-tensions"].axes
+    assert [float(np.asarray(line.get_ydata())[0]) for line in tension.lines] == [4.0, 1.0], "ulnar: 4 pulls, 1 holds"
+    assert findings.figures["tensions"].get_suptitle() == "smc/printed"
+    assert sum(len(axes.lines) for axes in findings.figures["tensions"].axes) == 4, "the first row's, each once"
+
+
+def test_lateness_is_drawn_where_time_is_real(tmp_path: Path, asked: list[Trial]) -> None:
+    _, findings, _ = tables(tmp_path, f"real_time: true, {ROWS}")
+    axes = findings.figures["lateness"].axes[0]
+    assert sum(bar.get_height() for bar in axes.patches) == 2 * 100 * len(FACTS)  # type: ignore[attr-defined]
+
+
+def test_one_row_of_controllers_needs_no_name_in_its_metrics(tmp_path: Path, asked: list[Trial]) -> None:
+    with pytest.MonkeyPatch.context() as during:
+        alone = trials()[lambda table: table["controller"] == "smc"]
+        during.setitem(globals(), "trials", lambda: alone)
+        _, findings, _ = tables(tmp_path, "rows: [{controller: smc, gains: printed}]")
+    assert {"rmse", "pushed_rmse", "pushed_recovery"} <= set(findings.metrics) and "recovery" not in findings.metrics
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("short", "fast"), [(0, 0), (1, 0), (0, 2), (2, 1)])
+def test_trials_that_do_not_arrive_or_chatter_are_the_verdict_on_the_run(short: int, fast: int, side: float) -> None:
+    """Of those that ended well; the stopped one is told by itself."""
+    table, ok = trials(), np.array([outcome == "ok" for *_, outcome in FACTS])
+    table["steady_state"], table["chattering"] = np.where(ok, 0.01, 9.0), np.where(ok, 100.0, 1e9)
+    last = np.flatnonzero(ok)[::-1]
+    table.loc[last[:short], "steady_state"] = 0.21 * np.radians(30.0)
+    table.loc[last[:fast], "chattering"] = 4.0 * 58.0 * 30.0
+    one = repeated("twin").first
+    course = replace(one.trajectory, theta_ref=side * one.trajectory.theta_ref)
+    study = wristctl.load_study(None)
+    twins = {number: replace(one, trajectory=course) for number in table["trial"]}
+    done = Performed(study, Findings(0), [], table, twins)
+    expected = {"does not arrive": short, "chatters": fast}
+    assert done.marks == [f"{mark}: {count} of 5 trials" for mark, count in expected.items() if count]

@@ -1,0 +1,154 @@
+"""What a study of hysteresis says, writes and draws; and a measured loop in it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wristctl
+from tests.identification.made_loops import SHORT, made_loop, written
+from wristctl.commands.hysteresis.command import Hysteresis
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records.files import sha256_of
+from wristctl.simulation.strokes import FrictionCase
+
+CABLE = FrictionCase(0.1, 1.0, 2e-5)
+QUICK = ("hysteresis.ranges_deg=[[0, 20], [5, 15]]", "hysteresis.frequencies=[0.5, 2]", "hysteresis.sheaths=[0, 1, 3]",
+         "hysteresis.angles_deg=[10]", "hysteresis.ramp=0.3")  # fmt: skip
+
+
+def study(*overrides: str) -> Study:
+    return wristctl.load_study(None, *QUICK, *overrides)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Hysteresis:
+    """In a run directory."""
+    return wristctl.hysteresis(study(), out=tmp_path_factory.mktemp("hysteresis"))
+
+
+def test_the_answer_comes_first_in_words_and_its_numbers_are_the_runs(done: Hysteresis) -> None:
+    first, second, third = done.tables[0].title.split("\n")
+    band = next(each for each in done.dead_bands if each.tendons == CABLE)
+    assert (
+        first.startswith("mu 0.1, sheath 1 rad: dead band ")
+        and f"{math.degrees(band.width):.3g} deg at 10 deg" in first
+    )
+    slow, fast = (each for each in done.loops if each.case.tendons == CABLE and each.case.low == 0.0)
+    assert f"friction takes {1e3 * slow.friction_work:.3g} mJ a cycle of 0 to 20 deg" in second and "2 Hz" in second
+    assert f"{1e3 * fast.damped_work:.3g} mJ at 2 Hz" in third
+    assert done.metrics["friction_work"] == slow.friction_work
+    assert done.metrics["dead_band"] == pytest.approx(math.degrees(band.width))
+    assert done.metrics["friction_work_change"] == pytest.approx(abs(fast.friction_work / slow.friction_work - 1.0))
+    assert done.run is not None and done.run.problems() == []
+    told = (done.run.path / "README.md").read_text()
+    assert told.index("mu 0.1, sheath 1 rad: dead band") < told.index("frequency [Hz]")
+
+
+def test_its_files_hold_every_loop_and_dead_band(done: Hysteresis) -> None:
+    assert done.run is not None
+    loops, courses, bands = (done.run.data(name) for name in ("loops", "courses", "dead_bands"))
+    assert len(loops) == 2 * 2 * 3 and len(courses) == 201 * len(loops) and len(bands) == 3
+    for at, loop in enumerate(done.loops):
+        own = courses[courses.loop == at]
+        np.testing.assert_array_equal(own.theta, loop.course.theta)
+        np.testing.assert_array_equal(own.spool_minus, loop.course.spool_minus)
+        assert loops.raw_work[at] == loop.raw_work and loops.sheath[at] == loop.case.tendons.sheath
+    area = np.trapezoid(own.spool_plus, own.theta)
+    assert abs(area) > 0.0 and loops.width.iloc[-1] == done.loops[-1].width
+    assert set(done.figures) == {"dead-band", "loops", "minor-loops", "work"}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A loop that somebody measured."""
+    return written(made_loop(CABLE, 1, SHORT).loop, tmp_path_factory.mktemp("measured") / "rig.csv")
+
+
+def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_path: Path) -> None:
+    done = wristctl.hysteresis(study(f"hysteresis.measured={recorded}"), out=tmp_path)
+    assert done.fit is not None and done.run is not None
+    title = done.tables[0].title
+    assert title.startswith("rig.csv tells mu ") and ", sheath " in title and " um" in title and "\n" not in title
+    for name, truth in CABLE._asdict().items():
+        found = done.run.metrics[name]
+        assert found["value"] == getattr(done.fit, name).value == done.metrics[name]
+        assert found["interval"] == list(getattr(done.fit, name)[1:])
+        assert found["interval"][0] <= truth <= found["interval"][1]
+    source = json.loads((done.run.path / "data/source.json").read_text())
+    assert source == {"name": recorded.name, "sha256": sha256_of(recorded)}
+    kept = done.run.data("measured")
+    np.testing.assert_allclose(kept.theta - kept.theta_model, done.fit.residuals[0], atol=1e-15)
+    np.testing.assert_allclose(kept.tension_minus - kept.tension_minus_model, done.fit.residuals[2], atol=1e-12)
+    assert "measured" in done.figures and kept.time.iloc[0] > 0.0
+
+
+def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
+    narrow = made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")).loop
+    named = f"hysteresis.measured={written(narrow, tmp_path / 'narrow.csv')}"
+    done = wristctl.hysteresis(study(named))
+    title = done.tables[0].title
+    assert "tells mu (bend + sheath)" in title and "not mu and the sheath apart" in title and "wider range" in title
+    assert math.isnan(done.metrics["sheath"]) and done.metrics["exponent"] > 0.0
+    assert done.tables[0].rows[1][3] is None, "no end of the sheath's interval"
+
+
+def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    coarse = made_loop(CABLE, 3, SHORT._replace(rate=20.0, cycles=2.0)).loop
+    wristctl.hysteresis(study(f"hysteresis.measured={written(coarse, tmp_path / 'coarse.csv')}"))
+    assert any("leaps" in said and "sample more often" in said for said in caplog.messages)
+
+
+def test_pulls_that_tremble_are_warned_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    loop = made_loop(CABLE, 4, SHORT._replace(what="tensions")).loop
+    assert loop.tensions is not None
+    noise = 0.05 * np.random.default_rng(0).standard_normal(loop.tensions.shape)
+    for own, told in ((loop, False), (replace(loop, tensions=loop.tensions + noise), True)):
+        caplog.clear()
+        wristctl.hysteresis(study(f"hysteresis.measured={written(own, tmp_path / 'pulls.csv')}"))
+        assert any("tremble" in said for said in caplog.messages) == told
+
+
+def test_a_file_that_is_no_loop_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "wrong.csv").write_text("time [s],angel [deg]\n")
+    with pytest.raises(UserError, match="unknown column 'angel'"):
+        wristctl.hysteresis(study(f"hysteresis.measured={tmp_path / 'wrong.csv'}"), out=tmp_path / "results")
+    assert not (tmp_path / "results").exists()
+
+
+def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = ("wrist.damping=1e-4", "hysteresis.tendon_stiffness=5e5", "hysteresis.shape=triangle")
+    sound = wristctl.hysteresis(study(*own))
+    monkeypatch.setattr("wristctl.simulation.hysteresis.FINER", (2,))
+    found = wristctl.hysteresis(study(*own))
+    drifts = [each.drift for each in found.loops] + [each.drift for each in found.dead_bands]
+    open_ = [each for each in drifts if each > 0.0]
+    assert 0 < len(open_) == found.metrics["not_converged"] and sound.metrics["not_converged"] == 0.0
+    assert found.marks == [f"not converged: {len(open_)} of {len(found.loops) + len(found.dead_bands)}"]
+    assert sound.marks == [] and "NOT CONVERGED" not in str(sound)
+    table = found.tables[0]
+    told = [row[list(table.columns).index("fate")] for row in table.rows]
+    outer = [each for each in found.loops if each.case.low == 0.0]
+    assert [bool(each) for each in told] == [each.drift > 0.0 for each in outer] and any(told)
+    assert "NOT CONVERGED" in table.title
+    frame = found.frame()
+    assert frame["drift"].tolist() == [each.drift for each in found.loops] and (frame["step"] <= 1e-3).all()
+
+
+@pytest.mark.parametrize(("step", "told"), [(1e-3, False), (5e-3, True)])
+def test_a_fit_by_too_long_a_step_is_warned_of(
+    step: float, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    loop = made_loop(CABLE, 1, SHORT._replace(frequency=1.0, cycles=2.0)).loop
+    wristctl.hysteresis(
+        study(f"hysteresis.measured={written(loop, tmp_path / 'quick.csv')}", f"hysteresis.step={step}")
+    )
+    assert any("hysteresis.step: 0.0025" in said for said in caplog.messages) == told

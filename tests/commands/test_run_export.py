@@ -1,0 +1,136 @@
+"""Runs in formats of other programs, opened by those formats' own readers."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from wristctl.commands.export.run_data import FORMATS, export_run
+from wristctl.errors import UserError
+from wristctl.records import Run, start_run
+from wristctl.study_files.load import load_study
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.vision.recordings import COLUMNS, RawVideo
+
+LOG = {
+    "trial": np.repeat([0, 1], 5),
+    "time": np.tile(np.arange(5) * 0.005, 2),
+    "clock": 10.0 + np.arange(10) * 0.005,
+    "theta": np.where(np.arange(10) == 3, np.nan, 0.1 * np.arange(10)),
+    "state": np.array(["enabled"] * 9 + ["fault"]),
+    "state-": np.arange(10),
+    "load": np.where(np.arange(10) == 7, np.inf, 0.0),
+}
+UNITS = {"time": "s", "clock": "s", "theta": "rad"}
+SERIES = {"theta": np.arange(12.0).reshape(3, 4), "names": np.arange(3), "time": np.arange(4.0), "one": np.array(7.0)}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run with a log of two trials, frames on the trials' time, arrays, a film and metrics."""
+    with start_run("hw-run", load_study(), "", tmp_path_factory.mktemp("made")) as live:
+        live.table("data/log.csv", LOG, UNITS, {"theta": "bending angle as estimated"})
+        live.table("data/frames.csv", {"trial": np.array([0, 1]), "captured": np.array([0.002, 0.003])})
+        live.table("data/trials-of-it.csv", {"trial": np.array([0, 1]), "rmse": np.array([0.1, 0.2])})
+        live.arrays("data/series.npz", SERIES)
+        film = RawVideo(live.file("data/raw.avi"), 60.0)
+        for number in range(3):
+            picture = np.full((48, 64), 80 * number, np.uint8)
+            verdict, corners = SightingVerdict.NO_TIP, np.full((2, 4, 2), np.nan)
+            film.add(Frame(picture, 10.0 + number / 64.0, number), Sighting(0.0, number, np.nan, verdict, corners))
+        film.close()
+        live.columns("data/raw.csv", COLUMNS)
+        live.metric("rmse", 0.25, "rad", "lower")
+        live.metric("settling", None, "s", "lower")
+    return Run(live.path)
+
+
+def test_matlabs_file_has_tables_arrays_units_metrics_and_the_run(made: Run, tmp_path: Path) -> None:
+    found = loadmat(export_run(made, "mat", tmp_path / "a.mat"), squeeze_me=True, simplify_cells=True)
+    for name in ("time", "clock", "theta", "trial"):
+        np.testing.assert_array_equal(found["data"]["log"][name], LOG[name])
+    assert list(found["data"]["log"]["state"]) == list(LOG["state"])
+    np.testing.assert_array_equal(found["data"]["log"]["state_"], np.arange(10))
+    np.testing.assert_array_equal(found["data"]["series"]["theta"], SERIES["theta"])
+    assert found["units"]["log"]["theta"] == "rad" and found["meaning"]["log"]["theta"] == "bending angle as estimated"
+    assert found["metrics"]["rmse"] == 0.25 and np.isnan(found["metrics"]["settling"])
+    assert found["run"]["id"] == made.id and found["run"]["result_sha256"] == made.result_hash
+    np.testing.assert_array_equal(found["data"]["trials_of_it"]["rmse"], [0.1, 0.2])
+
+
+def messages(file: Path) -> dict[str, list[tuple[int, Any, Any]]]:
+    """Time [ns], content and schema of every message by its topic, as mcap's own reader has them."""
+    reader = pytest.importorskip("mcap.reader")
+    found: dict[str, list[tuple[int, Any, Any]]] = {}
+    with file.open("rb") as stream:
+        for schema, channel, message in reader.make_reader(stream).iter_messages():
+            told = json.loads(schema.data) | {"name": schema.name, "encoding": channel.message_encoding}
+            found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data), told))
+    return found
+
+
+def test_an_mcap_log_has_what_went_on_in_time_on_one_clock(made: Run, tmp_path: Path) -> None:
+    found = messages(export_run(made, "mcap", tmp_path / "a.mcap"))
+    assert set(found) == {"/hw-run/log", "/hw-run/frames", "/hw-run/raw", "/hw-run/raw_video"}
+    times, rows, (schema, *_) = zip(*found["/hw-run/log"], strict=True)
+    np.testing.assert_allclose(np.array(times) * 1e-9, LOG["clock"])
+    assert [row["theta"] for row in rows][:4] == [0.0, 0.1, 0.2, None] and rows[9]["state"] == "fault"
+    assert rows[7]["load"] is None and rows[6]["load"] == 0.0
+    assert schema["encoding"] == "json" and schema["properties"]["theta"]["description"].endswith("[rad]")
+    assert schema["properties"]["trial"]["type"] == ["integer", "null"]
+    np.testing.assert_allclose([at * 1e-9 for at, _, _ in found["/hw-run/frames"]], [10.002, 10.028])
+
+
+def test_the_pictures_of_a_video_are_in_the_log_at_their_times(made: Run, tmp_path: Path) -> None:
+    film = messages(export_run(made, "mcap", tmp_path / "a.mcap"))["/hw-run/raw_video"]
+    for number, (at, picture, schema) in enumerate(film):
+        jpeg = np.frombuffer(base64.b64decode(picture["data"]), np.uint8)
+        seen = cv2.imdecode(jpeg, cv2.IMREAD_GRAYSCALE)
+        assert seen is not None and seen.shape == (48, 64) and abs(seen.mean() - 80.0 * number) < 3.0
+        assert at == round(1e9 * (10.0 + number / 64.0)) and schema["name"] == "foxglove.CompressedImage"
+        assert picture["timestamp"] == {"sec": at // 10**9, "nsec": at % 10**9} and picture["format"] == "jpeg"
+    assert len(film) == 3
+
+
+def test_a_simulation_is_a_log_too_and_what_has_no_time_is_refused(tmp_path: Path) -> None:
+    with start_run("simulate", load_study(), "", tmp_path) as live:
+        live.table("data/trajectory.csv", {"time": np.arange(3) * 0.001, "theta": np.arange(3.0)})
+    found = messages(export_run(Run(live.path), "mcap", tmp_path / "a.mcap"))
+    assert [at for at, _, _ in found["/simulate/trajectory"]] == [0, 1_000_000, 2_000_000]
+    with start_run("train", load_study(), "", tmp_path) as live:
+        live.table("data/curves.csv", {"epoch": np.arange(3)})
+    with pytest.raises(UserError, match="nothing in that train run went on in time"):
+        export_run(Run(live.path), "mcap", tmp_path / "b.mcap")
+    assert not (tmp_path / "b.mcap").exists()
+
+
+@pytest.mark.parametrize("to", list(FORMATS))
+def test_nothing_is_written_over(made: Run, to: str, tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(UserError, match="a file is in the way"):
+        export_run(made, to, tmp_path / "mine")
+    assert (tmp_path / "mine").read_text() == "mine"
+    with start_run("simulate", load_study(), "", tmp_path) as live:
+        pass
+    with pytest.raises(UserError, match="the run has no data"):
+        export_run(Run(live.path), to, tmp_path / "other")
+
+
+def test_a_package_that_is_missing_is_named(made: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.delitem(sys.modules, "wristctl.commands.export.mcap_log", raising=False)
+    for name in [each for each in sys.modules if each.split(".")[0] == "mcap"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    with pytest.raises(UserError, match="needs the package mcap") as caught:
+        export_run(made, "mcap", tmp_path / "a")
+    assert "wristctl[logs]" in caught.value.fix and not (tmp_path / "a").exists()

@@ -1,0 +1,184 @@
+"""A sweep gives at each point what the command gives there, in one table with units, whoever computes it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pandas.testing import assert_frame_equal
+
+import wristctl
+from wristctl.commands.simulate.command import Simulated
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.simulation import swept_loops
+from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+FAST = (
+    "simulate.controller=pid-ff", "simulate.gains=stepper", "simulate.loop.plant_segments=1", "simulate.horizon=0.6",
+    "simulate.reference.duration=0.3",
+)  # fmt: skip
+CAMERA = ("simulate.loop.sensor.level=camera", "simulate.loop.control_period=5e-3", "simulate.repetitions=2")
+
+
+def swept(study: Study, *sweep: str) -> Study:
+    return study.model_copy(update={"sweep": sweep})
+
+
+def at(*overrides: str) -> Simulated:
+    return wristctl.simulate(wristctl.load_study(None, *FAST, *overrides))
+
+
+@pytest.mark.parametrize(
+    "key, values, others",
+    [
+        ("wrist.hand_mass", ("0.2", "0.35"), ()),
+        ("simulate.loop.actuator.lag", ("0.004", "0.01"), ("simulate.loop.actuator.level=lagged",)),
+        ("simulate.loop.sensor.noise_deg", ("0.02", "0.2"), CAMERA),
+        ("simulate.loop.plant.stiffness", ("x0.8", "x1.2"), ()),
+        ("simulate.reference.angle_deg", ("-20", "35"), ()),
+        ("simulate.reference.frequency", ("0.6", "1.4"), ("simulate.reference.kind=sine", "simulate.horizon=2.5")),
+        ("simulate.reference.kind", ("minimum-jerk", "sine"), ("simulate.horizon=2.5",)),
+        ("simulate.reference.end_frequency", ("2.0", "4.0"), ("simulate.reference.kind=chirp", "simulate.horizon=2.5")),
+        (
+            "simulate.reference.duration",
+            ("0.1", "0.25"),
+            ("simulate.reference.kind=tip-path", "simulate.reference.inverse=closed-form"),
+        ),
+        ("simulate.controller", ("pid-ff", "computed-torque"), ("simulate.gains=default",)),
+    ],
+)
+def test_a_point_of_a_sweep_is_the_rollout_that_simulate_makes_there(
+    key: str, values: tuple[str, str], others: tuple[str, ...]
+) -> None:
+    study = wristctl.load_study(None, *FAST, *others)
+    table = wristctl.simulate(swept(study, f"{key}={','.join(values)}")).frame()
+    for number, value in enumerate(values):
+        alone = at(*others, f"{key}={value}").repeated
+        rows = table[table["point"] == number]
+        for name in ("rmse", "chattering", "oscillation", "energy"):
+            assert rows[name].to_list() == pytest.approx(alone.metrics[name].tolist(), rel=1e-12, nan_ok=True), name
+        assert rows["failed"].to_list() == alone.failed.tolist()
+
+
+def test_what_is_run_in_many_batches_comes_back_in_the_order_of_its_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = wristctl.load_study(None, *FAST, *CAMERA)
+    asked = swept(study, "simulate.controller=pid-ff,pid-dob", "simulate.reference.angle_deg=5,10,20")
+    together = wristctl.simulate(asked).frame()
+    monkeypatch.setattr("wristctl.simulation.swept_loops.at_most", lambda *_: 2)
+    assert_frame_equal(wristctl.simulate(asked).frame(), together)
+
+
+def test_no_batch_is_run_before_all_but_the_last_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The samples of a long sweep would fill the memory of a machine that runs faster than it judges."""
+    seen, run, judged = list[str](), swept_loops._run, swept_loops._judged
+
+    def slowly(*given: Any) -> Any:
+        time.sleep(0.05)
+        found = judged(*given)
+        seen.append("judged")
+        return found
+
+    def told(*given: Any) -> Any:
+        seen.append("run")
+        return run(*given)
+
+    monkeypatch.setattr(swept_loops, "at_most", lambda *_: 1)
+    monkeypatch.setattr(swept_loops, "_run", told)
+    monkeypatch.setattr(swept_loops, "_judged", slowly)
+    wristctl.simulate(swept(wristctl.load_study(None, *FAST), "simulate.reference.angle_deg=5,10,15,20,25"))
+    for number, at in enumerate(k for k, what in enumerate(seen) if what == "run"):
+        assert seen[:at].count("judged") >= number - 1
+    assert seen.count("run") == seen.count("judged") == 5
+
+
+def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:
+    study = wristctl.load_study(None, *FAST)
+    table = wristctl.simulate(swept(study, "simulate.gains.Kp=2,8")).frame()
+    assert table["rmse"][1] < table["rmse"][0]
+
+
+def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tmp_path: Path) -> None:
+    study = swept(wristctl.load_study(None, *FAST), "wrist.stiffness=0.4..0.9:4", "simulate.controller=pid-ff,pd-ff")
+    done = wristctl.simulate(study, out=tmp_path)
+    assert done.run is not None and len(done.frame()) == 8
+    (table,) = [each for each in done.run.manifest.outputs if each.path == "data/sweep.csv"]
+    units = {each.name: each.unit for each in table.columns}
+    assert units["wrist.stiffness"] == "N m/rad" and units["rmse"] == "rad" and units["energy"] == "J"
+    for key in ("wrist.stiffness", "simulate.controller"):
+        assert (done.run.path / "figures" / f"sweep-{key}.png").is_file()
+    best = done.frame().sort_values("rmse").iloc[0]
+    said = (done.run.path / "README.md").read_text()
+    assert f"simulate.controller = {best['simulate.controller']}" in said and "rmse is least" in said
+    listed = wristctl.runs("points=8", kind="simulate", out=tmp_path)
+    assert listed["rmse_least"].iloc[0] == best["rmse"]
+
+
+def test_processes_find_what_one_finds(tmp_path: Path) -> None:
+    study = swept(wristctl.load_study(None, *FAST), "wrist.stiffness=0.4..0.9:5")
+    hashes = {
+        done.run.result_hash
+        for named in ("serial", "processes:1")
+        if (done := wristctl.simulate(study, executor=named, out=tmp_path)).run is not None
+    }
+    assert len(hashes) == 1
+
+
+def test_a_point_where_the_wrist_fails_is_told_and_stays_in_the_table() -> None:
+    study = wristctl.load_study(None, *FAST, "simulate.gains={Kp: 5.0, Ki: 1.0, Kd: 0.1}", "simulate.horizon=1.0")
+    done = wristctl.simulate(swept(study, "wrist.range_deg=31,50", "simulate.loop.plant.payload=0,3"))
+    assert done.frame()["failed"].tolist() == [False, True, False, True]
+    assert done.frame()["fate"].tolist() == ["", "failed", "", "failed"]
+    assert "2 of 4 rollouts: failed" in str(done) and done.marks == ["failed: 2 of 4"]
+
+
+def test_a_sweep_says_of_each_point_what_simulate_says_of_it() -> None:
+    """Loops that are sound, chatter, do not arrive, swing and do not converge, to either side."""
+    keys = {
+        "simulate.controller": ("super-twisting", "feedforward"),
+        "simulate.reference.angle_deg": ("-30", "30"),
+        "simulate.loop.control_period": ("0.001", "0.005"),
+        "simulate.loop.plant.stiffness": ("x1", "x2"),
+    }
+    base = ("simulate.controller=feedforward", "simulate.gains=default", "wrist.length=0.12", "simulate.horizon=3.0")
+    study = wristctl.load_study(None, *base)
+    done = wristctl.simulate(swept(study, *(f"{key}={','.join(values)}" for key, values in keys.items())))
+    seen = set()
+    for row in done.frame().to_dict("records"):
+        point = [f"{key}={row[key]}" for key in keys]
+        alone = wristctl.simulate(wristctl.load_study(None, *base, *point))
+        assert row["fate"] == ", ".join(alone.repeated.marks), point
+        seen.update(alone.repeated.marks)
+    assert {"chatters", "does not arrive", "limit cycle", "not converged"} <= seen and "" in set(done.frame()["fate"])
+    assert any(mark.startswith("chatters: ") for mark in done.marks) and "rollouts: chatters" in str(done)
+    assert "fate" in done.tables[0].columns
+
+
+def test_the_tail_of_a_move_is_no_limit_cycle_in_a_sweep_either() -> None:
+    path = "simulate.reference={kind: tip-path, inverse: closed-form}"
+    study = wristctl.load_study(None, "simulate.controller=feedforward", "simulate.gains=default", path)
+    table = wristctl.simulate(swept(study, "simulate.horizon=5,6")).frame()
+    assert table["oscillation"][0] > LIMIT_CYCLE and table["fate"].tolist() == ["", ""]
+
+
+def test_a_search_and_a_comparison_are_done_at_every_point() -> None:
+    base = wristctl.load_study(
+        None, "tune.controllers=[pd-ff]", "tune.candidates=2", "tune.horizon=0.3",
+        "tune.loops={fast: {plant_segments: 1}}", "tune.scenarios=[{loop: fast, reference: {duration: 0.2}}]",
+        "compare.rows=[{controller: pd-ff}]", "compare.loops={fast: {plant_segments: 1}}", "compare.horizon=0.3",
+        "compare.references=[{duration: 0.2}]", "compare.inverses=[none]",
+    )  # fmt: skip
+    tuned = wristctl.tune(swept(base, "tune.iterations=1,4")).frame()
+    assert tuned["pd-ff_objective"][1] <= tuned["pd-ff_objective"][0] and "pd-ff_Kp" in tuned
+    compared = wristctl.compare(swept(base, "wrist.damping=0.05,0.2")).frame()
+    (name,) = [each for each in map(str, compared) if each.startswith("rmse_fast_pd-ff")]
+    assert compared[name].nunique() == 2
+
+
+def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_path: Path) -> None:
+    study = swept(wristctl.load_study(None, *FAST), "simulate.loop.plant.stifness=1,2")
+    with pytest.raises(UserError, match=r"there is no leaf simulate.loop.plant.stifness .*did you mean 'stiffness'"):
+        wristctl.simulate(study, out=tmp_path)
+    assert not list(tmp_path.iterdir())

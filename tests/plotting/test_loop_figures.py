@@ -1,0 +1,239 @@
+"""Figures of loops show the numbers of their trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from wristctl.plotting.loop_figures import angles, errors, tensions
+from wristctl.simulation.trajectory import Trajectory
+
+Course = Callable[..., Trajectory]
+
+
+def line(axes: Axes, label: str) -> Line2D:
+    (found,) = (each for each in axes.lines if each.get_label() == label)
+    return found
+
+
+def labels(axes: Axes) -> list[str]:
+    return [str(each.get_label()) for each in axes.lines]
+
+
+def test_angles_are_drawn_in_degrees_against_the_desired_angle(course: Course) -> None:
+    one = course("smc/tuned")
+    (axes,) = angles([one]).axes
+    np.testing.assert_array_equal(line(axes, "smc/tuned").get_ydata(), np.degrees(one.theta))
+    np.testing.assert_allclose(np.asarray(line(axes, "desired").get_ydata()), 30.0)
+
+
+def test_reference_is_drawn_where_a_network_makes_it_differ_from_the_desired_angle(course: Course) -> None:
+    assert "reference" not in labels(angles([course("smc/tuned")]).axes[0])
+    (axes,) = angles([course("smc/tuned", network_error=0.01)]).axes
+    np.testing.assert_allclose(np.asarray(line(axes, "reference").get_ydata()), 30.0 + np.degrees(0.01))
+
+
+def test_loop_that_diverges_is_named_so_and_hides_no_other(course: Course) -> None:
+    (axes,) = angles([course("smc/tuned"), course("pid/printed", diverges=True)]).axes
+    assert "pid/printed (diverged)" in labels(axes)
+    assert axes.get_ylim()[1] <= 45.0
+
+
+def test_errors_are_drawn_in_radians(course: Course) -> None:
+    one = course("smc/printed")
+    (axes,) = errors([one], "SMC").axes
+    np.testing.assert_array_equal(line(axes, "smc/printed").get_ydata(), one.error)
+    assert axes.get_title("left") == "SMC"
+
+
+def test_logarithmic_errors_are_positive_and_leave_out_what_is_too_small(course: Course) -> None:
+    one = course("smc/printed", tau=0.1)
+    (axes,) = errors([one], log=True).axes
+    drawn = np.asarray(line(axes, "smc/printed").get_ydata())
+    known = np.abs(one.error) >= 1e-8
+    np.testing.assert_array_equal(drawn[known], np.abs(one.error)[known])
+    assert axes.get_yscale() == "log" and np.isnan(drawn[~known]).all() and not known.all()
+
+
+def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(course: Course) -> None:
+    one = course("smc/exchanged")
+    plus, close, minus, _, torque, _ = tensions(one).axes
+    np.testing.assert_array_equal(plus.lines[0].get_ydata(), one.tension[:, 0])
+    np.testing.assert_array_equal(minus.lines[0].get_ydata(), one.tension[:, 1])
+    np.testing.assert_array_equal(line(torque, "wanted by the law").get_ydata(), one.torque_wanted)
+    np.testing.assert_array_equal(line(torque, "of the commanded tensions").get_ydata(), one.torque)
+    np.testing.assert_array_equal(close.lines[0].get_ydata(), one.tension[-20:, 0])
+    assert np.asarray(close.lines[0].get_xdata())[0] == pytest.approx(1e3 * (one.time[-20] - one.time[-1]))
+    assert labels(plus) == ["commanded"]
+
+
+def test_a_long_course_of_tensions_is_drawn_by_samples_of_its_own_that_keep_every_peak(course: Course) -> None:
+    short = course("smc/exchanged")
+    rng = np.random.default_rng(0)
+    time, tension = np.arange(20_007.0) * 1e-3, rng.uniform(2.0, 60.0, (20_007, 2))
+    torque = 0.04 * (tension[:, 0] - tension[:, 1])
+    one = replace(short, time=time, tension=tension, torque=torque, torque_wanted=torque)
+    drawn = tensions(one).axes[0].lines[0]
+    at = np.searchsorted(time, np.asarray(drawn.get_xdata()))
+    np.testing.assert_array_equal(drawn.get_ydata(), tension[at, 0])
+    assert len(at) < 1100 and (np.diff(at) > 0).all()
+    for first in range(0, 20_000, 400):  # ten parts: peaks stay where they are
+        whole, kept = tension[first : first + 400, 0], tension[at[(at >= first) & (at < first + 400)], 0]
+        assert (kept.min(), kept.max()) == (whole.min(), whole.max())
+
+
+def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(course: Course) -> None:
+    one = course("smc/exchanged")
+    seen, acting = np.roll(one.theta, 3), 0.5 * one.tension
+    late = replace(one, seen=seen, acting=acting)
+    (axes,) = angles([late]).axes
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen))
+    (axes,) = errors([late]).axes
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), seen - late.theta_ref)
+    plus, _, minus, *_ = tensions(late).axes
+    for side, drawn in enumerate((plus, minus)):
+        np.testing.assert_array_equal(line(drawn, "commanded").get_ydata(), late.tension[:, side])
+        np.testing.assert_array_equal(line(drawn, "acting").get_ydata(), acting[:, side])
+    same = replace(one, seen=one.theta, acting=one.tension)
+    assert labels(angles([same]).axes[0]) == ["smc/exchanged", "desired"]
+    assert "acting" not in labels(tensions(same).axes[0])
+
+
+def test_angles_are_named_and_have_their_units(course: Course) -> None:
+    (axes,) = angles([course("smc/tuned")], "Loop fast").axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "bending angle [deg]")
+    assert axes.get_title("left") == "Loop fast"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_diverging_angle_is_shown_to_half_a_move_beyond_what_is_desired(course: Course, sign: float) -> None:
+    one = course("pid/printed", diverges=True)
+    far = replace(
+        one, theta=sign * np.tan(one.time), theta_ref=sign * one.theta_ref, theta_desired=sign * one.theta_ref
+    )
+    low, high = angles([far]).axes[0].get_ylim()
+    assert (low, high) == pytest.approx((-15.0, 45.0) if sign > 0.0 else (-45.0, 15.0))
+
+
+def test_an_axis_of_angles_is_no_wider_than_what_is_drawn(course: Course) -> None:
+    low, high = angles([course("smc/tuned")]).axes[0].get_ylim()
+    assert -3.0 < low < 0.0 and 30.0 < high < 33.0
+
+
+def test_a_small_move_is_shown_to_5_deg_beyond_it(course: Course) -> None:
+    one = course("pid/printed", diverges=True)
+    far = replace(one, theta=np.tan(one.time), theta_ref=0.1 * one.theta_ref, theta_desired=0.1 * one.theta_desired)
+    assert angles([far]).axes[0].get_ylim() == pytest.approx((-5.0, 8.0))
+
+
+def test_a_reference_is_drawn_once_however_many_loops_follow_it(course: Course) -> None:
+    loops = [course(name, network_error=0.01) for name in ("smc/tuned", "pid/tuned")]
+    assert labels(angles(loops).axes[0]) == ["smc/tuned", "pid/tuned", "desired", "reference"]
+    mixed = [course("smc/tuned"), course("pid/tuned", network_error=0.01), course("mrac/tuned", network_error=0.02)]
+    (axes,) = angles(mixed).axes
+    drawn = [float(np.asarray(each.get_ydata())[0]) for each in axes.lines if each.get_label() == "reference"]
+    assert labels(axes).count("reference") == 2 and len(set(drawn)) == 2
+
+
+def test_the_desired_angle_is_that_of_the_first_loop(course: Course) -> None:
+    other = replace(course("pid/tuned"), theta_desired=0.5 * course("pid/tuned").theta_desired)
+    (axes,) = angles([course("smc/tuned"), other]).axes
+    desired = line(axes, "desired")
+    np.testing.assert_allclose(np.asarray(desired.get_ydata()), 30.0)
+    np.testing.assert_array_equal(desired.get_xdata(), other.time)
+
+
+def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(course: Course) -> None:
+    (axes,) = errors([course("smc/printed")]).axes
+    assert axes.get_ylim()[0] < -np.radians(30.0) and axes.get_yscale() == "linear"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "error [rad]")
+    assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
+    one, half = course("pid/printed", diverges=True), np.linspace(0.1, 0.5, 200) * course("pid/printed").theta_ref
+    for sign in (1.0, -1.0):
+        wild = replace(one, theta=sign * np.tan(one.time))
+        reach = 2.0 * np.radians(30.0)
+        low, high = errors([replace(wild, theta_ref=half), wild]).axes[0].get_ylim()
+        assert (low, high) == pytest.approx((-reach, reach), abs=0.02)
+        assert low < -reach < reach < high, "a whole move to either side, and a little more"
+
+
+def test_the_logarithm_of_an_error_is_of_its_size_alone(course: Course) -> None:
+    one = course("smc/printed")
+    late = replace(one, seen=np.roll(one.theta, 3))
+    (axes,) = errors([late], log=True).axes
+    assert labels(axes) == ["smc/printed"] and axes.get_ylabel() == "|error| [rad]"
+
+
+def test_the_side_on_which_tensions_are_named_and_begin_at_zero(course: Course) -> None:
+    one = course("smc/exchanged")
+    plus, close, minus, _, torque, last = (made := tensions(one)).axes
+    assert [each.get_ylabel() for each in made.axes] == ["+ side [N]", "", "- side [N]", "", "torque [N m]", ""]
+    assert [each.get_xlabel() for each in made.axes[4:]] == ["time [s]", "time - 4.975 s [ms]"]
+    assert plus.get_title("left") == "smc/exchanged: tension per tendon, torque"
+    assert close.get_title("left") == "last 20 samples"
+    for each in (plus, minus):
+        low, high = each.get_ylim()
+        assert low == 0.0 and 60.0 < high < 66.0, "the largest tension of both sides"
+    assert [each.get_legend() is not None for each in made.axes] == [False] * 4 + [True, False]
+    for each in (torque, last):
+        np.testing.assert_array_equal(
+            line(each, "wanted by the law").get_ydata(),
+            one.torque_wanted[-len(each.lines[0].get_xdata()) :],  # type: ignore[arg-type]
+        )
+    assert np.asarray(last.lines[0].get_xdata())[-1] == 0.0
+    assert np.asarray(last.lines[0].get_xdata())[0] == pytest.approx(-19 * 25.0), "in ms"
+
+
+def test_tensions_that_act_are_shown_beside_those_commanded_with_a_legend(course: Course) -> None:
+    one = course("smc/exchanged")
+    made = tensions(replace(one, acting=2.0 * one.tension))
+    plus, close, minus, close_minus, *_ = made.axes
+    assert [each.get_legend() is not None for each in made.axes] == [False, False, True, False, True, False]
+    assert 120.0 < plus.get_ylim()[1] < 132.0 and plus.get_ylim() == minus.get_ylim()
+    for side, panel in enumerate((close, close_minus)):
+        np.testing.assert_array_equal(line(panel, "acting").get_ydata(), 2.0 * one.tension[-20:, side])
+
+
+def test_a_torque_that_the_law_wants_beyond_all_tensions_does_not_flatten_the_one_given(course: Course) -> None:
+    one = course("smc/exchanged")
+    wild = replace(one, torque_wanted=100.0 * one.torque - 50.0 * np.arange(200.0))
+    low, high = tensions(wild).axes[4].get_ylim()
+    most = np.abs(one.torque).max()
+    assert low == pytest.approx(-2.0 * most) and high == pytest.approx(2.0 * most)
+
+
+def test_a_torque_within_its_limits_is_drawn_as_large_as_it_is(course: Course) -> None:
+    one = course("smc/exchanged")
+    low, high = tensions(replace(one, torque_wanted=one.torque)).axes[4].get_ylim()
+    assert high < 1.2 * np.abs(one.torque).max() and -0.2 * high < low < 0.0
+
+
+@pytest.mark.parametrize("count", [1999, 2000])
+def test_a_course_is_drawn_sample_by_sample_until_there_are_four_in_a_pixel(course: Course, count: int) -> None:
+    tension = np.random.default_rng(0).uniform(2.0, 60.0, (count, 2))
+    torque = 0.04 * (tension[:, 0] - tension[:, 1])
+    time = 1e-3 * np.arange(float(count))
+    one = replace(course("smc/exchanged"), time=time, tension=tension, torque=torque, torque_wanted=torque)
+    drawn = tensions(one).axes[0].lines[0]
+    assert len(np.asarray(drawn.get_xdata())) == (count if count < 2000 else 1000)
+    at = np.searchsorted(one.time, np.asarray(drawn.get_xdata()))
+    np.testing.assert_array_equal(drawn.get_ydata(), tension[at, 0])
+
+
+def test_what_differs_by_less_than_a_millionth_is_not_drawn_twice(course: Course) -> None:
+    one = course("smc/exchanged")
+    for share, apart in ((0.9e-6, False), (1.1e-6, True)):
+        seen = one.theta + share * one.theta.max()
+        assert ("smc/exchanged as seen" in labels(angles([replace(one, seen=seen)]).axes[0])) == apart
+
+
+def test_errors_below_a_hundred_millionth_are_left_out(course: Course) -> None:
+    one = course("smc/printed")
+    theta = one.theta_ref + np.where(np.arange(200) % 2, 1.1e-8, -0.9e-8)
+    drawn = np.asarray(errors([replace(one, theta=theta)], log=True).axes[0].lines[0].get_ydata())
+    assert np.isnan(drawn[::2]).all() and np.isfinite(drawn[1::2]).all()

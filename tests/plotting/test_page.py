@@ -1,0 +1,180 @@
+"""The page of a run, and what a browser makes of it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wristctl.commands.compare.figures import rmse_map, variation_dots
+from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.comparison_data import frame, series
+from wristctl.config.learning import TrainSettings
+from wristctl.config.study import Study
+from wristctl.plotting.page import page, several_page
+from wristctl.records import InputRun, Run, start_run
+from wristctl.records.manifest import OVERVIEW, Overview
+from wristctl.simulation.repetitions import Repeated
+
+HERE = Path(__file__).parent
+KEPT = HERE.parents[1] / "build" / "screenshots"
+SPEC = importlib.util.spec_from_file_location("browser", HERE / "browser.py")
+assert SPEC is not None and SPEC.loader is not None
+BROWSER = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(BROWSER)
+
+MARKUP = "</script><b>bold</b>"
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow]) -> Run:
+    """A comparison of six rows on three references, one of which diverged, with the run it was made from."""
+    out = tmp_path_factory.mktemp("page") / "results"
+    found = [_complete(result) for result in results]
+    with start_run("train", Study(), "quick", out) as network:
+        network.metric("rmse", 1e-3, "rad", "lower")
+    inputs = [InputRun("network", Run(network.path))]
+    argv = ["wristctl", "compare", "--label", MARKUP]
+    with start_run("compare", Study(), "quick", out, argv, inputs, lambda path, man: page(Run(path), man)) as run:
+        run.table("data/comparison.csv", frame(found, ()))
+        run.arrays("data/trajectories.npz", series(found, every=1))
+        run.figure("rmse-default", rmse_map(found, "loop default"))
+        run.figure("tension-variation-default", variation_dots(found, "loop default"))
+        for each in found:
+            value = each.simulation.metrics["rmse"]
+            run.metric(f"rmse_{each.label}_{each.reference}", value, "rad", "lower", meaning=MARKUP)
+        rows: list[Any] = [[each.label, each.reference, each.simulation.metrics["rmse"]] for each in found]
+        rows = [[name, reference, None if np.isnan(value) else value] for name, reference, value in rows]
+        tables = [{"title": "Loop default", "columns": ["controller", "reference", "RMSE [rad]"], "rows": rows}]
+        run.file("tables.json").write_text(json.dumps(tables))
+    return Run(run.path)
+
+
+def _complete(result: ComparedRow) -> ComparedRow:
+    metrics = {"settling": 1.0, "steady_state": 1e-4} | result.simulation.metrics
+    return replace(result, repeated=Repeated.once(replace(result.simulation, metrics=metrics)))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    if not (BROWSER.CHROMIUM and BROWSER.DRIVER):
+        pytest.skip("needs Debian's chromium and chromium-driver")
+    made = BROWSER.Browser(tmp_path_factory.mktemp("profile"))
+    yield made
+    made.close()
+
+
+def test_the_page_is_one_file_that_asks_for_nothing(compared: Run) -> None:
+    text = compared.file("report.html").read_text()
+    asked = re.findall(r"""(?:src|href|action)\s*=\s*["']([^"']+)|url\(([^)]+)\)|@import""", text)
+    assert all(address.startswith(("#", "data:")) for pair in asked for address in pair if address)
+    assert "default-src 'none'" in text and len(text) < 5e6
+
+
+def test_what_users_write_is_text_on_the_page_and_no_markup(compared: Run) -> None:
+    text = compared.file("report.html").read_text()
+    assert MARKUP not in text and "&lt;b&gt;bold" in text
+
+
+def test_the_report_does_not_count_as_a_result(compared: Run) -> None:
+    assert "report.html" not in {each.path for each in compared.manifest.outputs}
+    assert "  report.html\n" in compared.file("SHA256SUMS").read_text()
+    compared.check()
+
+
+def test_figures_share_no_ids(compared: Run) -> None:
+    ids = re.findall(r'\sid="([^"]+)"', compared.file("report.html").read_text())
+    assert len(ids) == len(set(ids))
+
+
+def test_a_page_that_fails_costs_nothing_but_itself(tmp_path: Path) -> None:
+    with start_run("train", Study(), "", tmp_path, page=lambda *_: str(1 / 0)) as live:
+        live.metric("rmse", 1.0)
+    run = Run(live.path)
+    assert run.state == "ok" and not (run.path / "report.html").exists()
+    assert "no report.html: ZeroDivisionError" in run.file("console.log").read_text()
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
+def test_a_browser_shows_the_page_without_an_error_or_a_request(
+    browser: Any, compared: Run, width: int, dark: bool
+) -> None:
+    file = compared.file("report.html")
+    browser.open(file, width, dark)
+    browser.run(
+        "document.getElementById('instant').value = 300;"
+        "document.getElementById('instant').dispatchEvent(new Event('input'))"
+    )
+    browser.screenshot(KEPT / f"compare-{width}-{'dark' if dark else 'light'}.png")
+    assert browser.console() == []
+    assert set(browser.requests()) == {file.as_uri()}
+    assert browser.run("return document.documentElement.scrollWidth") <= width, "nothing but tables scrolls sideways"
+    ground = browser.run("return getComputedStyle(document.body).backgroundColor")
+    assert (max(map(int, re.findall(r"\d+", ground))) < 64) == dark
+
+
+@pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
+def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_path: Path, width: int) -> None:
+    with start_run("train", Study(), "", tmp_path, [], page=lambda path, man: page(Run(path), man)) as live:
+        live.file(OVERVIEW).write_text(Overview(["hardly moves, and why " * 20]).text())
+    browser.open(Run(live.path).file("report.html"), width, False)
+    wide = "const a = document.querySelector('#answer pre'); return a.scrollWidth - a.clientWidth"
+    assert browser.run(wide) <= 0
+
+
+def test_a_table_sorts_by_number_and_back(browser: Any, compared: Run) -> None:
+    browser.open(compared.file("report.html"), 1280, False)
+    press = "document.querySelectorAll('table.sortable')[0].querySelectorAll('th button')[2].click();"
+    read = "return [...document.querySelector('table.sortable').tBodies[0].rows].map(row => row.cells[2].textContent)"
+    rising, falling = browser.run(press + read), browser.run(press + read)
+    numbers = [float(text) for text in rising if text != "-"]
+    assert numbers == sorted(numbers) and len(numbers) == 17 and falling == rising[::-1]
+
+
+def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, compared: Run) -> None:
+    browser.open(compared.file("report.html"), 1280, False)
+    groups = browser.run("return [...document.getElementById('group').options].map(option => option.value)")
+    references = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
+    assert groups == [f"default, {name}" for name in references]
+    read = "return [...document.querySelectorAll('#wrists > div')].map(panel => panel.lastChild.textContent)"
+    seek = "const s = document.getElementById('instant'); s.value = 1000; s.dispatchEvent(new Event('input'));"
+    panels = browser.run(seek + read)
+    rested = "29.8°, wanted 30.0°"
+    assert panels == [rested, "diverged", *[rested] * 4]
+    other = "const g = document.getElementById('group'); g.selectedIndex = 1; g.dispatchEvent(new Event('change'));"
+    assert browser.run(other + seek + read) == [rested] * 6
+    clock = "return parseFloat(document.getElementById('clock').textContent)"
+    pressed = browser.run("document.getElementById('play').click(); return document.getElementById('play').textContent")
+    assert pressed == "Pause"
+    deadline = time.monotonic() + 30.0  # however slow the machine: it begins anew and goes on
+    seen = [browser.run(clock)]
+    while min(seen) > 4.5 and time.monotonic() < deadline:
+        seen.append(browser.run(clock))
+    assert min(seen) <= 4.5
+    while seen[-1] <= min(seen) and time.monotonic() < deadline:
+        seen.append(browser.run(clock))
+    assert seen[-1] > min(seen)
+    assert browser.console() == []
+
+
+def test_two_runs_on_one_page_show_only_what_differs(browser: Any, tmp_path: Path) -> None:
+    runs = []
+    for epochs in (5, 6):
+        with start_run("train", Study(train=TrainSettings(epochs=epochs)), f"of-{epochs}", tmp_path) as live:
+            live.metric("rmse", 1.0 / epochs, "rad", "lower")
+        runs.append(Run(live.path))
+    file = tmp_path / "two.html"
+    file.write_text(several_page(runs))
+    browser.open(file, 1280, False)
+    rows = browser.run("return [...document.querySelectorAll('tbody tr')].map(row => row.innerText)")
+    assert [row.split("\t") for row in rows[2:]] == [["train.epochs", "5", "6"], ["rmse", "0.2", "0.1667"]]
+    assert browser.console() == []

@@ -1,0 +1,213 @@
+"""What stands on the page of a run: its headline, its metrics, its figures, where it comes from."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wristctl.config.learning import TrainSettings
+from wristctl.config.study import Study
+from wristctl.plotting.page import LARGEST, figures, inline_figure, page, several_page
+from wristctl.records import InputRun, Run, start_run
+from wristctl.records.manifest import OVERVIEW, Overview, read_overview
+
+
+def made(tmp_path: Path, metrics: dict[str, Any], unit: str = "rad", better: Any = "lower", **files: Any) -> Run:
+    with start_run("train", Study(), "", tmp_path, ["wristctl", "train", "--label", "a b"]) as live:
+        for name, value in metrics.items():
+            live.metric(name, value, unit if name != "other" else "s", better, meaning=f"says {name}")
+        for name, content in files.items():
+            live.file(f"{name}.json").write_text(json.dumps(content))
+    return Run(live.path)
+
+
+def page_of(run: Run) -> str:
+    return page(run, run.manifest)
+
+
+def cards(run: Run) -> list[tuple[str, str]]:
+    found = re.findall(r'<div class="card"><p>(.*?)</p><p class="value">(\S+)', page_of(run))
+    return [(name, value) for name, value in found]
+
+
+def rows(text: str) -> list[list[str]]:
+    """Cells of all rows of all tables."""
+    lines = re.findall(r"<tr>(.*?)</tr>", text, re.DOTALL)
+    cells = [re.findall(r"<td.*?>(.*?)</td>", line, re.DOTALL) for line in lines]
+    return [[re.sub(r"<.*?>", "", cell).strip() for cell in each] for each in cells]
+
+
+def test_a_command_says_which_metrics_head_its_page(tmp_path: Path) -> None:
+    run = made(tmp_path, {f"m_{k}": float(k) for k in range(20)} | {"none": float("nan")})
+    overview = Overview(cards=["m_7", "gone", "none", "m_3"])
+    (run.path / OVERVIEW).write_text(overview.text())
+    assert cards(run) == [("m 7", "7"), ("m 3", "3")], "what is not known is none"
+
+
+def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_path: Path) -> None:
+    run = made(tmp_path, {"none": float("nan")} | {f"m_{k}": 12.0 - k for k in range(11)})
+    assert cards(run) == [(f"m {k}", f"{12 - k}") for k in range(6)]
+    plain = made(tmp_path / "b", {f"m_{k}": float(k) for k in range(20, 0, -1)}, better=None)
+    assert [name for name, _ in cards(plain)] == [f"m {k}" for k in range(20, 14, -1)]
+
+
+def test_the_answer_begins_the_page_and_figures_follow_in_reading_order(tmp_path: Path) -> None:
+    run = made(tmp_path, {"rmse": 1.0}, tables=[{"title": "All", "columns": ["a"], "rows": [["b"]]}])
+    folder = run.path / "figures"
+    folder.mkdir()
+    for name in ("alone", "b-late", "a-early", "first"):
+        (folder / f"{name}.svg").write_text(SVG)
+    captions = {"first": "the answer drawn", "b-late": "comes <second>", "a-early": "", "undrawn": "drawn later"}
+    (run.path / OVERVIEW).write_text(Overview(["smc < pid", "holds"], "first", [], captions).text())
+    text = page_of(run)
+    order = [
+        "smc &lt; pid\nholds",
+        "the answer drawn",
+        "All",
+        "comes &lt;second&gt;",
+        "a early",
+        "alone",
+        "drawn later",
+    ]
+    places = [text.index(each) for each in order]
+    assert places == sorted(places) and "<details><summary>All</summary>" in text
+    assert f"wristctl runs report --all-figures {run.id}" in text
+    assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "alone"]
+
+
+def badge(run: Run) -> tuple[str, str]:
+    """Classes and words of the badge at the top of the page."""
+    ((classes, words),) = re.findall(r'<span class="(state.*?)">(.*?)</span>', page_of(run))
+    return classes, words
+
+
+def test_the_badge_is_the_verdict_and_ok_only_where_nothing_is_wrong(tmp_path: Path) -> None:
+    run = made(tmp_path, {"rmse": 1.0})
+    (run.path / OVERVIEW).write_text(Overview().text())
+    assert badge(run) == ("state ok", "ok")
+    (run.path / OVERVIEW).write_text(Overview(marks=["does not arrive", "chatters"]).text())
+    classes, words = badge(run)
+    assert "ok" not in classes.split() and words == "does not arrive, chatters"
+    run.manifest.state = "failed"
+    assert badge(run) == ("state failed", "failed"), "what was not done has no verdict"
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{", '{"answer": 3, "captions": [1], "cards": {"a": 1}}', '{"answer": [1], "marks": [2]}']
+)
+def test_an_overview_that_cannot_be_read_costs_nothing(tmp_path: Path, content: str) -> None:
+    run = made(tmp_path, {"rmse": 1.0})
+    (run.path / OVERVIEW).write_text(content)
+    assert read_overview(run.path) == Overview() and cards(run) == [("rmse", "1")]
+
+
+def test_all_metrics_stand_in_a_table_with_unit_direction_and_meaning(tmp_path: Path) -> None:
+    found = rows(page_of(made(tmp_path, {"rmse": 0.123456, "none": float("nan")})))
+    assert ["rmse", "0.1235", "rad", "lower", "1", "says rmse"] in found
+    assert ["none", "-", "rad", "lower", "1", "says none"] in found
+
+
+def test_cells_are_words_whole_numbers_four_digits_or_a_dash(tmp_path: Path) -> None:
+    cells: list[Any] = ["a<b", 123456, 1.23456, True, False, None]
+    run = made(tmp_path, {}, tables=[{"title": "T", "columns": list("abcdef"), "rows": [cells]}])
+    assert [html.unescape(each) for each in next(r for r in rows(page_of(run)) if "123456" in r)] == [
+        "a<b", "123456", "1.235", "yes", "no", "-",
+    ]  # fmt: skip
+
+
+def test_the_page_says_what_the_run_came_from(tmp_path: Path) -> None:
+    before = made(tmp_path, {"rmse": 1.0})
+    with start_run("tune", Study(), "", tmp_path, ["wristctl", "tune", "a b"], [InputRun("network", before)]) as live:
+        live.metric("rmse", 1.0)
+    run = Run(live.path)
+    text = page_of(run)
+    found = {row[0]: html.unescape(row[1]) for row in rows(text) if len(row) == 2}
+    manifest = run.manifest
+    assert found["command"] == "wristctl tune 'a b'"
+    assert found["input network"] == f"{before.id}, result {before.result_hash[:12]}"
+    assert (found["configuration"], found["fingerprint"]) == (manifest.config_sha256, manifest.fingerprint)
+    assert found["result"] == manifest.result_sha256 and found["python"] == manifest.environment.python
+    assert manifest.code.tree_sha256[:12] in found["code"] and f"wristctl {manifest.code.version}" in found["code"]
+    assert ("uncommitted changes" in found["code"]) == bool(manifest.code.commit and manifest.code.dirty)
+    assert f"{manifest.environment.cores} cores" in found["machine"]
+    assert re.fullmatch(r"\d+ MB, \d+\.\d s", found["memory, processor time"])
+    assert f"numpy {manifest.environment.packages['numpy']}" in found["packages"] and found["numerics"] == "-"
+    hashes = {row[0]: row for row in rows(text) if len(row) == 4}
+    for each in manifest.outputs:
+        assert hashes[each.path] == [each.path, str(each.bytes), each.sha256, "no" if each.volatile else "yes"]
+    assert 'class="lineage"' in text and f"wristctl tune --config {run.id}/config.yaml" in text
+
+
+SVG = (
+    '<?xml version="1.0"?><!DOCTYPE svg PUBLIC "x"><svg width="9" xmlns="http://www.w3.org/2000/svg">'
+    '<metadata>who</metadata><defs><style type="text/css">*{x}</style></defs><g id="one"><path id="p" '
+    'd="M 1.23456 2.5\nL 0.125 3.1415926"/><use xlink:href="#p" y="1.23456"/><rect clip-path="url(#one)"/></g></svg>'
+)
+
+
+def shown(url: str) -> str:
+    """The content of a data URL."""
+    return base64.b64decode(url.partition("base64,")[2]).decode()
+
+
+def test_a_figure_within_the_page_is_a_picture_with_two_decimals(tmp_path: Path) -> None:
+    file = tmp_path / "a.svg"
+    file.write_text(SVG)
+    url = inline_figure(file)
+    assert url.startswith("data:image/svg+xml;base64,")
+    assert 'd="M 1.23 2.5 L 0.12 3.14"' in shown(url) and 'y="1.23456"' in shown(url)
+
+
+@pytest.mark.parametrize(("more", "picture", "small"), [(0, True, True), (1, True, False), (1, False, True)])
+def test_a_figure_that_is_too_large_is_shown_as_its_picture(
+    tmp_path: Path, more: int, picture: bool, small: bool
+) -> None:
+    file = tmp_path / "a-b.svg"
+    empty = "<svg ></svg>"
+    file.write_text(f"<svg >{'x' * (LARGEST - len(empty) + more)}</svg>")
+    if picture:
+        file.with_suffix(".png").write_bytes(b"picture")
+    data = base64.b64encode(b"picture").decode()
+    found = inline_figure(file)
+    assert shown(found).startswith("<svg") if small else found == f"data:image/png;base64,{data}"
+
+
+def test_figures_come_by_name_and_a_link_is_no_figure(tmp_path: Path) -> None:
+    run = made(tmp_path, {"rmse": 1.0})
+    (run.path / "figures").mkdir(exist_ok=True)
+    for name in ("b-c", "a"):
+        (run.path / "figures" / f"{name}.svg").write_text(f"<svg >{name}</svg>")
+    (run.path / "figures" / "secret.svg").symlink_to("/etc/hostname")
+    assert [(caption, shown(url)) for _, caption, url in figures(run)] == [
+        ("a", "<svg >a</svg>"),
+        ("b c", "<svg >b-c</svg>"),
+    ]
+
+
+def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_path: Path) -> None:
+    runs = []
+    for number, (epochs, rate) in enumerate([(5, 0.1), (6, 0.1), (5, 0.2)]):
+        settings = Study(train=TrainSettings(epochs=epochs, learning_rate=rate))
+        with start_run("train", settings, f"n{number}" if number else "", tmp_path) as live:
+            live.metric("rmse", float(epochs), "rad", "lower")
+        (live.path / "figures").mkdir(exist_ok=True)
+        (live.path / "figures" / f"{'b' if number == 2 else 'a'}.svg").write_text(f"<svg >{number}</svg>")
+        runs.append(Run(live.path))
+    text = several_page(runs)
+    found = rows(text)
+    assert ["train.epochs", "5", "6", "5"] in found and ["train.learning_rate", "0.1", "0.1", "0.2"] in found
+    assert ["rmse", "5", "6", "5"] in found
+    assert 0 < text.index(">Configuration<") < text.index(">Metrics<")
+    assert f"{runs[0].id} | n1 | n2" in text
+    assert [row[0] for row in found[:4] if row] == [run.id for run in runs], "one row each"
+    assert [shown(url) for url in re.findall(r'src="(data:image/svg[^"]*)"', text)] == [
+        "<svg >0</svg>",
+        "<svg >1</svg>",
+        "<svg >2</svg>",
+    ]

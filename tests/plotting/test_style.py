@@ -1,0 +1,56 @@
+"""One look: a controller keeps its colour, its gains differ in dashes."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from wristctl.control.table import CONTROLLERS
+from wristctl.plotting.style import colour, figure, legend_below, line, logarithmic
+
+
+def test_controllers_of_the_table_have_colours_of_their_own() -> None:
+    assert len({colour(name) for name in CONTROLLERS}) == len(CONTROLLERS)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_gains_of_a_controller_share_its_colour_and_differ_in_dashes(name: str) -> None:
+    lines = [line(f"{name}/{gains}") for gains in {*CONTROLLERS[name].presets, "tuned"} - {"default"}]
+    assert {each["color"] for each in lines} == {colour(name)}
+    assert len({str(each["linestyle"]) for each in lines}) == len(lines)
+
+
+def test_unknown_controller_keeps_one_colour() -> None:
+    assert colour("someone-elses") == colour("someone-elses") == line("someone-elses/tuned")["color"]
+
+
+def test_axes_are_always_an_array_of_rows_and_columns() -> None:
+    assert figure()[1].shape == (1, 1)
+    assert figure(2, 3)[1].shape == (2, 3)
+
+
+def test_legend_below_names_each_label_once() -> None:
+    made, axes = figure(1, 2)
+    for each in axes.ravel().tolist():
+        each.plot([0.0, 1.0], label="smc/tuned")
+    legend_below(made)
+    assert [text.get_text() for text in made.legends[0].get_texts()] == ["smc/tuned"]
+
+
+@pytest.mark.parametrize(("low", "high"), [(1e-7, 3e-2), (0.9, 40.0), (0.02, 0.05)])
+def test_powers_of_ten_name_the_ticks_that_formulas_would(low: float, high: float) -> None:
+    made, ((plain, formulas),) = figure(1, 2)
+    logarithmic(plain.yaxis)
+    formulas.set_yscale("log")
+    for axes in (plain, formulas):
+        axes.set_ylim(low, high)
+    made.draw_without_rendering()
+    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    for minor in (False, True):
+        shown = [label.get_text() for label in plain.get_yticklabels(minor=minor)]
+        wanted = [label.get_text() for label in formulas.get_yticklabels(minor=minor)]
+        assert len(shown) == len(wanted)
+        for text, formula in zip(shown, wanted, strict=True):
+            expected = re.sub(r"\$\\mathdefault|[{}^$]", "", formula).replace(r"\times", "\u00d7")
+            assert text.translate(raised) == expected.removesuffix("\u00d7100"), "2, not 2 times 10 to the 0"

@@ -1,0 +1,136 @@
+"""Figures of trials show each direction's courses, in degrees and newtons, with their simulation and their push."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from wristctl.commands.hw_run.figures import DIRECTIONS, LoggedTrial, desired_and_obtained, errors, lateness, tensions
+from wristctl.simulation.trajectory import Trajectory
+
+
+@pytest.fixture
+def trial(course: Callable[..., Trajectory]) -> Callable[..., LoggedTrial]:
+    def made(direction: str = "flexion", repetition: int = 0, push: tuple[float, float] | None = None) -> LoggedTrial:
+        one = course("smc/exchanged", network_error=0.02)
+        simulated = 1.1 * one.time, 0.9 * one.theta, 0.1 * one.theta
+        own = one.time, one.theta, one.theta_ref, one.theta_desired, one.tension + np.array([0.0, 1.0]), simulated, push
+        return LoggedTrial(direction, one.label, repetition, *own)
+
+    return made
+
+
+def named(axes: Axes, label: str) -> list[Line2D]:
+    return [each for each in axes.lines if each.get_label() == label]
+
+
+def shown(made: Figure) -> list[str]:
+    return [axes.get_title("left") for axes in made.axes if axes.get_visible()]
+
+
+Maker = Callable[..., LoggedTrial]
+Drawing = Callable[[Sequence[LoggedTrial], str], Figure]
+
+
+def test_angles_are_in_degrees_beside_what_was_wanted_and_simulated(trial: Maker) -> None:
+    one = trial()
+    made = desired_and_obtained([one], "Trials")
+    (axes,) = made.axes
+    for label, time, angle in (
+        ("smc/exchanged", one.time, one.theta),
+        ("desired", one.time, one.theta_desired),
+        ("smc/exchanged, simulated", 1.1 * one.time, 0.9 * one.theta),
+    ):
+        (line,) = named(axes, label)
+        np.testing.assert_array_equal(line.get_xdata(), time)
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), np.degrees(angle))
+    assert (made.get_supylabel(), axes.get_xlabel()) == ("bending angle [deg]", "time [s]")
+    assert made.get_suptitle() == "Trials"
+
+
+def test_errors_are_angle_less_reference_in_degrees_around_zero(trial: Maker) -> None:
+    one = trial()
+    made = errors([one])
+    (axes,) = made.axes
+    for label, error in (("smc/exchanged", one.theta - one.theta_ref), ("smc/exchanged, simulated", 0.1 * one.theta)):
+        (line,) = named(axes, label)
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), np.degrees(error))
+    assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
+    assert made.get_supylabel() == "error [deg]"
+
+
+def test_tensions_are_those_of_the_side_that_pulls_and_of_the_other(trial: Maker) -> None:
+    one = trial()
+    made = tensions([one])
+    (axes,) = made.axes
+    pulls, holds = axes.lines
+    assert (pulls.get_label(), holds.get_label()) == ("tendons that pull", "tendons that hold against")
+    np.testing.assert_array_equal(pulls.get_ydata(), one.tension[:, 0])
+    np.testing.assert_array_equal(holds.get_ydata(), one.tension[:, 1])
+    assert pulls.get_color() != holds.get_color() and made.get_supylabel() == "tension [N]"
+
+
+def test_a_simulation_is_drawn_once_beside_the_first_repetition(trial: Maker) -> None:
+    again = [trial(repetition=k) for k in range(3)]
+    for draw in (desired_and_obtained, errors):
+        (axes,) = draw(again).axes
+        assert len(named(axes, "smc/exchanged")) == 3 and len(named(axes, "smc/exchanged, simulated")) == 1
+        alone = draw([again[1]]).axes[0], draw([replace(again[0], simulated=None)]).axes[0]
+        assert not any(named(each, "smc/exchanged, simulated") for each in alone)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+@pytest.mark.parametrize("draw", [desired_and_obtained, errors, tensions])
+def test_each_direction_has_its_panel_in_the_papers_order(trial: Maker, draw: Drawing, count: int) -> None:
+    names = DIRECTIONS[-count:]
+    made = draw([trial(each) for each in reversed(names)], "")
+    assert shown(made) == list(names)
+    made.draw_without_rendering()
+    below = [axes for axes in made.axes if axes.get_visible()][-2:]
+    assert all(axes.get_xlabel() == "time [s]" for axes in below)
+    assert all(any(label.get_text() for label in axes.get_xticklabels()) for axes in below)
+    others = [axes for axes in made.axes if axes.get_visible()][:-2]
+    assert not any(axes.get_xlabel() for axes in others)
+    columns = {round(axes.get_position().x0, 2) for axes in made.axes}
+    assert len(columns) == min(2, count), "two beside each other at most"
+
+
+def test_four_panels_are_no_taller_each_than_two(trial: Maker) -> None:
+    tall = [errors([trial(each) for each in DIRECTIONS[:count]]).get_figheight() for count in (2, 3, 4)]
+    assert tall[0] < tall[1] == tall[2] < 2.0 * tall[0]
+
+
+def test_a_push_is_shaded_in_its_own_direction_from_its_beginning_to_its_end(trial: Maker) -> None:
+    pushed = [trial("flexion", k, (2.0, 2.5)) for k in range(2)]
+    made = errors([*pushed, trial("radial"), trial("ulnar", push=(1.0, 1.2))])
+    spans = {axes.get_title("left"): axes.patches for axes in made.axes if axes.get_visible()}
+    assert [len(each) for each in spans.values()] == [1, 0, 1], "once however often it was repeated"
+    (span,) = spans["flexion"]
+    assert (span.get_x(), span.get_width()) == pytest.approx((2.0, 0.5))  # type: ignore[attr-defined]
+    assert span.get_label() == "push"
+    assert spans["ulnar"][0].get_x() == pytest.approx(1.0)  # type: ignore[attr-defined]
+
+
+def test_a_legend_names_each_course_once(trial: Maker) -> None:
+    made = desired_and_obtained([trial(each, k, (2.0, 2.5)) for each in DIRECTIONS for k in range(2)])
+    (legend,) = made.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert sorted(names) == ["desired", "push", "smc/exchanged", "smc/exchanged, simulated"]
+
+
+@pytest.mark.parametrize(("latest", "end"), [(2e-3, 5.0), (8e-3, 8.0)])
+def test_lateness_counts_every_tick_in_ms_up_to_a_period_or_the_latest(latest: float, end: float) -> None:
+    late = np.append(np.linspace(0.0, 1e-3, 99), latest)
+    (axes,) = lateness(late, 5e-3).axes
+    bars = [(bar.get_x(), bar.get_width(), bar.get_height()) for bar in axes.patches]  # type: ignore[attr-defined]
+    assert sum(height for _, _, height in bars) == 100
+    assert bars[0][0] == pytest.approx(0.0, abs=1e-12) and bars[-1][0] + bars[-1][1] == pytest.approx(end)
+    assert sum(height for x, _, height in bars if x < 1.0) == 99 and len(bars) > 40
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("from due to begun [ms]", "ticks [1]")
+    assert axes.get_yscale() == "log"

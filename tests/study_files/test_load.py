@@ -1,0 +1,158 @@
+"""Files and overrides become a study; what is wrong is named with place and cure."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from wristctl.config.loop import LOOPS, Loop
+from wristctl.config.plant import Actuator, Plant
+from wristctl.errors import UserError
+from wristctl.study_files.load import load_study
+
+ROOT = Path(__file__).parents[2]
+
+
+def _file(folder: Path, text: str, name: str = "study.yaml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_later_files_win_leaf_by_leaf(tmp_path: Path) -> None:
+    first = _file(tmp_path, "wrist: {length: 0.1, mass: 0.06}\ntrain: {hidden: [9, 9, 9]}", "a.yaml")
+    second = _file(tmp_path, "wrist: {length: 0.12}\ntrain: {hidden: [5]}", "b.yaml")
+    study = load_study([first, second])
+    assert (study.wrist.length, study.wrist.mass, study.train.hidden) == (0.12, 0.06, (5,))
+
+
+def test_overrides_win_over_files_and_are_typed(tmp_path: Path) -> None:
+    study = load_study(
+        [_file(tmp_path, "train: {epochs: 7}")],
+        ["epochs=9", "train.hidden=[4, 4]", "wrist.length=9e-2", "data=latest:gen-data"],
+        "train",
+    )
+    assert (study.train.epochs, study.train.hidden, study.wrist.length) == (9, (4, 4), 0.09)
+    assert study.train.data == "latest:gen-data"
+
+
+def test_an_override_is_relative_to_the_command_first() -> None:
+    assert load_study([], ["horizon=2.0"], "tune").tune.horizon == 2.0
+    assert load_study([], ["horizon=2.0"], "simulate").simulate.horizon == 2.0
+    assert load_study([], ["seed=4"], "simulate").seed == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("train:\n  epoch: 3\n", "unknown key 'epoch' - {file}:2: train.epoch - fix: did you mean 'epochs'?"),
+        ("trian: {}\n", "unknown key 'trian' - {file}:1: trian - fix: did you mean 'train'?"),
+        ("gen_data: {}\n", "did you mean 'gen-data'?"),
+        ("wrist:\n\n  mass: -0.1\n", "-0.1 should be greater than 0 - {file}:3: wrist.mass - fix: "),
+        ("wrist: {mass: .nan}\n", "nan should be a finite number - {file}:1: wrist.mass"),
+        ("wrist: {mass: .inf}\n", "inf should be a finite number"),
+        ("wrist: {mass: heavy}\n", "'heavy' should be a valid number"),
+        ("wrist: {mass: '0.1'}\n", "'0.1' should be a valid number"),
+        ("wrist: {mass: true}\n", "should be a valid number"),
+        ("gen-data: {samples: 1e3}\n", "1000.0 should be a valid integer"),
+        ("wrist: 3\n", "3 should be a group of keys and values - {file}:1: wrist"),
+        ("wrist: {pretension: 70}\n", "must exceed pretension"),
+        ("train: {optimiser: adam_w}\n", "{file}:1: train.optimiser - fix: did you mean 'adamw'?"),
+        ("compare:\n  rows:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.rows.1.contoller"),
+        ("compare:\n  rows:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
+        ("tune:\n  scenarios:\n  - reference: {kind: ramp}\n", "{file}:3: tune.scenarios.0.reference.kind"),
+        ("- 1\n", "a study file holds keys and values - {file}:1"),
+        ("train: {epochs: 1}\ntrain: {}\n", "key 'train' is repeated - {file}:2"),
+    ],
+)
+def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) -> None:
+    file = _file(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        load_study([file])
+    assert said.format(file=file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("epoch=3", "unknown key 'epoch' - --set epoch=3 - fix: did you mean 'epochs'?"),
+        ("epochs=many", "'many' should be a valid integer - --set epochs=many: train.epochs"),
+        ("wrist.lenght=1", "--set wrist.lenght=1: wrist.lenght - fix: did you mean 'length'?"),
+        ("epochs", "an override is key=value"),
+        ("hidden=[1,", "not valid YAML"),
+        ("epochs=__import__('os').getpid()", "should be a valid integer"),
+        (
+            "hw-run.rows.0.gain=x",
+            "'rows' is a list, and given as a whole: '0' is no key of it - --set hw-run.rows.0.gain=x: hw-run.rows - "
+            "fix: hw-run.rows=[{controller: ..., gains: ...}]; for 'gain' did you mean 'gains'?",
+        ),
+        ("compare.references=3", "3 should be a valid list - --set compare.references=3: compare.references"),
+        ("epochs={a: 1}", "{'a': 1} should be a valid integer - --set epochs={a: 1}: train.epochs"),
+        ("rows=[{name: a}, {name: b}, {name: a}]", "each row needs a name of its own"),
+        ("rows=[{name: a}, {}]", "each row needs a name of its own"),
+        ("train={rows: [{name: a}, {name: b}], search: true}", "give rows or search, not both"),
+        ("wrist.gravity.0=1", "--set wrist.gravity.0=1: wrist.gravity - fix: wrist.gravity=[...]"),
+    ],
+)
+def test_errors_in_overrides_name_the_override(override: str, said: str) -> None:
+    with pytest.raises(UserError) as caught:
+        load_study([], [override], "train")
+    assert said in str(caught.value)
+
+
+def test_an_error_names_the_file_that_set_the_value_last(tmp_path: Path) -> None:
+    good = _file(tmp_path, "train: {epochs: 5, batch: 10}", "good.yaml")
+    bad = _file(tmp_path, "train:\n  epochs: 0\n", "bad.yaml")
+    with pytest.raises(UserError, match=r"bad\.yaml:2: train\.epochs"):
+        load_study([good, bad])
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="No such file"):
+        load_study([tmp_path / "absent.yaml"])
+    with pytest.raises(UserError, match="Is a directory"):
+        load_study([tmp_path])
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "experiments").glob("*.yaml")), ids=lambda file: file.name)
+def test_every_committed_experiment_is_valid(file: Path) -> None:
+    assert load_study([file]) != load_study([])
+
+
+def test_named_loops_are_all_there_are_and_a_built_in_one_keeps_what_is_not_given(tmp_path: Path) -> None:
+    soft = "loops: {soft: {plant: {stiffness_scale: 0.8}}, exact: {substeps: 2}, sampled: {}}"
+    file = _file(tmp_path, f"compare: {{{soft}}}")
+    overrides = ["loops.soft.substeps=3", "loops.sampled.actuator.level=lagged"]
+    loops = load_study([file], overrides, "compare").compare.loops
+    assert list(loops) == ["soft", "exact", "sampled"]
+    assert loops["soft"] == Loop(plant=Plant(stiffness_scale=0.8), substeps=3)
+    assert loops["exact"] == LOOPS["exact"].model_copy(update={"substeps": 2})
+    assert loops["sampled"] == LOOPS["sampled"].model_copy(update={"actuator": Actuator(level="lagged")})
+    assert load_study([], ["loops.exact.limits=true"], "tune").tune.loops == {
+        "exact": LOOPS["exact"].model_copy(update={"limits": True})
+    }
+    assert load_study([]).compare.loops == LOOPS
+    with pytest.raises(UserError, match="too few: at least 1"):
+        load_study([], ["loops={}"], "compare")
+
+
+def test_studies_that_call_the_closed_form_exact_still_read() -> None:
+    """A loop has that name too, so what is written now is another."""
+    study = load_study(
+        [], ["compare.inverses=[network, exact]", "simulate.reference={tip: [0.07, 0.02], inverse: exact}"]
+    )
+    assert study.compare.inverses == ("network", "closed-form") and study.simulate.reference.inverse == "closed-form"
+    with pytest.raises(UserError, match="closed-form"):
+        load_study([], ["compare.inverses=[closed-from]"])
+
+
+@pytest.mark.parametrize("name", ["../../evil", "a/b", ".hidden", "", "x" * 61, "a\n", "a\0b"])
+def test_a_family_whose_name_is_none_for_a_file_is_refused_before_any_work(name: str) -> None:
+    with pytest.raises(UserError, match="is no name for a family") as caught:
+        load_study([], [f"families={json.dumps({name: {}})}"])
+    assert caught.value.exit_code == 2 and "families" in caught.value.where
+    assert list(load_study([], ['families={"my rig-2.5": {}}']).families) == ["my rig-2.5"]

@@ -1,0 +1,116 @@
+"""Sweeps as they are written, and the studies at their points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.study_files.load import load_study
+from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
+
+
+def swept(*sweep: str) -> Study:
+    return load_study().model_copy(update={"sweep": sweep})
+
+
+def values(text: str) -> list[object]:
+    (axis,) = axes_of(swept(f"wrist.length={text}"), "simulate")
+    return list(axis.values)
+
+
+def test_lists_ranges_and_logarithmic_ranges_have_the_values_they_say() -> None:
+    assert values("0.05,0.06, 0.08") == [0.05, 0.06, 0.08]
+    assert values("0.05..0.07:5") == pytest.approx([0.05, 0.055, 0.06, 0.065, 0.07])
+    assert values("0.01..1 log:3") == pytest.approx([0.01, 0.1, 1.0])
+    assert values("x0.5..1.5:3") == ["x0.5", "x1", "x1.5"]
+
+
+def test_distributions_are_drawn_from_a_stream_of_the_leafs_own() -> None:
+    even, normal = np.array(values("~1..3:4000")), np.array(values("~normal(2, 0.5):4000"))
+    assert 1.0 <= even.min() < 1.01 and 2.99 < even.max() <= 3.0 and even.mean() == pytest.approx(2.0, abs=0.05)
+    assert (normal.mean(), normal.std()) == pytest.approx((2.0, 0.5), abs=0.05)
+    assert np.log(np.array(values("~1..100 log:4000"))).mean() == pytest.approx(np.log(10.0), abs=0.1)
+    assert values("~1..3:5") == values("~1..3:5")
+    other = axes_of(swept("wrist.damping=~1..3:5"), "simulate")[0].values
+    assert list(other) != values("~1..3:5")
+
+
+@given(st.lists(st.integers(1, 4), min_size=1, max_size=3), st.integers(0, 3))
+def test_points_multiply_and_drawn_axes_go_together(counts: list[int], drawn: int) -> None:
+    axes = [SweepAxis(f"g{k}", tuple(range(many)), False, "") for k, many in enumerate(counts)]
+    axes += [SweepAxis(f"d{k}", tuple(range(5)), True, "") for k in range(drawn)]
+    points = points_of(axes)
+    assert len(points) == np.prod(counts) * (5 if drawn else 1) and len(set(points)) == len(points)
+    assert all(len(set(point[len(counts) :])) <= 1 for point in points)
+
+
+@pytest.mark.parametrize(
+    "key, value, unit",
+    [
+        ("wrist.length", 0.09, "m"),
+        ("loop.plant_segments", 2, "1"),
+        ("loop.plant.actuator.tendon_stiffness", 1e4, "N/m"),
+        ("loop.plant.stiffness", "x1.2", "N m/rad"),
+        ("reference.angle_deg", 12.0, "deg"),
+        ("controller", "pid", "1"),
+    ],
+)
+def test_a_point_changes_its_leaf_and_nothing_else(key: str, value: object, unit: str) -> None:
+    study = swept(f"{key}={value}")
+    (axis,) = axes_of(study, "simulate")
+    at = study_at(study, [axis], [value])
+    known = load_study(None or [], [f"{key}={value}"], "simulate")
+    assert at.model_copy(update={"sweep": ()}) == known and unit_at(study, axis.path) == unit
+
+
+def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None:
+    study = load_study(overrides=["compare.rows=[{controller: smc, gains: printed}, {controller: pid}]"])
+    axes = axes_of(
+        study.model_copy(update={"sweep": ("rows.1.controller=mrac", "loops.default.plant_segments=1..3:3")}), "compare"
+    )
+    at = study_at(study, axes, ["mrac", 3.0])
+    assert [row.controller for row in at.compare.rows] == ["smc", "mrac"] and at.compare.loops[
+        "default"
+    ].plant_segments == 3
+
+
+@pytest.mark.parametrize(
+    "sweep, told",
+    [
+        (["wrist.lenght=0.05,0.06"], r"no leaf wrist.lenght - .*wrist.lenght=0.05,0.06.*did you mean 'length'"),
+        (["wrsit.length=0.05"], r"there is no leaf wrsit.length .* did you mean 'wrist'"),
+        (["loop.plant=1"], r"simulate.loop.plant is a group of leaves"),
+        (["gains.Kx=1"], r"there is no leaf simulate.gains.Kx"),
+        (["wrist.length=0..1:1000000000"], r"a sweep of 1e\+09 points is more than 1e\+06 .* drawn ones"),
+        (["wrist.length=0.1..1:1100", "wrist.damping=0.1..1:1100"], r"a sweep of 1.21e\+06 points"),
+        (["wrist.length=0.05..0.06"], r"a range says how many values it has"),
+        (["wrist.length=0.06..0.05:3"], r"'0.06..0.05' is neither a range nor a distribution"),
+        (["wrist.length=~gauss(1,2):3"], r"'gauss\(1,2\)' is neither"),
+        (["wrist.length=0.05..0.06:0"], r"a sweep of no values"),
+        (["wrist.length"], r"a sweep is KEY=VALUES"),
+        (["wrist.length=1,,2"], r"a value is missing"),
+        (["wrist.length=0.05,-1"], r"wrist.length cannot be -1: Input should be greater than 0"),
+        (["loop.plant_segments=1..2:3"], r"simulate.loop.plant_segments cannot be 1.5"),
+        (["wrist.length=1,2", "wrist.length=3"], r"wrist.length is swept twice"),
+        (["wrist.length=~1..2:3", "wrist.damping=~1..2:4"], r"drawn leaves go together, and 3 and 4 values do not"),
+    ],
+)  # fmt: skip
+def test_a_sweep_that_cannot_be_is_named(sweep: list[str], told: str) -> None:
+    study = swept(*sweep)
+    with pytest.raises(UserError, match=told) as raised:
+        axes = axes_of(study, "simulate")
+        for point in points_of(axes):
+            study_at(study, axes, point)
+    assert raised.value.exit_code == 2
+
+
+def test_what_a_kind_of_reference_adds_has_its_unit() -> None:
+    study = load_study([], ["simulate.reference.kind=chirp"])
+    units = {name: unit_at(study, ("simulate", "reference", name)) for name in ("end_frequency", "offset_deg", "seed")}
+    assert units == {"end_frequency": "1/s", "offset_deg": "deg", "seed": "1"}
+    daily = study.simulate.reference.model_copy(update={"kind": "adl:jar"})
+    assert unit_at(daily, ("scale",)) == "1" and unit_at(daily, ("frequency",)) == "1/s"

@@ -1,0 +1,148 @@
+"""What goes wrong between the board's pins and the tendons: wires, drives, rotors, pulleys."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.messages import AXES
+from wristctl.config.bench import FaultKind, InjectedFault
+
+
+class Faults:
+    """Which faults are on at a time of the board's clock [s]; those of trials only once one begins."""
+
+    def __init__(self, faults: Sequence[InjectedFault]) -> None:
+        self._faults = tuple(faults)
+        self._starts = {"power-on": 0.0, "first trial": math.inf, "trial": math.inf}
+
+    def begin(self, start: float) -> None:
+        """A trial's motion starts at this time."""
+        self._starts["trial"] = start
+        self._starts["first trial"] = min(start, self._starts["first trial"])
+
+    def on(self, kind: FaultKind, time: float) -> bool:
+        """Whether such a fault is on."""
+        return self.since(kind, time) is not None
+
+    def since(self, kind: FaultKind, time: float) -> float | None:
+        """When the earliest fault of this kind that is on began; None where none is."""
+        return min((self.begun(fault) for fault in self.active((kind,), time)), default=None)
+
+    def next(self, kind: FaultKind, after: float) -> float:
+        """When the next fault of this kind begins after a time; infinite where none does."""
+        return min((time for fault in self.of((kind,)) if (time := self.begun(fault)) > after), default=math.inf)
+
+    def of(self, kinds: Sequence[FaultKind]) -> list[InjectedFault]:
+        """Those of these kinds, on or not."""
+        return [fault for fault in self._faults if fault.kind in kinds]
+
+    def active(self, kinds: Sequence[FaultKind], time: float) -> list[InjectedFault]:
+        """Those of these kinds that are on."""
+        return [fault for fault in self.of(kinds) if 0.0 <= time - self.begun(fault) < (fault.duration or math.inf)]
+
+    def begun(self, fault: InjectedFault) -> float:
+        """When a fault begins; infinite where what it counts from has not come."""
+        return self._starts[fault.since] + fault.at
+
+
+Edges = NDArray[np.int64]
+"""(E, 3) changes of output latches: cycle, port, value."""
+
+_PORT_A, _PORT_C = ord("A"), ord("C")
+_ALL_OFF = (1 << AXES) - 1
+_WIRES: tuple[FaultKind, ...] = ("direction-flipped", "direction-stuck", "motor-stalled", "drive-off", "supply-off")
+_POWER: tuple[FaultKind, ...] = ("drive-off", "supply-off")
+_TENDONS: tuple[FaultKind, ...] = ("tendon-detached", "tendon-slipped")
+_OFF = 1.0
+"""Slack of a tendon that is off its pulley [m]."""
+
+
+class MotorFaults:
+    """Changes what the motors hear of the board, and says when tendons give way.
+
+    `order` says to which axis of the board each motor's cable is connected.
+    """
+
+    def __init__(self, faults: Faults, order: Sequence[int]) -> None:
+        self._faults, self._order = faults, tuple(order)
+        self._enabled, self._until = _ALL_OFF, 0
+        self._given_way: set[tuple[int, float]] = set()
+
+    def hear(self, edges: Edges, until: int) -> Edges:
+        """The edges up to a cycle as the motors see them, and those of supplies that went and came meanwhile."""
+        edges = self._exchanged(edges)
+        power = [cycle for fault in self._faults.of(_POWER) for cycle in self._ends(fault)]
+        switched = sorted(cycle for cycle in power if self._until < cycle <= until)
+        if switched:
+            more = np.array([(cycle, _PORT_C, self._at(edges, cycle)) for cycle in switched], np.int64)
+            edges = np.concatenate([edges, more])
+            edges = edges[np.argsort(edges[:, 0], kind="stable")]
+        is_c = edges[:, 1] == _PORT_C
+        if is_c.any():
+            self._enabled = int(edges[is_c, 2][-1])
+        for fault in self._faults.of(_WIRES):
+            begin, end = self._ends(fault)
+            during = (edges[:, 0] >= begin) & (edges[:, 0] < end)
+            if during.any():
+                edges = edges.copy()
+                self._distort(fault, edges, during)
+        self._until = until
+        return edges
+
+    def give_way(self, time: float) -> list[tuple[int, float]]:
+        """Axes whose tendons give way up to a time [s], and by how much [m]; each once."""
+        found = []
+        for number, fault in enumerate(self._faults.of(_TENDONS)):
+            begun = self._faults.begun(fault)
+            if begun <= time and (number, begun) not in self._given_way:
+                self._given_way.add((number, begun))
+                found.append((fault.axis, _OFF if fault.kind == "tendon-detached" else 1e-3 * fault.size))
+        return found
+
+    def next(self, after: float) -> float:
+        """When the next tendon gives way after a time [s]; infinite where none does."""
+        return min(self._faults.next(kind, after) for kind in _TENDONS)
+
+    def _exchanged(self, edges: Edges) -> Edges:
+        if self._order == tuple(range(AXES)) or not len(edges):
+            return edges
+        edges = edges.copy()
+        for port, width in ((_PORT_A, 2), (_PORT_C, 1)):
+            at, field = edges[:, 1] == port, (1 << width) - 1
+            told = edges[at, 2]
+            heard = told & ~((1 << width * AXES) - 1)
+            for motor, axis in enumerate(self._order):
+                heard |= (told >> width * axis & field) << width * motor
+            edges[at, 2] = heard
+        return edges
+
+    def _ends(self, fault: InjectedFault) -> tuple[float, float]:
+        begin = self._faults.begun(fault)
+        return tuple(
+            math.inf if math.isinf(time) else round(time * FREQUENCY)
+            for time in (begin, begin + (fault.duration or math.inf))
+        )  # type: ignore[return-value]
+
+    def _at(self, edges: Edges, cycle: float) -> int:
+        before = edges[(edges[:, 1] == _PORT_C) & (edges[:, 0] <= cycle), 2]
+        return int(before[-1]) if len(before) else self._enabled
+
+    @staticmethod
+    def _distort(fault: InjectedFault, edges: Edges, during: NDArray[np.bool_]) -> None:
+        a, c = during & (edges[:, 1] == _PORT_A), during & (edges[:, 1] == _PORT_C)
+        step = 1 << 2 * fault.axis
+        if fault.kind == "direction-flipped":
+            edges[a, 2] ^= 2 * step
+        elif fault.kind == "direction-stuck":
+            edges[a, 2] &= ~(2 * step)
+        elif fault.kind == "motor-stalled":
+            edges[a, 2] &= ~step
+        elif fault.kind == "drive-off":
+            edges[a, 2] &= ~step
+            edges[c, 2] |= 1 << fault.axis
+        else:
+            edges[a, 2] &= 0b10101010
+            edges[c, 2] |= _ALL_OFF

@@ -1,0 +1,214 @@
+"""The table of commands: where each of them is, its line in the help, and the options that are its own."""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+_REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
+YES = {"yes": "Ask nobody before the motors of real hardware move."}
+"""The flag of commands that move motors, and its help."""
+
+
+class Entry(NamedTuple):
+    """A command: a procedure with its options, or a typer.Typer as it stands."""
+
+    place: str
+    """Module and name, `module:NAME`, imported when the command is called."""
+    panel: str | None
+    line: str
+    """Its line in the help."""
+    shortcuts: Sequence[str] = ()
+    """Leaves of its section that are options too."""
+    flags: Mapping[str, str] = MappingProxyType({})
+    """Switches of a call that are no settings, and their help."""
+    examples: Sequence[str] = ()
+    argument: str | None = None
+    """The leaf that stands first, without an option, in place of study files."""
+
+
+COMMANDS = {
+    "init": Entry(
+        "wristctl.cli.your_own:init_app", _REPRODUCE, "Lay out the study files in a folder, for you to change."
+    ),
+    "gen-data": Entry(
+        "wristctl.commands.gen_data.command:GEN_DATA",
+        _REPRODUCE,
+        "Sample tip positions and bending angles of the wrist's model.",
+        shortcuts=("samples", "source"),
+        examples=(
+            "wristctl gen-data experiments/paper.yaml",
+            "wristctl gen-data --samples 5000 --label large",
+            "wristctl gen-data --source plant --set segments=4",
+            "wristctl gen-data --source run --run latest:hw-run",
+            "wristctl gen-data --source csv --set 'files=[monday.csv,tuesday.csv]'",
+        ),
+    ),
+    "train": Entry(
+        "wristctl.commands.train.command:TRAIN",
+        _REPRODUCE,
+        "Train the network from tip position to bending angle.",
+        shortcuts=("search", "preset", "epochs", "seeds", "device"),
+        examples=(
+            "wristctl train experiments/paper.yaml --data latest:gen-data",
+            "wristctl train --preset recommended --seeds 5",
+            "wristctl train experiments/table1.yaml",
+            "wristctl train --search experiments/model_selection.yaml",
+        ),
+    ),
+    "tune": Entry(
+        "wristctl.commands.tune.command:TUNE",
+        _REPRODUCE,
+        "Search the gains of controllers.",
+        shortcuts=("candidates", "iterations"),
+        examples=(
+            "wristctl tune experiments/paper.yaml",
+            "wristctl tune --set 'controllers=[smc, pid]' --iterations 20",
+            "wristctl tune experiments/paper.yaml --from-identified latest:identify",
+        ),
+    ),
+    "compare": Entry(
+        "wristctl.commands.compare.command:COMPARE",
+        _REPRODUCE,
+        "Compare controllers, the paper's numbers beside ours.",
+        shortcuts=("horizon",),
+        examples=(
+            "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
+            "wristctl compare --set 'inverses=[none]' --set 'rows=[{controller: computed-torque, gains: default}]'",
+        ),
+    ),
+    "study": Entry(
+        "wristctl.commands.study.command:FAIR_STUDY",
+        _REPRODUCE,
+        "Tune and judge all laws at equal budget: which is for which rig.",
+        shortcuts=("budget",),
+        examples=(
+            "wristctl study experiments/fair_study.yaml",
+            "wristctl study experiments/fair_study.yaml --budget full --executor processes",
+            "wristctl study experiments/fair_study.yaml --budget full --resume RUN --executor dask://host:8786",
+        ),
+    ),
+    "simulate": Entry(
+        "wristctl.commands.simulate.command:SIMULATE",
+        _REPRODUCE,
+        "Simulate one closed loop, with pictures.",
+        shortcuts=("controller", "gains"),
+        examples=(
+            "wristctl simulate --controller smc --gains exchanged",
+            "wristctl simulate --set reference.kind=step --set loop.plant_segments=1",
+            "wristctl simulate --gains tuned --tuned latest:tune",
+        ),
+    ),
+    "analyse": Entry(
+        "wristctl.commands.analyse.command:ANALYSE",
+        _REPRODUCE,
+        "Find the margins of one loop, with pictures.",
+        shortcuts=("controller", "gains", "over"),
+        examples=(
+            "wristctl analyse --controller computed-torque --gains default",
+            "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
+            "wristctl analyse --controller smc-tracking --gains stepper --set loop.control_period=5e-3 "
+            "--set 'loop={actuator: {level: tendon}, sensor: {level: camera}}'",
+        ),
+    ),
+    "hysteresis": Entry(
+        "wristctl.commands.hysteresis.command:HYSTERESIS",
+        _REPRODUCE,
+        "Drive the wrist through hysteresis loops; fit a measured one.",
+        shortcuts=("drive", "shape", "measured"),
+        examples=(
+            "wristctl hysteresis experiments/hysteresis.yaml",
+            "wristctl hysteresis --measured loop.csv",
+            "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
+        ),
+    ),
+    "audit": Entry(
+        "wristctl.commands.audit.command:AUDIT",
+        _REPRODUCE,
+        "Judge the paper's claims one by one.",
+        examples=(
+            "wristctl audit experiments/claims.yaml",
+            "wristctl audit experiments/claims.yaml --table1 RUN --selection RUN",
+        ),
+    ),
+    "hw-run": Entry(
+        "wristctl.commands.hw_run.command:HW_RUN",
+        _HARDWARE,
+        "Perform the paper's experiment, on hardware or all emulated.",
+        shortcuts=("port", "camera", "repetitions", "real_time", "video", "priority"),
+        flags=YES,
+        examples=(
+            "wristctl hw-run",
+            "wristctl hw-run --set 'directions=[ulnar]' --set push.force=0",
+            "wristctl hw-run --dry-run --port /dev/ttyACM0",
+            "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
+        ),
+    ),
+    "identify": Entry(
+        "wristctl.commands.identify.command:IDENTIFY",
+        _HARDWARE,
+        "Find a real wrist's parameters from logged trials.",
+        argument="runs",
+        examples=(
+            "wristctl identify latest:hw-run",
+            "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
+            "wristctl tune experiments/paper.yaml --from-identified latest:identify",
+        ),
+    ),
+    "hw": Entry(
+        "wristctl.cli.hw:app", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."
+    ),
+    "track": Entry(
+        "wristctl.commands.track.command:TRACK",
+        _HARDWARE,
+        "Find the wrist's angle in a recorded video.",
+        shortcuts=("zero", "annotate"),
+        argument="video",
+        examples=(
+            "wristctl track trial.mp4",
+            "wristctl track trial.mp4 --calibration latest:calibrate-camera --annotate",
+            "wristctl track pictures/ --set frame_rate=60 --set markers.positive=left",
+        ),
+    ),
+    "export-model": Entry("wristctl.cli.export_model:app", _RESULTS, "Write the wrist of a run for MuJoCo or MATLAB."),
+    "new": Entry(
+        "wristctl.cli.your_own:new_app", _OWN, "Write a controller, reference or optimiser of your own to begin from."
+    ),
+    "check-law": Entry(
+        "wristctl.cli.your_own:check_law_app", _OWN, "Check a law of your own, and print its certificate."
+    ),
+    "runs": Entry("wristctl.cli.runs:app", _RESULTS, "Find, compare, verify and repeat runs."),
+}
+
+CALIBRATIONS = {
+    "board-pdf": Entry(
+        "wristctl.cli.hw_calibrate:board_pdf_app",
+        None,
+        "Write the board and the markers as a PDF, to print at true scale.",
+    ),
+    "camera": Entry(
+        "wristctl.commands.calibrate.camera:CALIBRATE_CAMERA",
+        None,
+        "Find lens and bending plane from views of the board.",
+        shortcuts=("camera", "views"),
+        examples=(
+            "wristctl hw calibrate camera",
+            "wristctl hw calibrate camera --camera 0",
+            "wristctl hw calibrate camera --camera pictures/ --set board.square=0.0248",
+            "wristctl track trial.mp4 --calibration latest:calibrate-camera",
+        ),
+    ),
+    "wrist": Entry(
+        "wristctl.commands.calibrate.wrist:CALIBRATE_WRIST",
+        None,
+        "Find zero, senses of turning and steps per radian.",
+        shortcuts=("port", "camera", "plane", "axis", "max_deg", "real_time", "priority"),
+        flags=YES,
+        examples=(
+            "wristctl hw calibrate wrist",
+            "wristctl hw calibrate wrist --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera",
+            "wristctl hw calibrate wrist --port /dev/ttyACM0 --camera 0 --axis 0 --max-deg 2",
+            "wristctl hw-run --port /dev/ttyACM0 --calibration latest:calibrate-wrist",
+        ),
+    ),
+}
+"""Of `wristctl hw calibrate`."""

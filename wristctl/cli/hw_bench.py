@@ -1,0 +1,132 @@
+"""`wristctl hw emulate` and `watch`."""
+
+import logging
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wristctl.cli.options import RESULTS, Debug, Image, Out, Quiet
+from wristctl.cli.progress import listening, progress
+from wristctl.commands.progress import no_event
+from wristctl.errors import UserError
+from wristctl.records import Run, open_run
+
+log = logging.getLogger(__name__)
+
+
+def emulate(
+    tcp: Annotated[
+        int | None, typer.Option("--tcp", help="Serve this TCP port (0: any), not a pseudo-terminal.")
+    ] = None,
+    image: Image = None,
+    boot_loader: Annotated[
+        Path | None, typer.Option("--boot-loader", help="Start this boot loader (Intel hex).")
+    ] = None,
+    wrist: Annotated[
+        bool, typer.Option("--wrist", help="Hang a simulated wrist on it, before a rendered camera.")
+    ] = False,
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="With --wrist: override a setting of hw-run, bench.KEY=VALUE."),
+    ] = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Serve the emulated board for any serial client, in real time; its port is the only line on stdout.
+
+    With --wrist a second line says where the camera's pictures are, which --camera takes; press, release (the
+    emergency stop) and directions that the wrist is turned to can be typed.
+    """
+    with listening(quiet, False) as console:
+        with progress(console, no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
+            from wristctl.board.emulator.atmega2560 import FIRMWARE, Atmega2560
+            from wristctl.board.emulator.serve import PtyLine, TcpLine, serve
+
+            chip = Atmega2560(image or FIRMWARE, boot_loader=boot_loader)
+        line = PtyLine() if tcp is None else TcpLine(tcp)
+        if wrist:
+            _serve_with_wrist(chip, line, override or [], console, quiet)
+            return
+        log.info("serving; try: wristctl hw check --port %s", line.address)
+        print(line.address, flush=True)
+        try:
+            serve(chip, line)
+        finally:
+            line.close()
+
+
+def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, quiet: bool) -> None:
+    import sys
+    from tempfile import TemporaryDirectory
+
+    from wristctl.loop_priority import prioritised
+    from wristctl.study_files.load import load_study
+
+    study = load_study((), override, "hw-run")
+    priority = prioritised(study.hw_run.priority)
+    with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
+        if allowed:
+            log.info(allowed)
+        pictures = Path(folder) / "frame"
+        with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+            from wristctl.bench.frame_process import start_film
+            from wristctl.bench.rig import Bystander, Rig
+            from wristctl.bench.server import BenchServer
+
+            settings, markers = study.hw_run.bench, study.hw_run.markers
+            camera, film = start_film(settings, study.wrist, markers, pictures, broadcast=True)
+            rig = Rig(settings, study.wrist, study.seed, markers, chip)
+            bystander = Bystander(rig, sys.stdin.fileno()) if sys.stdin and not sys.stdin.closed else None
+            server = BenchServer(rig, line, film, bystander=bystander)
+        log.info("serving, with a wrist on axes 0 to 3; its camera's frames: %s", pictures)
+        log.info("try: wristctl hw check --rig --port %s --camera %s", line.address, server.camera)
+        print(line.address, server.camera, sep="\n", flush=True)
+        try:
+            server.run()
+        finally:
+            camera.join()
+
+
+Seconds = Annotated[float, typer.Option("--last", help="Seconds to show.", min=0.5)]
+Every = Annotated[float, typer.Option("--every", help="Seconds between two pictures.", min=0.1)]
+
+
+def watch(
+    ref: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of hw-run; by default the newest.")] = "",
+    file: Annotated[Path, typer.Option("--file", help="The picture (PNG) to write anew each time.")] = Path("live.png"),
+    last: Seconds = 10.0,
+    every: Every = 0.5,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Draw angle, reference and tensions of the trials that go on, until their run ends."""
+    from wristctl.commands.hw_run.live_figure import newest_rows, recent
+    from wristctl.records.files import replacing
+
+    run = open_run(ref, out) if ref else _newest(out)
+    if run.kind != "hw-run":
+        raise UserError("only runs of hw-run go on in time", str(run.path), "name a run of hw-run")
+    period, log = run.config.hw_run.control_period, run.path / "data" / "log.csv"
+    going_on, drawn = True, False
+    while going_on:
+        going_on = run.state == "running"
+        if log.is_file() and log.stat().st_size:  # empty until the first tick
+            drawn = True
+            with replacing(file) as temporary:
+                recent(newest_rows(log, last, period)).savefig(temporary, format="png", dpi=100)
+        if going_on:
+            time.sleep(every)
+    if not drawn:
+        raise UserError("the run ended before its first trial", str(run.path), f"wristctl runs show {run.id}")
+    print(file)
+
+
+def _newest(results: Path) -> Run:
+    from wristctl.records.index import indexed
+
+    found = [each.id for each in indexed(results, renew=False) if each.kind == "hw-run"]
+    if not found:
+        raise UserError("there is no run of hw-run", str(results), "start one, or say --out DIR")
+    return Run(results / found[-1])

@@ -1,0 +1,181 @@
+"""`wristctl runs report`, `figures`, `table` and `export`."""
+
+import hashlib
+import logging
+import re
+from collections.abc import Collection, Iterable
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from wristctl.cli.command import asked_to_trust
+from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, Refs, TrustCode
+from wristctl.cli.output import say
+from wristctl.cli.progress import listening, progress
+from wristctl.commands.progress import no_event
+from wristctl.errors import TO, Argument, UserError, meant, writing
+from wristctl.plugins.trust import asking
+from wristctl.records import Run, open_run
+from wristctl.records.files import write_text
+from wristctl.records.index import DRAWN
+from wristctl.records.manifest import read_overview
+
+_log = logging.getLogger(__name__)
+
+
+def draw_later(run: Run, quiet: bool) -> Path:
+    """Draw what a run left for later, into a folder beside it."""
+    from wristctl.commands.perform import redrawn
+    from wristctl.records.formats import write_figure
+
+    folder = run.path.parent / f"{DRAWN}{run.id}"
+    with listening(quiet, False) as console:
+        found = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        left = [name for name in found if not (run.path / "figures" / f"{name}.svg").exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        with progress(console, no_event, "drawing", len(left), "figures", quiet) as done:
+            for count, name in enumerate(left, start=1):
+                write_figure(folder / name, found[name])
+                done(count)
+    return folder
+
+
+def report(
+    refs: Refs,
+    out: Out = RESULTS,
+    to: Annotated[Path | None, typer.Option("--to", help="The file to write; by default beside the runs.")] = None,
+    all_figures: Annotated[
+        bool, typer.Option("--all-figures", help="Draw those too that the run left for later, into a folder beside it.")
+    ] = False,
+    trust_code: TrustCode = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a page about one run, or about several beside each other: one HTML file that needs no network.
+
+    Where the folder of the runs cannot be written to, the page goes to the working directory.
+    """
+    from wristctl.plotting.page import page, several_page
+
+    runs = [open_run(ref, out) for ref in refs]
+    name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
+    file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
+    with asking(partial(asked_to_trust, trust_code)):
+        drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
+        text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
+    try:
+        write_text(file, text, TO)
+    except UserError as error:
+        if to:
+            raise
+        _log.warning("%s (%s): the page is written here", error.what, error.where)
+        file = Path(file.name)
+        write_text(file, text)
+    say(file)
+
+
+class FigureFormat(StrEnum):
+    """What a figure is written as."""
+
+    pdf, svg, png = "pdf", "svg", "png"
+
+
+def figures(
+    ref: Ref,
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME...]", help="Figures; all where none is.")] = None,
+    format_: Annotated[FigureFormat, typer.Option("--format", help="pdf, svg or png.")] = FigureFormat.pdf,
+    width: Annotated[
+        str | None, typer.Option("--width", help="Of the page or column: 88mm, 18cm, 7in; by default each its own.")
+    ] = None,
+    to: Annotated[Path | None, typer.Option("--to", help="Folder; by default one beside the run.")] = None,
+    trust_code: TrustCode = False,
+    out: Out = RESULTS,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Draw figures of a run anew, also those that it left for later, as wide as a column.
+
+    The run stays as it was sealed: figures go into a folder beside it.
+    """
+    from wristctl.commands.perform import redrawn
+    from wristctl.plotting.style import fit, for_paper
+    from wristctl.records.formats import write_figure_for_paper
+
+    run, inches = open_run(ref, out), _inches(width) if width else None
+    folder = to or run.path.parent / f"{DRAWN}{run.id}"
+    _check_names(names or (), read_overview(run.path).captions, run)
+    trust = asking(partial(asked_to_trust, trust_code))
+    with listening(quiet, False) as console, for_paper(inches), trust:
+        found = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        _check_names(names or (), found, run)
+        chosen = list(names or found)
+        with writing(folder, TO):
+            folder.mkdir(parents=True, exist_ok=True)
+        with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as done:
+            for count, name in enumerate(chosen, start=1):
+                made = found[name]
+                fit(made)
+                write_figure_for_paper(folder / f"{name}.{format_.value}", made)
+                done(count)
+    say(folder)
+
+
+def _check_names(names: Iterable[str], known: Collection[str], run: Run) -> None:
+    for name in names:
+        if known and name not in known:
+            raise UserError(f"no figure {name!r}", str(run.path), meant(name, known))
+
+
+def _inches(text: str) -> float:
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(mm|cm|in)", text.strip())
+    size = float(found[1]) / {"mm": 25.4, "cm": 2.54, "in": 1.0}[found[2]] if found else 0.0
+    if not 1.5 <= size <= 40.0:
+        what = "no width of a figure" if found is None else "a figure is 4 to 100 cm wide"
+        raise UserError(what, Argument("width", text), "for example --width 88mm")
+    return size
+
+
+def table(
+    ref: Ref,
+    number: Annotated[
+        list[int] | None, typer.Option("--table", "-n", help="Which of its tables, from 1; repeatable. All where none.")
+    ] = None,
+    latex: Annotated[bool, typer.Option("--latex", help="As LaTeX, for booktabs.")] = False,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Print the tables of a run: all that the command printed or kept back."""
+    from wristctl.commands.printed_table import Table, latex_table
+    from wristctl.plotting.page import tables
+
+    run = open_run(ref, out)
+    found = [Table(each["title"], each["columns"], each["rows"]) for each in tables(run)]
+    if not found:
+        raise UserError(f"run {run.id} has no tables", str(run.path), "its data are in data/")
+    for each in number or ():
+        if not 1 <= each <= len(found):
+            raise UserError(f"no table {each}", str(run.path), f"1 to {len(found)}")
+    chosen = [found[each - 1] for each in number] if number else found
+    print("\n\n".join(latex_table(each) if latex else each.text() for each in chosen))
+
+
+def export(
+    ref: Ref,
+    to: Annotated[Literal["mcap", "mat"], typer.Option("--to", help="The format.")],
+    file: Annotated[
+        Path | None, typer.Option("--file", help="Where to write it; by default the run's id, in this folder.")
+    ] = None,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Write a run's tables, arrays and videos for other programs, with their units.
+
+    mat: one file for MATLAB and Octave. mcap: a log of what went on in time, videos too, for Foxglove, PlotJuggler or
+    Rerun. A table for pandas is the CSV file of the run, or `wristctl.open_run(RUN).data(NAME)` in Python.
+    """
+    from wristctl.commands.export.run_data import export_run
+
+    say(export_run(open_run(ref, out), to, file))

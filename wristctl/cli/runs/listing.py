@@ -1,0 +1,203 @@
+"""`wristctl runs ls`, `show`, `diff`, `lineage` and `tag`."""
+
+import json
+import shlex
+from collections.abc import Collection, Iterator
+from dataclasses import asdict, fields
+from typing import Annotated, Any, get_args
+
+import typer
+
+from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, run_ids
+from wristctl.cli.output import say
+from wristctl.commands.printed_table import Table, number
+from wristctl.errors import Argument, UserError, meant
+from wristctl.records import Run, open_run
+from wristctl.records.difference import Difference, difference
+from wristctl.records.find import entries, in_order, select
+from wristctl.records.index import IndexEntry
+from wristctl.records.journal import jsonable
+from wristctl.records.lineage import ancestry, dependents
+from wristctl.records.run import RunState
+from wristctl.records.tags import change_tags, known_tags
+
+_LISTED_HEADS = {"wall_s": "wall [s]", "chief": "chief metric"}
+
+
+def ls(
+    out: Out = RESULTS,
+    kind: Annotated[str | None, typer.Option("--kind", help="Only runs of this command.")] = None,
+    label: Annotated[str | None, typer.Option("--label", help="Only runs with this label; * stands for any.")] = None,
+    state: Annotated[str | None, typer.Option("--state", help="Only runs in this state: ok, failed, ...")] = None,
+    tagged: Annotated[str | None, typer.Option("--tag", help="Only runs with this tag.")] = None,
+    where: Annotated[
+        list[str] | None, typer.Option("--where", help="Only runs with such a metric: 'rmse<1e-3'; repeatable.")
+    ] = None,
+    newer: Annotated[str | None, typer.Option("--newer", help="Only runs started within: 30m, 12h, 2d.")] = None,
+    older: Annotated[str | None, typer.Option("--older", help="Only runs started before: 30m, 12h, 2d.")] = None,
+    sort: Annotated[
+        str, typer.Option("--sort", help="By started, id, kind, label, state, wall_s or a metric.")
+    ] = "started",
+    reverse: Annotated[bool, typer.Option("--reverse", help="Largest or newest first.")] = False,
+    columns: Annotated[
+        str | None, typer.Option("--columns", help="Fields and metrics to show: id,about,rmse,settling.")
+    ] = None,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """List runs, oldest first: what each was about, and the metric that heads its page."""
+    where = where or []
+    known = entries(out)
+    _check_choice("kind", kind, {each.kind for each in known})
+    _check_choice("state", state, get_args(RunState))
+    found = in_order(select(known, kind, label, state, tagged, where, newer, older), sort)
+    found = found[::-1] if reverse else found
+    if as_json:
+        print(json.dumps(jsonable({"schema": "wristctl.runs/1", "runs": list(map(asdict, found))}), indent=2))
+    elif found:
+        print((_chosen(found, columns) if columns else _table(found, [sort, *where])).text())
+    else:
+        say(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
+
+
+def _table(found: list[IndexEntry], asked: list[str]) -> Table:
+    """The listing, with the metrics that were asked for and the columns that hold something."""
+    metrics = sorted({name for each in found for name in each.metrics if any(text.startswith(name) for text in asked)})
+    held = [name for name in ("about", "chief") if any(getattr(each, name) for each in found)]
+    columns = ["id", "kind", "state", "wall_s", *held, *metrics]
+    columns += [name for name in ("tags", "note") if any(getattr(each, name) for each in found)]
+    heads = [_LISTED_HEADS.get(name, name) for name in columns]
+    return Table("", heads, [[_cell(each, name) for name in columns] for each in found])
+
+
+def _chosen(found: list[IndexEntry], columns: str) -> Table:
+    """The columns that were named."""
+    names = [name.strip() for name in columns.split(",") if name.strip()]
+    known = {*(field.name for field in fields(IndexEntry)), *(metric for each in found for metric in each.metrics)}
+    for name in names:
+        _check_choice("columns", name, known)
+    return Table(
+        "", [_LISTED_HEADS.get(name, name) for name in names], [[_cell(each, name) for name in names] for each in found]
+    )
+
+
+def _check_choice(option: str, given: str | None, known: Collection[str]) -> None:
+    if given is not None and known and "*" not in given and given not in known:
+        raise UserError(f"unknown {option.removesuffix('s')} {given!r}", Argument(option, given), meant(given, known))
+
+
+def _cell(each: IndexEntry, name: str) -> Any:
+    if name == "chief":
+        value = each.metrics.get(each.chief)
+        return f"{each.chief} {number(value)}" if isinstance(value, int | float) else ""
+    value = each.value(name)
+    return ", ".join(value) if isinstance(value, list) else value
+
+
+def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
+    """Show one run: command, state, inputs, metrics and files."""
+    run = open_run(ref, out)
+    tags = known_tags(run.path.parent).get(run.id, [])
+    if as_json:
+        manifest = json.loads(run.manifest.model_dump_json(by_alias=True))
+        shown = {**manifest, "state": run.state, "tags": tags, "metrics": run.metrics, "run": str(run.path)}
+        print(json.dumps(jsonable(shown), indent=2))
+        return
+    print("\n\n".join(table.text() for table in _run_tables(run, tags)), end="\n\n")
+    say(run.path)
+
+
+def _run_tables(run: Run, tags: list[str]) -> list[Table]:
+    manifest = run.manifest
+    commit = (manifest.code.commit or "")[:12]
+    dirty = "with uncommitted changes" if manifest.code.dirty else ""
+    facts = [
+        ("state", run.state),
+        ("command", shlex.join(manifest.argv)),
+        ("seed", str(manifest.seed)),
+        ("started", manifest.timing.started),
+        ("code", " ".join(part for part in (manifest.code.version, commit, dirty) if part)),
+        *([("tags", ", ".join(tags))] if tags else []),
+        ("result hash", manifest.result_sha256 or "-"),
+        *((f"input {each.role}", f"{each.kind} run {each.run}") for each in manifest.inputs),
+        *([("error", manifest.error.what)] if manifest.error else []),
+    ]
+    metrics = [(name, each["value"], each["unit"], each["better"], each["n"]) for name, each in run.metrics.items()]
+    files = [(each.path, each.bytes, each.sha256[:12]) for each in manifest.outputs]
+    return [
+        Table("", ("run", run.id), facts),
+        *([Table("Metrics", ("metric", "value", "unit", "better", "n"), metrics)] if metrics else []),
+        *([Table("Files", ("path", "bytes", "sha256"), files)] if files else []),
+    ]
+
+
+_DIFF_TITLES = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
+
+
+def diff(
+    before: Ref,
+    after: Annotated[str, typer.Argument(metavar="OTHER", help="The run to compare it with.", autocompletion=run_ids)],
+    out: Out = RESULTS,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Show what differs between two runs: configuration, metrics, code, environment, inputs."""
+    a, b = open_run(before, out), open_run(after, out)
+    found = difference(a, b)
+    if as_json:
+        changed = {
+            name: {each.name: {"before": each.before, "after": each.after} for each in changes}
+            for name, changes in vars(found).items()
+        }
+        print(json.dumps(jsonable({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
+        return
+    say(f"before  {a.id}")
+    say(f"after   {b.id}")
+    print()
+    print("\n\n".join(table.text() for table in _diff_tables(found)) or "nothing differs")
+
+
+def _diff_tables(found: Difference) -> Iterator[Table]:
+    for name, title in _DIFF_TITLES.items():
+        if name == "code" and found.metrics:
+            rows = [(each.name, each.before, each.after, *_change(each.before, each.after)) for each in found.metrics]
+            yield Table("Metrics", ("metric", "before", "after", "change", "change [%]"), rows)
+        if changes := getattr(found, name):
+            changed = [(each.name, _text(each.before), _text(each.after)) for each in changes]
+            yield Table(title, ("what", "before", "after"), changed)
+
+
+def _change(before: Any, after: Any) -> tuple[float | None, float | None]:
+    if not isinstance(before, int | float) or not isinstance(after, int | float):
+        return None, None
+    return after - before, 100.0 * (after - before) / abs(before) if before else None
+
+
+def _text(value: Any) -> str:
+    return "-" if value is None else str(value)
+
+
+def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
+    """Show the runs that a run was made from, and those made from it."""
+    run = open_run(ref, out)
+    tree, users = ancestry(run), dependents(run, run.path.parent)
+    if as_json:
+        shown = {"schema": "wristctl.lineage/1", "lineage": asdict(tree), "dependents": users}
+        print(json.dumps(shown, indent=2))
+        return
+    for line in tree.lines():
+        say(line)
+    for user in users:
+        say(f"used by {user}")
+
+
+def tag(
+    ref: Ref,
+    tags: Annotated[list[str] | None, typer.Argument(metavar="[TAG...]", help="Tags to add.")] = None,
+    remove: Annotated[list[str] | None, typer.Option("--remove", help="A tag to take away; repeatable.")] = None,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Add tags to a run, or take them away; they stand in tags.json beside the runs."""
+    run = open_run(ref, out)
+    say(f"{run.id}  {', '.join(change_tags(run.path.parent, run.id, tags or (), remove or ())) or 'no tags'}")

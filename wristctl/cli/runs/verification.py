@@ -1,0 +1,252 @@
+"""`wristctl runs verify`, `sign` and `replay`."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from wristctl.cli.command import asked_to_trust
+from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, TrustCode, run_ids
+from wristctl.cli.output import say
+from wristctl.cli.progress import listening, progress
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import inputs_of, procedure_of
+from wristctl.commands.progress import no_event
+from wristctl.errors import UserError
+from wristctl.plugins.places import check_trust
+from wristctl.plugins.trust import asking
+from wristctl.processes import NO_HARDWARE, end_with_parent
+from wristctl.records import Run, list_runs, open_run
+from wristctl.records.difference import leaves_of
+from wristctl.records.lineage import input_run
+from wristctl.records.lock import RunLock
+from wristctl.records.manifest import CONFIG, SIGNATURE, SUMS, Input, command_of
+from wristctl.records.removal import SCRATCH
+from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
+from wristctl.records.signature import RunSignature, is_signed, signature
+from wristctl.records.signature import sign as sign_run
+from wristctl.sha256sums import UNREADABLE, unreadable
+from wristctl.study_files.load import read_study
+
+_SHOWN = 50
+"""Runs from which on it is shown how far it has come."""
+
+
+class Verified(NamedTuple):
+    """What is wrong with a run, and whose signature it has, where that was asked."""
+
+    problems: list[tuple[str, str]]
+    signed: str = ""
+
+    running: bool = False
+    """It goes on, and nothing of it is sealed yet."""
+
+    @property
+    def said(self) -> str:
+        """The run in words."""
+        if self.running:
+            return "is running"
+        if all(file == SIGNATURE for file, _ in self.problems):
+            return f"as sealed{', but nobody vouches for it' if self.problems else self.signed}"
+        return "could not be checked" if any(what.startswith(UNREADABLE) for _, what in self.problems) else "changed"
+
+    def fails(self, must_be_signed: bool) -> bool:
+        """Whether it is not what was asked for."""
+        return must_be_signed if self.running else bool(self.problems)
+
+
+def verify(
+    refs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[RUN...]", help="Runs to check; all where none is named.", autocompletion=run_ids),
+    ] = None,
+    signed: Annotated[bool, typer.Option("--signed", help="They must also be signed (`wristctl runs sign`).")] = False,
+    signers: Annotated[
+        Path | None,
+        typer.Option("--signers", help="Whose keys count: a file of allowed signers, `NAME KEYTYPE KEY` a line."),
+    ] = None,
+    out: Out = RESULTS,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Hash every file of runs again and name each that is not as it was sealed (exit code 3).
+
+    With --signed each must have a signature over those hashes, and with --signers one by somebody named there. A run
+    that goes on is not sealed: it is named as running, and fails where it must be signed.
+    """
+    must = signed or signers is not None
+    paths = [run.path for run in ([open_run(ref, out) for ref in refs] if refs else list_runs(out))]
+    found: dict[str, Verified] = {}
+    quiet = len(paths) < _SHOWN
+    with (
+        listening(quiet, False) as console,
+        progress(console, no_event, "verifying", len(paths), "runs", quiet) as done,
+    ):
+        for count, path in enumerate(paths, start=1):
+            run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
+            found[str(path) if run.id in found else run.id] = _verified(run, must, signers)
+            done(count, changed=sum(each.fails(must) for each in found.values()))
+    if as_json:
+        shown = {
+            name: [{"file": file, "problem": what} for file, what in each.problems] for name, each in found.items()
+        }
+        print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
+    else:
+        for name, each in found.items():
+            say(f"{name}  {each.said}")
+            for file, what in () if each.running else each.problems:
+                say(f"  {file}: {what}")
+    changed = sum(each.fails(must) for each in found.values())
+    if changed:
+        fix = "restore the files named, or run the command again"
+        asked = " and signed" if must else ""
+        raise UserError(
+            f"{changed} of {len(found)} runs are not as they were sealed{asked}", str(out), fix, exit_code=3
+        )
+
+
+def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
+    """One run. What is sealed is hashed, whoever holds its lock: anybody can."""
+    running = run.state == "running"  # asked first: a run that ends meanwhile is sealed before its lock is free
+    try:
+        problems = run.problems()
+    except UserError as error:
+        unreadable_seal = error.what.startswith(UNREADABLE)
+        if running and not unreadable_seal:
+            return Verified([(SUMS, "is not there yet: the run is running")], running=True)
+        problems = [(SUMS, error.what if unreadable_seal else f"missing: the run is {run.state}")]
+    except OSError as error:  # another user's, perhaps: the others are still checked
+        problems = [(Path(error.filename or run.path).name, unreadable(error, run.path).what)]
+    if not signed:
+        return Verified(problems)
+    if not is_signed(run):
+        return Verified([*problems, (SIGNATURE, "run is not signed")])
+    by = signature(run, signers)
+    return Verified([*problems, (SIGNATURE, by.fault)] if by.fault else problems, _by(by))
+
+
+def _by(found: RunSignature) -> str:
+    """Who signed a run, as far as that is known."""
+    if not found.key:
+        return ""
+    if found.signer:
+        return f", signed by {found.signer} with {found.key}"
+    return f", signed with {found.key}; --signers says whose it is"
+
+
+KEY = Path("~/.ssh/id_ed25519")
+
+
+def sign(
+    ref: Ref,
+    key: Annotated[
+        Path, typer.Option("--key", help="Your private SSH key; where an agent holds it, the public one.")
+    ] = KEY,
+    out: Out = RESULTS,
+    debug: Debug = False,
+) -> None:
+    """Sign a run: with your SSH key, over the hashes of all its files. `verify --signed` checks it."""
+    run = open_run(ref, out)
+    made = sign_run(run, key.expanduser())
+    say(f"{run.id}  signed with {made.key}")
+
+
+_SAME = ("identical", "within tolerance", "volatile")
+
+
+def replay(
+    ref: Ref,
+    out: Out = RESULTS,
+    override: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Repeat it with another setting.")
+    ] = None,
+    trust_code: TrustCode = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Run a run again in a scratch folder, and say of each file whether it came out the same (exit code 3 if not).
+
+    The scratch folder is kept where something differs. A run on real hardware is refused: nothing here moves a motor.
+    """
+    with asking(partial(asked_to_trust, trust_code)):
+        _replay(open_run(ref, out), override or [], as_json)
+
+
+def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
+    if run.state != "ok":
+        raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
+    inputs = inputs_of(run)
+    check_trust(leaves_of(run).values(), run.path / CONFIG)
+    study, _ = read_study([run.path / CONFIG], overrides, run.kind)
+    if getattr(getattr(study, run.kind.replace("-", "_")), "port", None) is not None:
+        fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
+        raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
+    changed = changed_inputs(run)
+    if changed:
+        return _conclude(run, None, [], changed, as_json)
+    scratch = Path(tempfile.mkdtemp(prefix=SCRATCH))
+    lock = RunLock(scratch)  # a sign of life, for `runs gc`
+    try:
+        code = _again(run, scratch, [*_named(run, inputs), *overrides])
+    except KeyboardInterrupt:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+    finally:
+        lock.release()
+    ended = list_runs(scratch)
+    if code or not ended:
+        why = causes(run, ended[0]) if ended else []
+        said = f"the repetition ended with exit code {code} ({scratch})"
+        return _conclude(run, scratch, [], [said, *why], as_json)
+    found = verdicts(run, ended[0])
+    alike = all(each.verdict in _SAME for each in found)
+    _conclude(run, scratch, found, [] if alike else causes(run, ended[0]), as_json)
+
+
+def _named(run: Run, inputs: Mapping[str, Input | list[Input]]) -> Iterator[str]:
+    """What names a run's inputs where they are now, as overrides."""
+    for leaf, named in inputs.items():
+        paths = [str(input_run(run, each).path) for each in (named if isinstance(named, list) else [named])]
+        yield f"{procedure_of(run).subject}.{leaf}={json.dumps(paths if isinstance(named, list) else paths[0])}"
+
+
+def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
+    """The same command on the same configuration, in a process of its own; its messages pass through.
+
+    Whatever its configuration says, it opens no board and no camera.
+    """
+    options = [part for text in settings for part in ("--set", text)]
+    again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
+    command = [sys.executable, "-P", "-m", "wristctl", *again, *options, "--label", "replay"]
+    alone = {**os.environ, NO_HARDWARE: "yes"}
+    return subprocess.run(command, stdout=subprocess.DEVNULL, env=alone, preexec_fn=end_with_parent).returncode
+
+
+def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
+    """Print the verdicts; where there is a cause to name, fail and keep the scratch folder."""
+    if as_json:
+        files = [each._asdict() for each in found]
+        kept = str(scratch) if why and scratch else None
+        shown: dict[str, Any] = {"schema": "wristctl.replay/1", "run": run.id, "same": not why, "causes": why}
+        print(json.dumps({**shown, "files": files, "scratch": kept}, indent=2))
+    else:
+        if found:
+            print(Table("", ("file", "verdict", "where"), found).text(), end="\n\n")
+        for cause in why:
+            say(f"cause: {cause}")
+    if why:
+        kept = f"the repetition is in {scratch}" if scratch else "mend the input, or run its command again"
+        raise UserError("the repetition differs" if found else "the run was not repeated", run.id, kept, exit_code=3)
+    if scratch:
+        shutil.rmtree(scratch)
+    if not as_json:
+        exact = all(each.verdict in ("identical", "volatile") for each in found)
+        say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

@@ -1,0 +1,1 @@
+"""What each command plans, computes, says and draws: as a run directory, or as a result in memory."""

@@ -1,0 +1,150 @@
+"""Laws, references and optimisers from elsewhere in a study: loaded, tried, and known by their own names."""
+
+import json
+import logging
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
+from wristctl.config.foreign import PLAIN, Foreign, is_reference
+from wristctl.config.leaves import named_in, renamed
+from wristctl.config.study import Study
+from wristctl.errors import UserError, nearest
+from wristctl.plugins.places import entry_point_names
+from wristctl.study_files.resolved import names_read
+
+log = logging.getLogger(__name__)
+
+
+class Adopted(NamedTuple):
+    """A study that calls what is from elsewhere by its own name, and where that is from."""
+
+    study: Study
+    foreign: tuple[Foreign, ...]
+
+
+def adopted(study: Study, command: str) -> Adopted:
+    """Load what the sections that a command reads name from elsewhere, and try each law on a few states.
+
+    Raises UserError for what cannot be loaded or does not keep to what a law is, and for two things of one name.
+    """
+    read = names_read(command)
+    sections = {name: getattr(study, name) for name in type(study).model_fields if name in read}
+    names: dict[tuple[str, str], str] = {}
+    settings = dict(study.laws)
+    owners: dict[tuple[str, str], str] = {}
+    origins: list[Foreign] = []
+    for table, name in named_in(tuple(sections.values())):
+        found = _loaded(table, name)
+        if found is None:
+            continue
+        entry, origin = found
+        own = _entry(table, name, entry, origin, study)
+        if owners.setdefault((table.what, own), origin.reference) != origin.reference:
+            where = f"{owners[table.what, own]} and {origin.reference}"
+            raise UserError(f"two {table.what}s are called '{own}'", where, "rename one of them")
+        names[table.what, name] = own
+        if table.what == CONTROLLERS.what and (known := table[own].settings):
+            section = own.removesuffix(PLAIN)
+            settings[section] = {key: each.default for key, each in known.items()} | settings.get(section, {})
+        origins.append(origin)
+
+    laws = [own.removesuffix(PLAIN) for (what, _), own in names.items() if what == CONTROLLERS.what]
+    for name in study.laws:
+        if name not in laws and (meant := nearest(name, laws)):
+            raise UserError(f"this study names no law '{name}'", f"laws.{name}", f"did you mean '{meant}'?")
+
+    def own_name(table: Choices[Any], name: str) -> str:
+        return names.get((table.what, name), name)
+
+    if not origins:
+        return Adopted(study, ())
+    called = {name: renamed(each, own_name) for name, each in sections.items()}
+    return Adopted(study.model_copy(update=called | {"laws": settings}), tuple(origins))
+
+
+def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
+    """The study with what is from elsewhere by its place again, or by another (of the copy) where `places` has one."""
+
+    def place(table: Choices[Any], name: str) -> str:
+        origin = table.origin(name)
+        whole = origin.reference if origin else name
+        called = (places or {}).get(whole, whole)
+        if called != whole and table.what == REFERENCES.what:  # by which its section is read, also while it is written
+            table.lend(called, *table.loaded(whole))
+        return called
+
+    sections = {name: getattr(study, name) for name in type(study).model_fields}
+    return study.model_copy(update={name: renamed(each, place) for name, each in sections.items()})
+
+
+def sources_in(study: Study) -> dict[str, str]:
+    """What is from elsewhere in a study that calls it by its own name: each source's hash, by its name and place."""
+    found: dict[str, str] = {}
+    for table, name in named_in(tuple(getattr(study, field) for field in type(study).model_fields)):
+        if origin := table.origin(name):
+            places = {f"{name}/{file.relative_to(origin.root)}": digest for file, digest in origin.files.items()}
+            found |= places
+    return found
+
+
+def adoption(study: Study, command: str) -> dict[str, Any]:
+    """What `adopt` is given elsewhere, as JSON has it, to know the same laws."""
+    content = with_places(study).model_dump_json(by_alias=True, include=names_read(command))
+    return {"study": json.loads(content), "command": command, "sources": sources_in(study)}
+
+
+def adopt(spec: Mapping[str, Any]) -> None:
+    """Load what a study names from elsewhere, in a process that has not. UserError where it is another text there."""
+    study = Study.model_validate_json(json.dumps(spec["study"]))
+    found = sources_in(adopted(study, spec["command"]).study)
+    changed = [name for name, digest in spec["sources"].items() if found.get(name) != digest]
+    if changed:
+        raise UserError(f"{', '.join(changed)} is another text here than where the study began", "study")
+
+
+def _loaded(table: Choices[Any], name: str) -> tuple[Any, Foreign] | None:
+    """What a name stands for where it is from elsewhere; None of what belongs to the table."""
+    if not table.group:
+        return None
+    lent = table.origin(name)
+    if is_reference(name) or (lent is None and not table.belongs(name)):
+        return table.loaded(name)
+    if lent is not None:
+        return table.loaded(lent.reference)
+    if name in entry_point_names(table.group):
+        what = f"'{name}' is a {table.what} of wristctl, and an installed package has one of that name too"
+        raise UserError(what, table.group, "uninstall that package, or let its author rename it")
+    return None
+
+
+def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: Study) -> str:
+    """The name of what was loaded, under which the table knows it now; UserError where it is no such thing."""
+    if table.what == CONTROLLERS.what:
+        from wristctl.control.vetting import law_of, vet
+
+        entry = law_of(entry, origin.reference, study.laws)
+        own = str(entry.name)
+    elif table.what == OPTIMISERS.what:
+        from wristctl.tuning.optimisers import Optimiser
+
+        if not (isinstance(entry, type) and issubclass(entry, Optimiser)):
+            raise UserError(f"{origin.attribute} is no Optimiser", str(origin.file), "derive it from Optimiser")
+        own = str(entry.name)
+    else:
+        from wristctl.simulation.reference import ReferenceKind
+
+        if not isinstance(entry, ReferenceKind):
+            raise UserError(f"{origin.attribute} is no ReferenceKind", str(origin.file), "make it a ReferenceKind")
+        if not is_reference(name):
+            table.lend(name, entry, origin)
+        return name  # a reference has no name but its place, by which its section is read
+    if table.belongs(own) or (own in entry_point_names(table.group) and is_reference(name)):
+        what = f"there is a {table.what} '{own}' already"
+        raise UserError(what, origin.reference, f'rename this one: name="my-{own}"')
+    if table.what == CONTROLLERS.what:
+        vet(entry, origin.reference)
+        if entry.plain:
+            log.warning("%s is plain Python: its rollouts run one by one, and its times are Python's", own)
+    table.lend(own, entry, origin)
+    return own

@@ -1,0 +1,1 @@
+"""`analyse`: margins and poles of the linearised loop."""

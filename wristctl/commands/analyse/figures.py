@@ -1,0 +1,171 @@
+"""Figures of a linearised loop: Bode plot, sensitivity, step response, root locus, and the phase portrait."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from wristctl.arrays import Array
+from wristctl.plotting.style import (
+    BLACK,
+    BLUE,
+    DOTTED,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
+    VERMILLION,
+    figure,
+    legend,
+    legend_below,
+    logarithmic,
+    title,
+)
+from wristctl.stability.loop_analysis import LoopAnalysis, RootLocus
+from wristctl.stability.phase_portrait import PhasePortrait
+from wristctl.stability.sampled_loop import Complex
+
+_COLOURS = (SKY, ORANGE, VERMILLION, BLUE, GREY)
+_TURN = 2.0 * np.pi
+_LEAST, _SLOWEST = 1e-4, 0.02
+"""Loop gain, and frequency [Hz], below which nothing is drawn."""
+
+
+def bode(found: Sequence[LoopAnalysis], angles: Sequence[float], heading: str) -> Figure:
+    """Magnitude and phase of the loop's transfer over frequency [Hz], a line for each resting angle [deg].
+
+    Dots are where the gain is 1 and where the phase is -180 deg. A loop that feeds nothing back is shown as its plant:
+    angle per torque.
+    """
+    made, axes = figure(2, 1, height=5.2, sharex=True)
+    gain, phase = axes[:, 0]
+    alone = all(each.is_open for each in found)
+    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
+        response = each.plant if alone else each.response
+        at = each.omega / _TURN
+        shown = at >= min(_SLOWEST, 0.1 * at[-1])
+        gain.plot(at[shown], np.abs(response)[shown], label=f"at {angle:g} deg", **style)
+        phase.plot(at[shown], _phase(response)[shown], **style)
+        if not alone:
+            _mark(gain, each, style["color"])
+    logarithmic(gain.xaxis)
+    logarithmic(gain.yaxis)
+    gain.set_ylabel("angle per torque [rad/(N m)]" if alone else "loop gain")
+    phase.set(xlabel="frequency [Hz]", ylabel="phase [deg]")
+    if not alone:
+        gain.axhline(1.0, **DOTTED)
+        phase.axhline(-180.0, **DOTTED)
+        gain.set_ylim(bottom=max(_LEAST, gain.get_ylim()[0]))
+    low, high = phase.get_ylim()
+    phase.set_yticks(np.arange(90.0 * np.floor(low / 90.0), high + 90.0, 90.0 * max(1, round((high - low) / 540.0))))
+    phase.set_ylim(low, high)
+    title(gain, heading)
+    legend(gain, loc="lower left")
+    return made
+
+
+def _mark(axes: Axes, each: LoopAnalysis, colour: str) -> None:
+    limits = [limit for limit in (each.margins.least, each.margins.most) if 0.0 < limit.value < np.inf]
+    axes.plot([limit.omega / _TURN for limit in limits], [1.0 / limit.value for limit in limits], "o", color=colour)
+    crossed = [crossing.omega / _TURN for crossing in each.margins.gain_crossings]
+    axes.plot(crossed, np.ones(len(crossed)), "s", color=colour, markersize=4.0)
+
+
+def _phase(response: Complex) -> Array:
+    """Degrees, without jumps, begun within half a turn of 0."""
+    unwrapped = np.degrees(np.unwrap(np.angle(response)))
+    return np.asarray(unwrapped - 360.0 * np.round(unwrapped[0] / 360.0))
+
+
+def _styles(count: int) -> list[dict[str, Any]]:
+    """One for each angle, the later ones thinner: they lie close together, and none must hide another."""
+    return [{"color": _COLOURS[k % len(_COLOURS)], "linewidth": 1.0 + 1.2 * (count - 1 - k)} for k in range(count)]
+
+
+def sensitivity(found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
+    """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| over frequency [Hz]."""
+    made, ((axes,),) = figure(height=3.2)
+    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
+        amplified = 1.0 / (1.0 + each.response)
+        at = each.omega / _TURN
+        shown = at >= min(_SLOWEST, 0.1 * at[-1])
+        axes.plot(at[shown], np.abs(amplified)[shown], label=f"S at {angle:g} deg", **style)
+        axes.plot(
+            at[shown], np.abs(each.response * amplified)[shown], linestyle="--", label=f"T at {angle:g} deg", **style
+        )
+    axes.axhline(1.0, **DOTTED)
+    logarithmic(axes.xaxis)
+    logarithmic(axes.yaxis)
+    axes.set_ylim(bottom=max(1e-3, axes.get_ylim()[0]))
+    axes.set(xlabel="frequency [Hz]", ylabel="amplification")
+    legend_below(made, 2)
+    return made
+
+
+def step(found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
+    """The angle after a small step of the reference, as a share of it, over time [s], where the loop is stable."""
+    made, ((axes,),) = figure(height=3.2)
+    lasts = 0.0
+    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
+        if each.margins.stable:
+            axes.plot(each.step.time, each.step.angle, label=f"at {angle:g} deg", **style)
+            lasts = max(lasts, 2.0 * each.step.settling, 5.0 * each.step.rise)
+    axes.axhline(1.0, **DOTTED)
+    axes.set_xlim(0.0, lasts)
+    axes.set(xlabel="time [s]", ylabel="angle / step")
+    legend(axes, loc="lower right")
+    return made
+
+
+def locus(found: RootLocus, least_growth: float = -60.0) -> Figure:
+    """Poles as the gain grows: decay or growth [1/s] and frequency [Hz]; black rings stand for the loop as it is."""
+    made, ((axes,),) = figure(height=4.2)
+    points = np.concatenate([each for each in found.poles if len(each)])
+    shades = np.concatenate([np.full(len(p), f) for f, p in zip(found.factors, found.poles, strict=True)])
+    own = found.poles[len(found.factors) // 2]
+    near = np.log10(shades)
+    shown = axes.scatter(points[:, 0], points[:, 1], c=near, s=8.0, cmap="viridis", linewidths=0.0)
+    axes.scatter(own[:, 0], own[:, 1], s=42.0, facecolors="none", edgecolors=BLACK, label="as it is")
+    axes.axvline(0.0, color=VERMILLION, linewidth=1.0)
+    left = max(least_growth, float(points[:, 0].min())) if len(points) else least_growth
+    right = max(5.0, min(float(points[:, 0].max()), -left)) if len(points) else 5.0
+    axes.set_xlim(1.05 * left, 1.05 * right)
+    inside = points[(points[:, 0] > 1.05 * left) & (points[:, 0] < 1.05 * right)]
+    axes.set_ylim(-0.02 * inside[:, 1].max(initial=1.0), 1.05 * inside[:, 1].max(initial=1.0))
+    axes.set(xlabel="growth [1/s]; left of 0 it decays", ylabel="frequency [Hz]")
+    bar = made.colorbar(shown, ax=axes, label="log10 of the gain's factor")
+    bar.ax.tick_params(labelsize=9.0)
+    over = "the loop's gain" if found.over == "loop" else found.over
+    title(axes, f"Root locus over {over}")
+    legend(axes, loc="upper left")
+    return made
+
+
+def portrait(found: PhasePortrait) -> Figure:
+    """Error and its rate of the nonlinear loop, over the sliding surface (black) and its boundary layer (grey).
+
+    Vermillion until a course has come into the layer for good, blue from then on.
+    """
+    made, ((axes,),) = figure(height=4.2)
+    for course in found.courses:
+        error, rate = np.degrees(course.error), np.degrees(course.rate)
+        points = np.stack([error, rate], axis=1)
+        late = course.time >= (course.reached if np.isfinite(course.reached) else np.inf)
+        colours = np.where(late[1:], BLUE, VERMILLION)
+        axes.add_collection(LineCollection(list(np.stack([points[:-1], points[1:]], axis=1)), colors=list(colours)))
+        axes.plot(error[:1], rate[:1], "o", color=BLACK, markersize=4.0)
+    axes.autoscale()
+    low, high = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    across = np.array([low, high])
+    line, layer = -found.slope * across, np.degrees(found.layer)
+    axes.fill_between(across, line - layer, line + layer, color=LIGHT, linewidth=0.0, zorder=0.5)
+    axes.plot(across, line, color=BLACK, linewidth=1.0, label="sliding surface, without its integral")
+    for colour, label in ((VERMILLION, "reaching"), (BLUE, "within the layer for good")):
+        axes.plot([], [], color=colour, label=label)
+    axes.set(xlim=(low, high), ylim=(bottom, top), xlabel="error [deg]", ylabel="error rate [deg/s]")
+    legend_below(made, 3)
+    return made

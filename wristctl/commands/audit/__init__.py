@@ -1,0 +1,1 @@
+"""`audit`: the paper's claims, one by one."""

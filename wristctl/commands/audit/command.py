@@ -1,0 +1,265 @@
+"""The paper's claims, one by one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from wristctl.commands.compare.command import Compared, compare
+from wristctl.commands.inputs import EarlierRun, Given, Inputs
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.audit import Claim
+from wristctl.config.loop import LOOPS
+from wristctl.config.study import Study
+from wristctl.errors import Argument, Call, UserError, meant, under
+from wristctl.records import LiveRun, Run, start_run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.comparison.claims import Judgement, Metrics, TrialsDone
+    from wristctl.comparison.robust import Strip
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Audited(StudyResult):
+    """Every claim of the paper with its verdict, and the comparisons that show it."""
+
+    kind = "audit"
+
+    judgements: list[Judgement]
+    comparisons: dict[str, Compared]
+    """by loop"""
+    strips: list[Strip]
+    """over the box of what the paper leaves open, where the study names it"""
+
+    @property
+    def answer(self) -> list[str]:
+        """What of the paper holds, in a few lines."""
+        from wristctl.commands.audit.answer import answer_of
+
+        return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per claim: the paper's value, verdict and reason, and on each loop our range, verdict and mark."""
+        from wristctl.comparison.claims import ledger_frame
+
+        return ledger_frame(self.judgements)
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """What will be run; no claims, or a train run that cannot show them, are errors here."""
+    from wristctl.comparison.claims import TRAININGS, conditions_of
+    from wristctl.simulation.size import Size, check_size
+
+    claims = study.audit.claims
+    if not claims:
+        raise UserError("no claims to audit", "audit.claims", Call("audit", "experiments/claims.yaml"))
+    _check_claims(claims)
+    _check_trainings(claims, inputs)
+    asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in (*TRAININGS, "hardware"))
+    shown = [f"{name}: {_name(inputs[name]) if name in inputs else 'open, for want of a run'}" for name in asked]
+    rollouts = f"{len(conditions_of(claims))} comparisons on the built-in loops"
+    box = study.audit.box
+    with under("audit"):
+        check_size(Size(list(LOOPS.values()), study.audit.horizon))
+        if box.unknowns:
+            with under("box"):
+                _check_box(study)
+    rollouts += f", and {box.draws + sum(box.continuous)} settings drawn" * bool(box.unknowns)
+    return "\n".join([f"{len(claims)} claims; {rollouts}", *shown])
+
+
+def _check_box(study: Study) -> None:
+    """UserError where the box's settings are too many; their mean is that of a few of them."""
+    from wristctl.comparison.robust import rows_in_box
+    from wristctl.comparison.unknowns_sampling import CONTINUOUS, drawn_settings
+    from wristctl.simulation.size import Size, check_steps
+
+    box, rows = study.audit.box, len(rows_in_box(study.audit.claims))
+    few = drawn_settings(box.model_copy(update={"draws": 8}), study.wrist, study.seed)
+    each = sum(Size([own.loop], own.horizon).steps for own in few) / len(few)
+    count = box.draws + sum(box.continuous)
+    check_steps(rows * (box.draws * each + sum(box.continuous) * box.horizon / CONTINUOUS), rows * count)
+
+
+def audit(session: Session) -> Audited:
+    """Judge every claim of the paper by rollouts, its own words, or what is still open."""
+    from wristctl.commands.audit.answer import ledger_tables
+    from wristctl.commands.audit.figures import ours_over_the_papers
+    from wristctl.comparison.claims import TRAININGS, Grounds, conditions_of, evidence_study, judge_all, ledger_frame
+    from wristctl.control.table import CONTROLLERS
+
+    findings, inputs, study = session.findings, session.inputs, session.study
+    claims = study.audit.claims
+    known = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
+    compared = {}
+    for loop, scale in conditions_of(known):
+        name = loop if scale == 1.0 else f"{loop}-stiffness-{scale:g}"
+        compared[name] = _evidence(session, evidence_study(study, known, (loop, scale)), f"audit-{name}")
+    grounds = Grounds(
+        dict(zip(conditions_of(known), (each.frame() for each in compared.values()), strict=True)),
+        {role: found for role in TRAININGS if (found := inputs.read(role, _metrics)) is not None},
+        inputs.read("hardware", _trials),
+        study.wrist.tension_limit,
+    )
+    judged = judge_all(claims, grounds)
+    boxed = judged_in_box(session)
+    if not boxed and any(name for each in judged for name in each.found):
+        findings.figure("ledger", ours_over_the_papers, judged)
+    shown_by = {name: _name(each) for name, each in (*compared.items(), *inputs.items())}
+
+    units = {"paper": "", "low": "", "high": ""}
+    meaning = {
+        "paper": "the paper's value",
+        "verdict": "of all loops: where it fails on all, the gravest; else where they differ, not specified enough; "
+        "none: a setting",
+        "whose": "paper, ours (a check of its auditors) or group (its authors elsewhere)",
+        "part_of": "the statement that it is a detail of",
+    }
+    findings.table("data/claims.csv", ledger_frame(judged), units, meaning)
+    findings.plain("evidence.json", shown_by, volatile=True)
+    theirs = [j for j in judged if j.claim.whose == "paper" and not j.claim.part_of]
+    counted = [j.verdict for j in theirs if j.verdict is not None]
+    for verdict, count in sorted(Counter(counted).items()):
+        says = f"claims of the paper whose verdict is: {verdict}"
+        findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=says)
+    evidence = Table("Runs that show it", ("shown by", "run"), list(shown_by.items()))
+    tables = [*ledger_tables(judged), *([box_table(boxed)] if boxed else []), evidence]
+    return Audited(study, findings, tables, judged, compared, boxed)
+
+
+_METRICS = ("comparison", "ordering", "symmetry", "hardware")
+
+
+def _check_claims(claims: Sequence[Claim]) -> None:
+    """UserError for a claim that names a metric or an equation that there is not."""
+    from wristctl.comparison.derived_claims import EQUATIONS
+    from wristctl.simulation.metrics import METRICS
+
+    loops: Iterable[str] = METRICS
+    tables = {"equation": set(EQUATIONS)} | {kind: set(loops) for kind in _METRICS}
+    for claim in claims:
+        known = tables.get(claim.evidence)
+        if known is not None and claim.metric not in known:
+            kind = "equation" if claim.evidence == "equation" else "metric"
+            what = f"claim {claim.id} asks for the {kind} '{claim.metric}', which there is not"
+            raise UserError(what, "audit.claims", meant(str(claim.metric), known))
+
+
+def _check_trainings(claims: Sequence[Claim], inputs: Inputs) -> None:
+    """UserError where a training lacks a metric that a claim asks for."""
+    from wristctl.comparison.claims import TRAININGS
+
+    for claim in claims:
+        metrics = inputs.read(claim.evidence, _metrics)
+        if metrics is not None and claim.metric not in metrics:
+            run = inputs.runs().get(claim.evidence)
+            give = Argument(claim.evidence, metavar="")
+            raise UserError(
+                f"claim {claim.id} needs the metric '{claim.metric}', which this run does not have",
+                str(run.path) if run else claim.evidence,
+                ("give ", give, " a run of `", Call("train", TRAININGS[claim.evidence]), "`"),
+            )
+
+
+def _evidence(session: Session, study: Study, label: str) -> Compared:
+    """The comparison of a study, in a run directory of its own beside that of the audit."""
+
+    def compared(run: LiveRun | None) -> Compared:
+        return compare(replace(session, study=study, inputs=Inputs(), findings=Findings(study.seed, run, draws=False)))
+
+    if session.findings.run is None:
+        return compared(None)
+    with start_run("compare", study, label, session.findings.run.path.parent, ["wristctl", "audit"], []) as run:
+        return compared(run)
+
+
+def _metrics(given: Given) -> Metrics:
+    return given.metrics if isinstance(given, Run) else given.findings.metrics
+
+
+def _trials(given: Given) -> TrialsDone:
+    from wristctl.comparison.claims import TrialsDone
+    from wristctl.simulation.batch import sample_period
+    from wristctl.simulation.reference import motion
+
+    study = given.config if isinstance(given, Run) else given.study
+    table = given.data("trials") if isinstance(given, Run) else given.frame()
+    own = study.hw_run
+    moving = motion(own.reference, study.wrist, own.horizon, sample_period(own.control_period))
+    return TrialsDone(table, min(moving.rest, own.horizon), own.port is None)
+
+
+def _name(given: Given) -> str:
+    run = given if isinstance(given, Run) else given.run
+    return run.id if run else "in memory"
+
+
+AUDIT = Procedure(
+    "audit",
+    plan,
+    audit,
+    (
+        EarlierRun("table1", kind="train", optional=True),
+        EarlierRun("selection", kind="train", optional=True),
+        EarlierRun("hardware", kind="hw-run", optional=True),
+    ),
+)
+
+
+def judged_in_box(session: Session) -> list[Strip]:
+    """Every claim that draws can judge; none where the study names no unknowns."""
+    from wristctl.commands.audit.figures import shares, strip
+    from wristctl.comparison.robust import draws_frame, rows_in_box, strips, strips_frame
+    from wristctl.comparison.unknowns_sampling import continuous_settings, drawn_settings, react
+    from wristctl.control.table import CONTROLLERS
+    from wristctl.study_files.sweeps import unit_at
+
+    study, findings, box = session.study, session.findings, session.study.audit.box
+    claims = [claim for claim in study.audit.claims if claim.controller is None or claim.controller in CONTROLLERS]
+    rows = rows_in_box(claims)
+    if not box.unknowns or not rows:
+        return []
+    turned = {claim.label for claim in claims if claim.evidence == "symmetry"}
+    settings = [*drawn_settings(box, study.wrist, study.seed), *continuous_settings(box, study.wrist, study.seed)]
+    with session.progress("drawing settings from the box", total=100, unit="%") as done:
+        share = len(rows) / (len(rows) + len(turned))
+        drawn = react(rows, settings, lambda part: done(round(100 * share * part)))
+        rest = [row for row in rows if row.label in turned]
+        mirrored = react(rest, settings, lambda part: done(round(100 * (share + (1 - share) * part))), mirrored=True)
+    found = strips(claims, drawn, mirrored)
+    findings.table("data/box.csv", strips_frame(found))
+    findings.table("data/draws.csv", draws_frame(drawn))
+    own = [each for each in found if not each.claim.unspecified or each.claim.evidence == "symmetry"]
+    heading = "In which of the settings that the paper may have had its claims hold"
+    findings.figure("box", shares, own or found, heading)
+    for each in found:
+        if each.leaves:
+            name = each.leaves[0].name
+            within = study if name.startswith("wrist.") else study.simulate
+            unit = unit_at(within, name.split("."))
+            findings.figure(f"strip-{each.claim.id}", strip, each, drawn.values(name), unit, later=True)
+    return found
+
+
+def box_table(found: list[Strip]) -> Table:
+    """Where each claim holds, and what decides it."""
+    from wristctl.comparison.verdicts import FAILING
+
+    rows = []
+    for each in found:
+        held = each.share("reproduced")
+        beside = (each.share("better than the paper").value, each.share(*FAILING).value)
+        second = each.leaves[1].name if each.told and len(each.leaves) > 1 else ""
+        rows.append((each.claim.id, each.uncounted, held.value, held.low, held.high, *beside, each.told, second))
+    heads = ("claim", "not converged", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
+    draws = len(found[0].verdicts) if found else 0
+    most = max((each.uncounted for each in found), default=0)
+    left = f"; those that did not converge, up to {most}, are not counted" * bool(most)
+    return Table(f"Shares of {draws} settings drawn from what the paper leaves open{left}", heads, rows)

@@ -1,0 +1,1 @@
+"""`hw calibrate`: the camera, the wrist, and the board to print."""

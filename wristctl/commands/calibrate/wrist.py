@@ -1,0 +1,121 @@
+"""Zero, senses of turning and steps per radian of a wrist, by small guarded moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.rig_description import coming_first, describe_rig
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.trial.calibration import WristCalibration
+    from wristctl.trial.testbeds import Testbed
+
+_OF_AXIS = ("axis", "tendon", "sense", "taken up [mm]", "bend [deg]")
+_COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]", "friction [mm]")
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class WristCalibrated(StudyResult):
+    """Where each tendon is just taut on the straight wrist, and which way its motor turns."""
+
+    kind = "calibrate-wrist"
+
+    calibration: WristCalibration
+
+    def frame(self) -> pd.DataFrame:
+        """One row per tendon."""
+        import pandas as pd
+
+        return pd.DataFrame(self.tables[0].rows, columns=_COLUMNS)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class AxisFound(StudyResult):
+    """Which way one motor turns, and how slack its tendon is."""
+
+    kind = "calibrate-wrist"
+
+    def frame(self) -> pd.DataFrame:
+        """One row."""
+        import pandas as pd
+
+        return pd.DataFrame(self.tables[0].rows, columns=_OF_AXIS)
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """What would be done; opens nothing."""
+    settings = study.calibrate_wrist
+    slack = 1e3 * settings.homing.slack
+    if settings.axis is not None:
+        until = f"until its tendon bends the wrist, by {settings.max_deg:g} deg at most"
+        return f"{describe_rig(settings)}\naxis {settings.axis} reels in by at most {slack:g} mm {until}"
+    return f"{describe_rig(settings)}\neach motor reels in by at most {slack:g} mm until its tendon bends the wrist"
+
+
+def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
+    """Find where each tendon is just taut on the straight wrist, which way its motor turns, and steps per radian.
+
+    The wrist stands straight, its tendons slack, both markers in the camera's picture. Later runs reuse what is
+    durable: senses of turning and the marker's zero; positions only until the board restarts. With --axis one motor is
+    tried by itself, up to --max-deg, and nothing is kept for later runs.
+    """
+    session.operator.tell(describe_rig(session.study.calibrate_wrist))
+    import numpy as np
+
+    from wristctl.trial.calibration import FILE, calibrated
+    from wristctl.trial.homing import ExpectedMoves
+    from wristctl.trial.testbeds import open_testbed
+    from wristctl.vision.view import View
+    from wristctl.wrist.directions import ACTIVE
+
+    findings, study = session.findings, session.study
+    settings = study.calibrate_wrist
+    view = View.of(session.inputs.runs().get("optics"))
+    with coming_first(session, settings):
+        with session.progress("opening board and camera"):
+            testbed = open_testbed(settings, study.wrist, study.seed, view, session.operator.confirm)
+        if settings.axis is not None:
+            return _one_axis(session, testbed, settings.axis)
+        with session.progress("homing"):
+            found = calibrated(testbed, settings, study.wrist)
+    findings.plain(FILE, found.plain())
+    zero = found.zero
+    findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
+    by_model = ExpectedMoves(settings, study.wrist, settings.plane).steps()
+    rows = []
+    for axis, tendon in enumerate(ACTIVE):
+        slope, slack, near = zero.steps_per_radian[axis], zero.slack[axis], f"tendon {tendon}, near the straight wrist"
+        findings.metric(f"steps_per_radian_{tendon}", slope, "1/rad", meaning=near)
+        findings.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")
+        rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, by_model, 1e3 * slack, 1e3 * zero.friction[axis]))
+    findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.marker):.3f} deg")
+    return WristCalibrated(study, findings, [Table("Zero", _COLUMNS, rows)], found)
+
+
+def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
+    import numpy as np
+
+    from wristctl.trial.rig_strokes import axis_tried
+    from wristctl.wrist.directions import ACTIVE
+
+    findings, study = session.findings, session.study
+    with session.progress(f"trying axis {axis}"):
+        found = axis_tried(testbed, study.calibrate_wrist, axis)
+    findings.metric("taken_up", found.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
+    findings.metric("bend", found.bend, "rad", meaning="of the wrist then")
+    row = axis, ACTIVE[axis], f"{found.sense:+d}", 1e3 * found.taken_up, float(np.degrees(found.bend))
+    return AxisFound(study, findings, [Table("One axis", _OF_AXIS, [row])])
+
+
+CALIBRATE_WRIST: Procedure[WristCalibrated | AxisFound] = Procedure(
+    "calibrate-wrist", plan, calibrate_wrist, (EarlierRun("optics", kind="calibrate-camera", optional=True),)
+)

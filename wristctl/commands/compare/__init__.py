@@ -1,0 +1,1 @@
+"""`compare`: controllers under the same conditions, beside the paper's numbers."""

@@ -1,0 +1,301 @@
+"""Controllers under the same conditions, beside the paper's numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from wristctl.commands.compare.answer import (
+    STANDING_UNITS,
+    answer_lines,
+    head_with_the_best,
+    loop_tables,
+    step_table,
+    units,
+)
+from wristctl.commands.compare.ranking import ranked
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs_of_loops import (
+    check_family_reach,
+    check_inverses,
+    check_reach,
+    check_row,
+    compared_inverses,
+    family_of,
+    judged_loops,
+    network_for,
+    tuned_gains,
+    tuned_on,
+)
+from wristctl.commands.loop_warnings import (
+    asked_by,
+    warn_if_coarse,
+    warn_if_it_buckles,
+    warn_out_of_reach,
+    warn_outside_conditions,
+)
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Session
+from wristctl.commands.sweep.command import sweepable
+from wristctl.commands.tune.command import planned_search, search_all
+from wristctl.config.study import Study
+from wristctl.errors import UserError, under
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from wristctl.comparison.class_standing import ClassStanding
+    from wristctl.comparison.combinations import ComparedRow
+    from wristctl.comparison.step_cost import StepTime
+    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.control.table import Gains
+    from wristctl.simulation.size import Size
+    from wristctl.tuning.search import Search
+
+
+def draw(findings: Findings, study: Study, results: list[ComparedRow], standings: Sequence[ClassStanding]) -> None:
+    """Each class by itself, then RMSE against variation of tension, over what grows, and of every row on every loop."""
+    from wristctl.commands.compare.class_figures import answer_figure, error_against_variation
+    from wristctl.commands.compare.figures import error_over_disturbance, series_of_sizes
+
+    caption = "RMSE of every row in each class of conditions, with 95 % intervals; rows from best to worst over all"
+    findings.figure("answer", answer_figure, standings, caption=caption)
+    findings.overview.figure = "answer"
+    for standing in standings:
+        _of_class(findings, standing, results)
+    later = partial(findings.figure, later=True)
+    first = [each for each in results if each.inverse == _stands_for(results)[2]]
+    caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
+    later("rmse-against-tension-variation", error_against_variation, first, standings, caption=caption)
+    for leaf, sizes in series_of_sizes(study.compare.loops).items():
+        caption = f"RMSE over {leaf}, medians over motions"
+        later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
+    _of_every_row(findings, study, results)
+
+
+def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[ComparedRow]) -> None:
+    """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
+    from wristctl.commands.compare.class_figures import shown_rows, tension_rows
+    from wristctl.plotting.loop_figures import error_sizes, errors
+
+    later = partial(findings.figure, later=True)
+    cell = _stands_for(standing.of(results))
+    here = {each.label: each for each in results if (each.loop, each.reference, each.inverse) == cell}
+    own = [here[row] for row in shown_rows(standing) if row in here]
+    courses = [each.simulation.trajectory for each in own]
+    slug, where = _slug(standing.name), f"{standing.name}: loop {cell[0]}, {cell[1]}"
+    caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
+    later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
+    later(
+        f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of both sides, {where}"
+    )
+    repeated = [each.repeated for each in own if len(each.repeated.failed) > 1]
+    if repeated:
+        caption = f"|error| over repetitions: median and 95 % interval, {where}"
+        later(f"error-of-repetitions-{slug}", error_sizes, repeated, where, caption=caption)
+
+
+def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRow]) -> None:
+    from wristctl.commands.compare.figures import rmse_map, variation_dots
+    from wristctl.comparison.combinations import paper_cells
+
+    later, cells, settings = partial(findings.figure, later=True), paper_cells(study), study.compare
+    for loop in settings.loops:
+        here = [each for each in results if each.loop == loop]
+        beside = any(cell[0] == loop for cell in cells)
+        caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
+        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, here, f"loop {loop}", beside=beside, caption=caption)
+        caption = f"Total variation of tension of every row, loop {loop}"
+        later(f"tension-variation-{_slug(loop)}", variation_dots, here, f"loop {loop}", caption=caption)
+    for reference in dict.fromkeys(each.reference for each in results) if len(settings.loops) > 1 else ():
+        here = [each for each in results if each.reference == reference]
+        caption = f"RMSE of every row on each loop, {reference}"
+        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, here, reference, "loop", beside=False, caption=caption)
+
+
+def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
+    """The loop, reference and inverse of the first row that is no step and, if there are others, not of a network."""
+    chosen = min(results, key=lambda each: (each.inverse == "network", each.jumps))
+    return chosen.loop, chosen.reference, chosen.inverse
+
+
+def _slug(name: str) -> str:
+    """A name as a file's."""
+    return re.sub(r"[^A-Za-z0-9.-]+", "-", name.replace(" -", " minus ").replace("+", "plus ")).strip("-")
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Compared(StudyResult):
+    """Every combination of controller, loop, reference, direction and inverse."""
+
+    kind = "compare"
+
+    rows: list[ComparedRow]
+    """each with the simulation of its loop"""
+    searches: dict[str, Search]
+    """of the controllers that were tuned here, by name"""
+    step_times: dict[str, StepTime]
+    """median and 99th percentile of a control step on this machine [us], by controller/gains"""
+    standings: list[ClassStanding]
+    """of the rows in each class of conditions, or over the worlds of a family"""
+    rankings: Sequence[WorldRanking] = ()
+    """over the worlds of a family, where one is named: of its smooth motions, of its steps; there are no `rows` then"""
+
+    @property
+    def fault(self) -> UserError | None:
+        """That nothing in a ranking can be relied on."""
+        if any(len(found.standing.unreliable) < len(found.rows) for found in self.rankings) or not self.rankings:
+            return None
+        what, where = "every row fails, swings or chatters in some world", self.findings.run
+        return UserError(what, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
+
+    @property
+    def answer(self) -> list[str]:
+        """Which row is best in each class of conditions, in words."""
+        return answer_lines(self.standings)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
+        import pandas as pd
+
+        from wristctl.comparison.combinations import paper_cells
+        from wristctl.comparison.comparison_data import frame
+        from wristctl.comparison.world_ranking import ranking_frame
+
+        if self.rankings:
+            return pd.concat([ranking_frame(found) for found in self.rankings], ignore_index=True)
+        return frame(self.rows, paper_cells(self.study))
+
+    def series(self) -> dict[str, np.ndarray]:
+        """Courses over time, one row per combination, every fifth sample; SI units."""
+        from wristctl.comparison.comparison_data import series
+
+        return dict(series(self.rows))
+
+    def courses(self) -> Mapping[str, Mapping[str, Any]]:
+        """As `series`."""
+        return {"series": self.series()}
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check names and say how many rollouts there will be."""
+    from wristctl.commands.truth_table import truth_told
+    from wristctl.comparison.combinations import refuse_tuned_scenarios
+    from wristctl.simulation.size import check_size
+
+    settings, earlier, searched = study.compare, tuned_on(inputs), ""
+    found_here = settings.tuning.controllers if settings.tuning is not None else ()
+    for number, row in enumerate(settings.rows):
+        if row.gains != "tuned" or row.controller not in found_here:
+            with under(f"compare.rows.{number}"):
+                check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
+    if settings.tuning is not None:
+        check_family_reach(study, settings.tuning.worlds.family)
+        with under("compare.tuning"):
+            searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist, inputs)}\n"
+        refuse_tuned_scenarios(settings, settings.tuning)
+    if earlier is not None:
+        refuse_tuned_scenarios(settings, earlier)
+    check_family_reach(study, settings.worlds.family)
+    if not settings.worlds.family:
+        check_reach(settings.references, study.wrist, "compare.references.{}")
+    with under("compare"):
+        asked = size(study)
+        check_inverses(compared_inverses(study), inputs)
+        check_size(asked)
+    told = truth_told(study.wrist, judged_loops(study, study.compare))
+    return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{told}"
+
+
+def size(study: Study) -> Size:
+    """Every row on every loop and reference, or on the worlds of a family."""
+    from wristctl.comparison.combinations import count_rollouts
+    from wristctl.simulation.size import Size
+
+    settings, loops = study.compare, list(judged_loops(study, study.compare).values())
+    if settings.worlds.family:
+        family = family_of(study.families, settings.worlds.family, "worlds.family")
+        return Size(loops, family.horizon, len(settings.rows) * settings.worlds.draws * len(family.references))
+    return Size(loops, settings.horizon, count_rollouts(settings))
+
+
+def compare(session: Session) -> Compared:
+    """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
+    from wristctl.commands.truth_table import truth_tables
+    from wristctl.comparison.class_standing import class_standings, of_ranking, standings_frame
+    from wristctl.comparison.combinations import compare as run_comparison
+    from wristctl.comparison.combinations import paper_cells
+    from wristctl.comparison.comparison_data import frame, repetitions_frame, series
+    from wristctl.comparison.statistics import spread
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.draws import Draws
+
+    study, findings, searches = session.study, session.findings, dict[str, "Search"]()
+    settings = study.compare
+    loops = judged_loops(study, study.compare).values()
+    warn_if_it_buckles(findings, study.wrist, loops)
+    warn_if_coarse(loops)
+    warn_outside_conditions(settings.rows, loops)
+    warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
+    network = network_for(session.inputs, study.wrist, loops)
+    if settings.tuning is not None:
+        searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
+    tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
+    if settings.worlds.family:
+        rankings, shown = ranked(session, study, network, tuned)
+        stands = [of_ranking(ranking) for ranking in rankings]
+        head_with_the_best(findings, stands)
+        return Compared(study, findings, shown, [], searches, {}, stands, rankings)
+    with session.progress("comparing", total=100, unit="%") as done:
+        results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
+    scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
+    findings.note_streams(Draws(study.seed).names(loops, scenarios))
+    cells = paper_cells(study)
+    findings.table("data/comparison.csv", frame(results, cells), units=units())
+    findings.arrays("data/trajectories.npz", series(results))
+    if any(len(result.repeated.failed) > 1 for result in results):
+        findings.table("data/repetitions.csv", repetitions_frame(results), units=units())
+    for result in results:
+        name = "_".join((result.loop, result.label, result.inverse, result.reference)).replace(" ", "-")
+        found = spread(result.repeated.metrics["rmse"])
+        findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
+    standings = class_standings(results, settings, study.wrist)
+    findings.table("data/standings.csv", standings_frame(standings), units=STANDING_UNITS)
+    head_with_the_best(findings, standings)
+    times = _step_times(session, tuned)
+    with session.progress("drawing"):
+        draw(findings, study, results, standings)
+    by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
+    tables = [*chain.from_iterable(by_loop), step_table(times), *truth_tables(study.wrist, settings.loops)]
+    return Compared(study, findings, tables, results, searches, times, standings)
+
+
+def _step_times(session: Session, tuned: Gains) -> dict[str, StepTime]:
+    from wristctl.comparison.step_cost import step_time
+    from wristctl.control.table import controller, gains_of
+
+    times = {}
+    with session.progress("timing the control step"):
+        for row in session.study.compare.rows:
+            law = controller(row.controller)
+            gains = gains_of(law, row.gains, tuned)
+            times[f"{row.controller}/{row.gains_name}"] = step_time(law, gains, session.study.wrist)
+    session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
+    return times
+
+
+COMPARE = sweepable(
+    Procedure(
+        "compare",
+        plan,
+        compare,
+        (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
+        size=size,
+    )
+)

@@ -1,0 +1,221 @@
+"""Figures of a comparison: every controller on every reference of one loop, or on one reference of every loop."""
+
+from collections.abc import Mapping, Sequence
+from textwrap import fill
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
+from wristctl.arrays import Array
+from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.comparison_data import metrics_of
+from wristctl.comparison.paper import T2
+from wristctl.comparison.statistics import spread
+from wristctl.config.loop import Loop
+from wristctl.plotting.style import (
+    BLACK,
+    GREY,
+    WIDTH,
+    PowersOfTen,
+    colour,
+    figure,
+    legend_below,
+    legend_under,
+    line,
+    logarithmic,
+    title,
+    undress,
+)
+from wristctl.study_files.keys import field_at, unit_of
+
+Across = Literal["reference", "loop"]
+"""What the columns of a figure are."""
+
+_BESIDE_CELLS, _NUMBER = 2.3, 0.45
+"""Width [in] of names and bar, and what a cell needs for its number."""
+_FAILED = "///"
+"""Hatch of what diverged."""
+
+
+def rmse_map(
+    results: Sequence[ComparedRow], heading: str = "", across: Across = "reference", beside: bool = True
+) -> Figure:
+    """RMSE [rad] of each controller as number and colour (log); columns as `across` says.
+
+    `beside`: with the paper's T2 in a column of its own.
+
+    Of repetitions it is the median, with its 95 % interval below and how many of them failed. What diverged is hatched
+    and marked with an x.
+    """
+    rows, columns = _names(results, across)
+    values = np.full((len(rows), len(columns)), np.nan)
+    printed = np.full((len(rows), 1), np.nan)
+    below: dict[tuple[int, int], str] = {}
+    for result in results:
+        at = rows.index(_row(results, result))
+        place = at, columns.index(getattr(result, across))
+        values[place] = metrics_of(result)["rmse"]
+        if len(result.repeated.failed) > 1:
+            below[place] = _below(result)
+        printed[at] = T2[result.controller].rmse if beside and result.controller in T2 else np.nan
+    known = np.concatenate([values, printed], axis=1)
+    positive = known[known > 0.0]
+    norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
+    widths = (len(columns), 1)
+    size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
+    beside = bool(np.isfinite(printed).any())
+    made, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
+    ours = axes[0, 0]
+    narrow = (made.get_figwidth() - _BESIDE_CELLS) / len(columns) < _NUMBER  # then colours and bar have to do
+    image = _cells(ours, values, norm, below, numbers=not narrow)
+    if beside:
+        _cells(axes[0, 1], printed, norm)
+        axes[0, 1].set_xticks([0], ["the paper's\nT2"])
+    ground = "none" if narrow else "w"
+    for row, column in np.argwhere(np.isnan(values)):
+        ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
+        ours.text(
+            column,
+            row,
+            "x",
+            ha="center",
+            va="center",
+            fontsize=11.0,
+            fontweight="bold",
+            backgroundcolor=ground,
+        )
+    ours.set_yticks(range(len(rows)), rows)
+    names = columns if narrow else [fill(name, 10) for name in columns]
+    ours.set_xticks(range(len(columns)), names, rotation=90.0 if narrow else 0.0)
+    title(ours, heading)
+    bar = made.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
+    bar.minorformatter = PowersOfTen()
+    bar.ax.tick_params(labelsize=9.0)
+    return made
+
+
+def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
+    """Total variation of tension per second [N/s], log, of each controller: a dot is a reference, a line their median.
+
+    Of repetitions a dot is their median, with its 95 % interval; a row of which something failed is marked x.
+    """
+    rows, _ = _names(results, "reference")
+    made, ((axes,),) = figure(height=1.6 + 0.24 * len(rows))
+    for at, name in enumerate(rows):
+        own = [result for result in results if _row(results, result) == name]
+        spreads = [spread(result.repeated.metrics["chattering"]) for result in own]
+        values = np.array([each.median for each in spreads])
+        known = values[np.isfinite(values) & (values > 0.0)]
+        failed = any(result.repeated.failed.any() for result in own)
+        shade = colour(own[0].controller)
+        axes.plot(known, np.full(len(known), at), "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8)
+        axes.plot([np.median(known)] * 2 if len(known) else [], [at - 0.3, at + 0.3] if len(known) else [], color=BLACK)
+        for each in spreads:
+            if each.interval is not None:
+                axes.plot(each.interval, [at, at], color=shade, linewidth=1.0)
+    logarithmic(axes.xaxis)
+    axes.set_yticks(range(len(rows)), rows)
+    axes.invert_yaxis()
+    axes.set_xlabel("total variation of tension per second [N/s]")
+    title(axes, heading)
+    handles = [
+        Line2D([], [], linestyle="none", marker="o", color=GREY, label="a reference"),
+        Line2D([], [], linestyle="none", marker="x", color=GREY, label="a reference, row failed somewhere"),
+        Line2D([], [], color=BLACK, label="median over references"),
+    ]
+    legend_under(made, handles, 3)
+    return made
+
+
+def _row(results: Sequence[ComparedRow], result: ComparedRow) -> str:
+    """The row's name: controller and gains, and the inverse where several are compared."""
+    several = len({each.inverse for each in results}) > 1
+    return f"{result.label}, {result.inverse}" if several else result.label
+
+
+def _names(results: Sequence[ComparedRow], across: Across) -> tuple[list[str], list[str]]:
+    """Rows and columns in the order of the results."""
+    rows = dict.fromkeys(_row(results, result) for result in results)
+    return list(rows), list(dict.fromkeys(getattr(result, across) for result in results))
+
+
+def _below(result: ComparedRow) -> str:
+    """The interval of a repeated row's RMSE, and how many repetitions failed."""
+    found, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
+    ends = "" if found.interval is None else "\n{:.2g} to {:.2g}".format(*found.interval)
+    return ends + (f"\n{failed.sum()} of {found.n} failed" if failed.any() else "")
+
+
+def _cells(
+    axes: Axes,
+    values: Array,
+    norm: LogNorm,
+    below: Mapping[tuple[int, int], str] | None = None,
+    numbers: bool = True,
+) -> AxesImage:
+    """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan."""
+    undress(axes)
+    image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
+    for row, column in np.argwhere(np.isfinite(values) & numbers):
+        value = values[row, column]
+        text = (below or {}).get((int(row), int(column)), "")
+        ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
+        axes.text(column, row, f"{value:.2g}{text}", ha="center", va="center", fontsize=7.5 if text else 9.0, color=ink)
+    return image
+
+
+_FEWEST = 3
+"""Sizes from which on there is a course to draw."""
+
+
+def series_of_sizes(loops: Mapping[str, Loop]) -> dict[str, dict[str, float]]:
+    """Leaves in which at least three loops differ by a number and by nothing else: their sizes by name of the loop."""
+    flat = {name: _leaves(loop.model_dump(), "") for name, loop in loops.items()}
+    found: dict[str, dict[str, float]] = {}
+    leaves = dict.fromkeys(leaf for each in flat.values() for leaf in each)
+    for leaf in leaves:
+        rest: dict[Any, dict[str, float]] = {}
+        for name, each in flat.items():
+            if isinstance(each.get(leaf), int | float) and not isinstance(each[leaf], bool):
+                others = tuple(sorted((key, repr(value)) for key, value in each.items() if key != leaf))
+                rest.setdefault(others, {})[name] = float(each[leaf])
+        longest = max(rest.values(), key=len, default={})
+        if len(set(longest.values())) >= _FEWEST:
+            found[leaf] = dict(sorted(longest.items(), key=lambda pair: pair[1]))
+    return found
+
+
+def error_over_disturbance(results: Sequence[ComparedRow], leaf: str, sizes: Mapping[str, float]) -> Figure:
+    """RMSE [deg], log, of each row over a leaf of the loop, medians over motions; a line ends where the row fails."""
+    made, ((axes,),) = figure(height=3.6)
+    for label in dict.fromkeys(each.label for each in results):
+        errors = []
+        for loop in sizes:
+            own = [each for each in results if each.label == label and each.loop == loop]
+            failed = any(each.repeated.failed.any() for each in own)
+            errors.append(np.nan if failed else np.median([metrics_of(each)["rmse"] for each in own]))
+        axes.plot(list(sizes.values()), np.degrees(errors), marker="o", markersize=3.5, label=label, **line(label))
+    logarithmic(axes.yaxis)
+    axes.set(xlabel=f"{leaf} [{_unit(leaf)}]", ylabel="RMSE [deg]")
+    title(axes, f"error over {leaf}")
+    legend_below(made)
+    return made
+
+
+def _unit(leaf: str) -> str:
+    _, field = field_at(("simulate", "loop", *leaf.split(".")))
+    return (unit_of(field) if field is not None else "") or "1"
+
+
+def _leaves(node: Mapping[str, Any], begin: str) -> dict[str, Any]:
+    """Leaves of nested mappings by their key paths."""
+    found: dict[str, Any] = {}
+    for key, value in node.items():
+        found |= _leaves(value, f"{begin}{key}.") if isinstance(value, Mapping) else {f"{begin}{key}": value}
+    return found

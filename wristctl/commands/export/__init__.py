@@ -1,0 +1,1 @@
+"""`runs export` and `export-model`: runs and wrists for other programs."""

@@ -1,0 +1,122 @@
+"""A run's data in formats of other programs: MATLAB's, and MCAP, which robot log viewers open."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wristctl.errors import FILE, UserError
+from wristctl.records import Run
+from wristctl.records.files import replacing
+from wristctl.records.formats import read_arrays, read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+INSTALL = "pip install 'wristctl[logs]'"
+
+
+def tables_of(run: Run) -> dict[str, pd.DataFrame]:
+    """Every table of a run by its name: data/log.csv is log."""
+    return {file.stem: read_table(run.file(f"data/{file.name}")) for file in sorted((run.path / "data").glob("*.csv"))}
+
+
+def arrays_of(run: Run) -> dict[str, dict[str, np.ndarray]]:
+    """Every set of arrays of a run by its name."""
+    return {file.stem: read_arrays(run.file(f"data/{file.name}")) for file in sorted((run.path / "data").glob("*.npz"))}
+
+
+def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of a table's columns, as far as the run says them."""
+    outputs = [each for each in run.manifest.outputs if each.path == f"data/{table}.csv"]
+    return {column.name: (column.unit, column.meaning) for each in outputs for column in each.columns}
+
+
+def export_run(run: Run, to: str, file: Path | None) -> Path:
+    """Write a run's data as `to` (mat, mcap); where they were written.
+
+    Raises UserError for a run without data, a file in the way, or a package that is not installed.
+    """
+    ending, write = FORMATS[to]
+    path = file or Path(f"{run.id}{ending}")
+    if path.exists():
+        raise UserError("a file is in the way", str(path), "remove it, or name another with --file")
+    if not (run.path / "data").is_dir():
+        raise UserError("the run has no data", str(run.path), "name another")
+    write(run, path)
+    return path
+
+
+def _mat(run: Run, path: Path) -> None:
+    """A struct for each table and each set of arrays, `units` and `meaning` of the columns, `metrics`, `run`."""
+    from scipy.io import savemat
+
+    data = {name: {str(key): _column(each) for key, each in table.items()} for name, table in tables_of(run).items()}
+    data |= arrays_of(run)
+    told = {name: columns_of(run, name) for name in data}
+    whole = {
+        "data": data,
+        "units": {name: {key: unit for key, (unit, _) in own.items()} for name, own in told.items() if own},
+        "meaning": {name: {key: meaning for key, (_, meaning) in own.items()} for name, own in told.items() if own},
+        "metrics": {name: _number(each["value"]) for name, each in run.metrics.items()},
+        "run": about(run),
+    }
+    with replacing(path, FILE) as temporary:
+        savemat(
+            str(temporary), _named(whole), appendmat=False, long_field_names=True, oned_as="column", do_compression=True
+        )
+
+
+def _column(values: Any) -> np.ndarray:
+    """Numbers as they are, words as cells."""
+    array: np.ndarray = values.to_numpy()
+    return array if array.dtype.kind in "fiub" else np.array(values.fillna("").astype(str), object)
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _named(content: Any) -> Any:
+    """Names that MATLAB has: letters, digits and underscores, 63 at most; of two alike the second ends in _2."""
+    if not isinstance(content, Mapping):
+        return content
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        word = re.sub(r"\W", "_", str(key))
+        base = name = (word if word[:1].isalpha() else f"x{word}")[:60]
+        number = 1
+        while name in found:
+            name = f"{base}_{(number := number + 1)}"
+        found[name] = _named(value)
+    return found
+
+
+def about(run: Run) -> dict[str, str]:
+    """Which run it was."""
+    manifest = run.manifest
+    known = {"id": run.id, "kind": run.kind, "seed": str(manifest.seed), "version": manifest.code.version}
+    return known | {"result_sha256": run.result_hash, "started": manifest.timing.started}
+
+
+def _mcap(run: Run, path: Path) -> None:
+    try:
+        from wristctl.commands.export.mcap_log import write_mcap
+    except ImportError:
+        raise UserError("MCAP needs the package mcap, which is not installed", "--to mcap", INSTALL) from None
+    tables = {name: (table, columns_of(run, name)) for name, table in tables_of(run).items()}
+    metrics = {name: json.dumps(each) for name, each in run.metrics.items()}
+    with replacing(path, FILE) as temporary:
+        write_mcap(run, tables, {"run": about(run), "metrics": metrics}, temporary)
+
+
+FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
+    "mat": (".mat", _mat),
+    "mcap": (".mcap", _mcap),
+}
+"""How each format's files end, and what writes them."""

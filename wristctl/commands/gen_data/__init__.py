@@ -1,0 +1,1 @@
+"""`gen-data`: samples of tip positions and bending angles."""

@@ -1,0 +1,188 @@
+"""Samples of tip positions and bending angles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wristctl.commands.inputs import EarlierRun, Given, Inputs
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import Argument, Call, Setting, UserError
+from wristctl.records import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.learning.dataset import Samples
+    from wristctl.learning.measured_samples import RecordedCourse
+
+
+READABLE = 200_000
+"""Samples beyond which there is no samples.csv, which nobody would read, and the figure shows some of them."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Generated(StudyResult):
+    """Samples of tip positions [m] and bending angles [rad]."""
+
+    kind = "gen-data"
+
+    samples: Samples
+
+    def frame(self) -> pd.DataFrame:
+        """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
+        from wristctl.commands.train.tables import samples_table
+
+        return samples_table(self.samples)
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """What a run would draw."""
+    settings, wrist = study.gen_data, study.wrist
+    for name, given in (("run", "run" in inputs), ("csv", bool(settings.files))):
+        if given and settings.source != name:
+            fix, what = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
+            raise UserError(f"{what} given, but source is {settings.source}", "gen-data.source", fix)
+    if settings.source in ("run", "csv"):
+        courses, run = _courses(study, inputs), inputs.runs().get("run")
+        whose = (
+            run.id if run else f"a {inputs['run'].kind} result" if "run" in inputs else _counted(settings.files, "file")
+        )
+        count = sum(len(course.theta) for course in courses)
+        return f"at most {settings.samples} of {count} samples of {whose}, {_counted(courses, 'recording')}"
+    begin = f"{settings.samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
+    if settings.source == "plant":
+        tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))
+        low, high = (100.0 * ratio for ratio in settings.payload)
+        return begin + f"{settings.segments} segments, tilted by {tilts} deg, payload {low:g} to {high:g} %"
+    low, high = (1e3 * ratio * wrist.length for ratio in settings.stretch)
+    return begin + f"arc length {low:g} to {high:g} mm"
+
+
+def gen_data(session: Session) -> Generated:
+    """Sample tip positions and bending angles: constant curvature, equilibria under load, or earlier runs."""
+    import numpy as np
+
+    from wristctl.commands.gen_data.figures import workspace
+    from wristctl.commands.train.figures import coverage
+    from wristctl.commands.train.tables import MEANING, UNITS, samples_table
+    from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE
+    from wristctl.learning.evaluation import angle_errors
+    from wristctl.wrist.kinematics import exact_angle
+
+    findings = session.findings
+    entropy = findings.stream("samples")
+    with session.progress("drawing", session.study.gen_data.samples, "samples") as done:
+        samples = drawn(session.study, entropy, session.inputs, done)
+        done(len(samples.theta))
+    table = samples_table(samples)
+    exact = angle_errors(exact_angle(samples.tip), samples.theta)
+
+    count = len(samples.theta)
+    with session.progress("writing"):
+        if count <= READABLE:
+            findings.table("data/samples.csv", table, UNITS, MEANING)
+        findings.arrays("data/samples.npz", samples.arrays())
+        findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
+        findings.figure("workspace", workspace, session.study.wrist)
+
+    findings.metric("samples", count, meaning="number of samples")
+    for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
+        share = float(np.mean(samples.held_out == code))
+        findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
+    rows: list[tuple[str, float, float]] = []
+    known = {"theta": (180.0 / np.pi, "deg"), "pose": (180.0 / np.pi, "deg"), "hand_mass": (1.0, "kg")}
+    for name in ("theta", "arc_length", "x", "y", *samples.names):
+        scale, unit = known.get(name, (1e3, "mm"))
+        low, high = scale * float(table[name].min()), scale * float(table[name].max())
+        rows.append((f"{name} [{unit}]", low, high))
+        findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")
+        findings.metric(f"{name}_max_{unit}", high, unit=unit, n=count, meaning=f"greatest: {MEANING[name]}")
+    for name in ("rmse_deg", "max_error_deg"):
+        meaning = "error of the exact inverse 2 atan2(y, x) on these samples"
+        findings.metric(f"exact_inverse_{name}", getattr(exact, name), "deg", "lower", count, meaning=meaning)
+    rows.append(("error of the exact inverse [deg]", 0.0, exact.max_error_deg))
+    findings.headline(
+        "samples", "theta_min_deg", "theta_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
+    )
+    tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
+    return Generated(session.study, findings, tables, samples)
+
+
+def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, done: Callable[[int], object] = int) -> Samples:
+    """The samples that the study's gen-data section asks for; `done` is told how many there are by now."""
+    import numpy as np
+
+    from wristctl.learning.dataset import draw_samples
+
+    settings, rng = study.gen_data, np.random.default_rng(entropy)
+    if settings.source in ("run", "csv"):
+        from wristctl.learning.measured_samples import samples_of_courses
+
+        return samples_of_courses(_courses(study, inputs), settings.samples, rng)
+    if settings.source == "plant":
+        from wristctl.learning.dataset import draw_equilibria
+
+        return draw_equilibria(settings, study.wrist, rng, done)
+    return draw_samples(settings, study.wrist, rng)
+
+
+def samples_of(given: Run | Generated) -> Samples:
+    """The samples of a gen-data run or result."""
+    from wristctl.learning.dataset import Samples
+
+    return Samples.from_arrays(given.array("samples")) if isinstance(given, Run) else given.samples
+
+
+def _counted(what: Sequence[object], name: str) -> str:
+    return f"{len(what)} {name}{'s' * (len(what) != 1)}"
+
+
+def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
+    if study.gen_data.source == "csv":
+        from wristctl.learning.measured_samples import read_courses
+
+        if not study.gen_data.files:
+            raise UserError("source csv needs files", "gen-data.files", Setting("files=[recording.csv]", "gen-data"))
+        return [course for file in study.gen_data.files for course in read_courses(Path(file))]
+    found = inputs.read("run", _courses_of)
+    if found is None:
+        fix = Call("gen-data", arguments=(Argument("run", "latest:simulate"),))
+        raise UserError("source run needs a run", "gen-data.run", fix)
+    return found
+
+
+def _courses_of(given: Given) -> list[RecordedCourse]:
+    """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
+    from wristctl.learning.measured_samples import NEEDED, courses_in
+
+    found = [course for name, columns in _kept(given) for course in courses_in(columns, name)]
+    if not found:
+        tips = "name a simulate, compare, track or hw-run run; one made before tips were logged has to be repeated"
+        raise UserError(
+            f"no course in that {given.kind} run: it has no data with {', '.join(NEEDED)}",
+            str(given.path) if isinstance(given, Run) else "run",
+            tips,
+        )
+    return found
+
+
+def _kept(given: Given) -> list[tuple[str, Mapping[str, Any]]]:
+    """Every table and every set of arrays of a run by its name, or what a result would have written of that."""
+    if isinstance(given, Run):
+        from wristctl.records.formats import read_arrays, read_table
+
+        folder = given.path / "data"
+        frames = [(file.stem, read_table(file)) for file in sorted(folder.glob("*.csv"))]
+        tables = [(at, {str(name): column.to_numpy() for name, column in frame.items()}) for at, frame in frames]
+        return [*tables, *((file.stem, read_arrays(file)) for file in sorted(folder.glob("*.npz")))]
+    return list(given.courses().items())
+
+
+GEN_DATA = Procedure("gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),))

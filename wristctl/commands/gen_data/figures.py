@@ -1,0 +1,62 @@
+"""Where the wrist's tip can rest: from one end of the tendons' tension to the other, by statics and not by geometry."""
+
+from contextlib import suppress
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.plotting.style import BLACK, BLUE, GREY, figure, legend, title
+from wristctl.wrist.shape import arcs_backbone
+from wristctl.wrist.statics import equilibrium
+
+SEGMENTS = 4
+_SOFTER, _STIFFER = 0.7, 1.3
+_TENSIONS, _DRAWN = 16, 5
+
+
+def rest_poses(wrist: WristParameters, tension: Array) -> Array:
+    """Segment angles (k, n) [rad] at rest where one side pulls with so much [N per tendon] (k,); nan where it buckles.
+
+    Positive is the + side's tension, negative the - side's; the other side keeps its pretension.
+    """
+    poses = np.full((len(tension), SEGMENTS), np.nan)
+    for at, pull in enumerate(tension.tolist()):
+        with suppress(UserError):
+            poses[at] = equilibrium(wrist, SEGMENTS, tuple(max(each, wrist.pretension) for each in (pull, -pull)))
+    return poses
+
+
+def workspace(wrist: WristParameters) -> Figure:
+    """The wrist at rest under tensions up to its limit, its tip's path, and angle over tension; stiffer and softer."""
+    up = np.linspace(wrist.pretension, wrist.tension_limit, _TENSIONS)
+    tension = np.concatenate([-up[::-1], up])
+    poses = rest_poses(wrist, tension)
+    made, ((shape, curve),) = figure(1, 2, width=8.5, height=3.8)
+    colours = ScalarMappable(Normalize(-wrist.tension_limit, wrist.tension_limit), mpl.colormaps["viridis"])
+    tips = []
+    for number, pose in enumerate(poses):
+        line, _ = arcs_backbone(wrist, pose, np.linspace(0.0, wrist.length, 60))
+        tips.append(line[-1])
+        if number % (_TENSIONS // _DRAWN) == 0 or number == len(poses) - 1:
+            shape.plot(1e3 * line.imag, 1e3 * line.real, color=colours.to_rgba(tension[number]), linewidth=1.4)
+    tip = 1e3 * np.array(tips)
+    shape.plot(tip.imag, tip.real, color=BLACK, linewidth=2.0)
+    shape.set(xlabel="y [mm]", ylabel="x [mm]", aspect="equal")
+    reach = np.degrees(poses.sum(axis=1))
+    known, limit = reach[np.isfinite(reach)], f"within {wrist.tension_limit:g} N"
+    ends = f"from {known.min():.3g} to {known.max():.3g} deg" if len(known) else "nowhere: it buckles"
+    title(shape, f"the tip rests {ends} {limit}")
+    for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
+        other = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
+        angle = np.degrees(rest_poses(other, tension).sum(axis=1))
+        label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
+        curve.plot(tension, angle, style, color=BLUE if factor == 1.0 else GREY, label=label)
+    curve.set(xlabel="tension of the pulling side's tendons [N]", ylabel="bending angle at rest [deg]")
+    legend(curve, loc="best")
+    return made

@@ -1,0 +1,136 @@
+"""Tables and figures of hw-run: beside the paper's experiment and a simulation of the same trials."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wristctl.commands.hw_run import figures as trial_figures
+from wristctl.commands.printed_table import Table
+from wristctl.commands.results import Findings
+from wristctl.commands.session import Session
+from wristctl.comparison.paper import EXPERIMENT
+from wristctl.control.table import Gains
+from wristctl.simulation.repetitions import Simulation
+from wristctl.trial.trials import Trial, twin
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS
+from wristctl.wrist.kinematics import Inverse
+
+Twins = dict[int, Simulation]
+"""The simulation of each trial, by its number."""
+
+_MEANS = ("rmse", "steady_state", "settling", "recovery", "true_rmse", "true_steady_state")
+_COLUMNS = (
+    "", "trials", "RMSE [rad]", "steady state [rad]", "settling [s]", "recovery [s]", "true RMSE [rad]",
+    "true steady state [rad]", "simulated RMSE [rad]", "simulated steady state [rad]",
+)  # fmt: skip
+_BY_TRIAL = {
+    "trial": "trial", "direction": "direction", "push": "push [N]", "label": "controller", "rmse": "RMSE [rad]",
+    "steady_state": "steady state [rad]", "settling": "settling [s]", "recovery": "recovery [s]",
+    "overshoot": "overshoot [%]", "peak_tension": "peak tension [N]", "outcome": "outcome",
+}  # fmt: skip
+
+
+def trial_tables(
+    session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None
+) -> tuple[list[Table], Twins]:
+    """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
+    trials = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
+    twins = _twins(session, trials, network, tuned)
+    theirs = bool((trials["controller"] == "smc").any())
+    rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]
+    by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
+    with session.progress("drawing"):
+        _draw(session, trials, twins)
+    title = "Means over the trials" + ", beside the paper's experiment with the same law" * theirs
+    return [Table(title, _COLUMNS, rows), by_trial], twins
+
+
+def _twins(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
+    """Each trial in simulation; repetitions share one."""
+    names = [row.label for row in session.study.hw_run.rows]
+    done: dict[tuple[Any, ...], Simulation] = {}
+    found = {}
+    with session.progress("simulating the same trials"):
+        for each in trials.to_dict("records"):
+            key = each["direction"], each["push"], each["label"]
+            if key not in done:
+                trial = Trial(each["trial"], each["direction"], 0, each["push"], names.index(each["label"]))
+                done[key] = twin(session.study, trial, network, tuned)
+            found[each["trial"]] = done[key]
+    return found
+
+
+def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tuple[Any, ...]]:
+    """A row for each controller with and without a push; a metric for each number."""
+    labels = [row.label for row in session.study.hw_run.rows]
+    for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
+        group = trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)]
+        if group.empty:
+            continue
+        means = {name: float(group[name].mean(skipna=False)) for name in _MEANS}
+        simulated = [
+            float(np.mean([twins[number].metrics[name] for number in group["trial"]]))
+            for name in ("rmse", "steady_state")
+        ]
+        for name, unit in zip(_MEANS, ("rad", "rad", "s", "s", "rad", "rad"), strict=True):
+            if name == "recovery" and not pushed:
+                continue
+            whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
+            full = "_".join([*["pushed"] * pushed, name, *whose])
+            meaning = f"mean over trials{' with a push' * pushed}, {label}"
+            session.findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
+        yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)
+
+
+def _papers() -> Iterator[tuple[Any, ...]]:
+    """What the paper measured with its own law."""
+    for name, printed in EXPERIMENT.items():
+        count = 4 if name == "four directions" else 1
+        yield (f"paper: {name}", count, printed.rmse, printed.steady_state, printed.settling, *[None] * 5)
+
+
+def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
+    findings, settings = session.findings, session.study.hw_run
+    push, log = settings.push, _logged(findings, "log")
+    courses = []
+    for each in trials.to_dict("records"):
+        course, simulated = log[log["trial"] == each["trial"]], twins[each["trial"]].trajectory
+        courses.append(
+            trial_figures.LoggedTrial(
+                direction=each["direction"],
+                label=each["label"],
+                repetition=each["repetition"],
+                **{name: course[name].to_numpy(float) for name in ("time", "theta", "theta_ref", "theta_desired")},
+                tension=_sides(course, each["direction"]),
+                simulated=(simulated.time, simulated.theta, simulated.error),
+                push=(push.start, push.start + push.duration) if each["push"] else None,
+            )
+        )
+    for prefix, some in (
+        ("", [course for course in courses if course.push is None]),
+        ("pushed-", [course for course in courses if course.push is not None]),
+    ):
+        if some:
+            findings.figure(f"{prefix}directions", trial_figures.desired_and_obtained, some)
+            findings.figure(f"{prefix}errors", trial_figures.errors, some)
+            row = settings.rows[0]
+            first = [each for each in some if each.label == row.label and each.repetition == 0]
+            findings.figure(f"{prefix}tensions", trial_figures.tensions, first, row.label)
+    if settings.real_time or settings.port is not None:
+        both = (log, _logged(findings, "between"))
+        late = np.concatenate([table["late"].to_numpy(float) for table in both])
+        findings.figure("lateness", trial_figures.lateness, late, settings.control_period)
+
+
+def _logged(findings: Findings, name: str) -> pd.DataFrame:
+    assert findings.run is not None
+    return pd.read_csv(findings.run.file(f"data/{name}.csv"))
+
+
+def _sides(course: pd.DataFrame, direction: str) -> Any:
+    """Commanded tension (T, 2) of one tendon of the direction's side and of one of the other."""
+    pulling = DIRECTIONS[direction].tendons
+    holding = next(tendon for tendon in ACTIVE if tendon not in pulling)
+    return course[[f"tension_{pulling[0]}", f"tension_{holding}"]].to_numpy(float)

@@ -1,0 +1,221 @@
+"""The trials of hw-run with their log, a row for each by the log alone, and how they went."""
+
+import logging
+from functools import partial
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from wristctl.commands.printed_table import Table
+from wristctl.commands.rig_description import coming_first
+from wristctl.commands.session import Session
+from wristctl.config.choices import PLANTS
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import Gains
+from wristctl.errors import fix_of
+from wristctl.records import LiveRun
+from wristctl.simulation.metrics import METRICS
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.experiment import Experiment
+from wristctl.trial.log import TrialLog
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.testbeds import open_testbed
+from wristctl.trial.trials import JUDGED, Trial, evaluated, trials_of
+from wristctl.vision.camera import Frame
+from wristctl.vision.marker import Sighting
+from wristctl.vision.recordings import COLUMNS as RAW
+from wristctl.vision.recordings import AnnotatedVideo, RawVideo
+from wristctl.vision.view import View
+from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.kinematics import Inverse
+
+log = logging.getLogger(__name__)
+
+Films = list[AnnotatedVideo | RawVideo]
+
+_OF_TRIALS: dict[str, tuple[str, str]] = {
+    "trial": ("", "number, from 0, in the order done"),
+    "direction": ("", "of bending"),
+    "repetition": ("", "number, from 0"),
+    "push": ("N", "largest force against the bend"),
+    "controller": ("", "name in the table of controllers"),
+    "gains": ("", "preset, tuned or own"),
+    "outcome": ("", "ok, or why it ended early"),
+    "odd": ("", "what was odd all the same: beyond what a sound rig shows, within the limits"),
+    **{name: (metric.unit, metric.formula) for name, metric in METRICS.items()},
+    **{f"true_{name}": (METRICS[name].unit, f"{METRICS[name].formula}; of the true angle") for name in JUDGED},
+    "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the move"),
+    "true_recovery": ("s", "the same by the emulated wrist's true angle, from the true end of the push"),
+    "push_torque": ("N m", "largest load torque of the push, as estimated"),
+}
+
+
+def perform_trials(
+    session: Session, bench: WristParameters, network: Inverse | None, tuned: Gains | None
+) -> pd.DataFrame:
+    """Do all trials, logged as they go; a row for each. What stops them is raised once everything is kept.
+
+    The controller knows the session's wrist; `bench` is the one that an emulated bench weakens. What moves is logged on
+    the disk as it does: there must be a run directory.
+    """
+    settings, run, study = session.study.hw_run, session.findings.run, session.study
+    assert run is not None
+    cv2.setNumThreads(1)
+    trials = trials_of(settings, np.random.default_rng(session.findings.stream("order")))
+    calibration = session.inputs.read("calibration", WristCalibration.load)
+    plant = PLANTS[settings.bench.plant.model]
+    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
+    monotonic = settings.port is not None or settings.real_time
+    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period, monotonic)
+    try:
+        experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
+        films = _films(run, settings)
+    except BaseException:
+        trial_log.close()
+        raise
+    stopped: BaseException | None = None
+    try:
+        with coming_first(session, settings):
+            _perform(session, bench, experiment, films, trials)
+    except BaseException as error:
+        stopped = error
+    try:
+        trial_log.close()
+    except OSError as error:
+        stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", fix_of(error))
+    for film in films:
+        film.close()
+    if films:
+        run.columns("data/raw.csv", RAW)
+    for name, stream in trial_log.streams.items():
+        run.columns(f"data/{name}.csv", stream.columns)
+    table = _evaluate(run, settings, experiment, trials)
+    _summarise(session, experiment, trial_log)
+    if stopped is not None:
+        raise stopped
+    return table
+
+
+def _perform(
+    session: Session, bench: WristParameters, experiment: Experiment, films: Films, trials: list[Trial]
+) -> None:
+    study, settings = session.study, session.study.hw_run
+    with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
+        view = View.of(session.inputs.runs().get("optics"))
+        keep = partial(_add, films) if films else None
+        testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
+    with session.operator.watch(trials, session) as shown:
+        experiment.run(testbed, shown)
+
+
+def _films(run: LiveRun, settings: HwRunSettings) -> Films:
+    if not settings.video:
+        return []
+    rate = settings.sensor.frame_rate
+    return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
+
+
+def _add(films: Films, frame: Frame, seen: Sighting) -> None:
+    for film in films:
+        film.add(frame, seen)
+
+
+def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
+    """trials.csv: a row for each trial that began, by the log alone."""
+    courses = pd.read_csv(run.file("data/log.csv"))
+    file = run.path / "data/truth.csv"
+    truths = pd.read_csv(file) if file.is_file() else None
+    rows = []
+    for trial in trials:
+        if trial.number not in experiment.outcomes:
+            continue
+        row = settings.rows[trial.row]
+        course = courses[courses["trial"] == trial.number]
+        truth = None if truths is None else truths[truths["trial"] == trial.number]
+        followed = experiment.motions[trial.direction]
+        rows.append(
+            {
+                "trial": trial.number,
+                "direction": trial.direction,
+                "repetition": trial.repetition,
+                "push": trial.push,
+                "controller": row.controller,
+                "gains": row.gains_name,
+                "outcome": experiment.outcomes[trial.number],
+                "odd": experiment.odd.get(trial.number, ""),
+                **evaluated(trial, course, followed, settings.push, settings.control_period, truth),
+            }
+        )
+    table = pd.DataFrame(rows, columns=list(_OF_TRIALS))
+    units, meaning = ({name: column[i] for name, column in _OF_TRIALS.items()} for i in range(2))
+    run.table("data/trials.csv", table, units=units, meaning=meaning)
+    return table
+
+
+def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) -> None:
+    """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
+    findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
+    findings.metric("ticks", len(timing.late), meaning="control ticks")
+    meaning = "ticks skipped because one before took too long"
+    findings.metric("overruns", timing.overruns, better="lower", meaning=meaning)
+    meaning = "from due to begun, of a tick"
+    for name, share in (("late_p50", 0.5), ("late_p99", 0.99), ("late_max", 1.0)):
+        findings.metric(name, timing.jitter(share), "s", "lower", n=len(timing.late), meaning=meaning)
+    if timing.late and (settings.real_time or settings.port is not None):
+        session.operator.tell(timing.said())
+        findings.summary(timing.said())
+    if timing.late:
+        findings.summary(timing.camera.summary())
+    _tell_oddities(session, experiment)
+    if experiment.zero is not None:
+        findings.plain("data/zero.json", experiment.zero.plain())
+    if experiment.stop is None:
+        return
+    stop = experiment.stop
+    findings.plain("data/stop.json", stop.plain())
+    sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
+    log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
+    text = _last_second(trial_log).text()
+    findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
+    log.warning("%s\n%s", stop.reason, text)
+
+
+def _tell_oddities(session: Session, experiment: Experiment) -> None:
+    """How near trials came to the limits of what a wrist may do otherwise than its motors, and what was odd."""
+    findings, limits, greatest = session.findings, session.study.hw_run.safety, experiment.greatest
+    known = {
+        "apart": (np.degrees(greatest.apart), limits.follow_deg, "deg", "marker from where the spools should have it"),
+        "jump": (np.degrees(greatest.jump), limits.jump_deg, "deg", "of the marker, off that, between two frames"),
+        "load": (greatest.load, limits.load, "N m", "load torque as estimated"),
+        "across": (np.degrees(greatest.across), limits.across_deg, "deg", "bend across the plane"),
+    }
+    for name, (value, limit, unit, meaning) in known.items():
+        findings.metric(f"greatest_{name}", float(value), unit, "lower", meaning=f"{meaning}; limit {limit:g} {unit}")
+    parts = ", ".join(f"{name} {value:.2g} of {limit:g} {unit}" for name, (value, limit, unit, _) in known.items())
+    findings.summary(f"Greatest of what the model of the rig does not explain, and the limit: {parts}.")
+    for number, words in experiment.odd.items():
+        if words and experiment.outcomes.get(number) == "ok":
+            text = f"Trial {number} went through, but was odd: {words}"
+            log.warning(text)
+            findings.summary(text)
+
+
+def _last_second(trial_log: TrialLog) -> Table:
+    """The last second of ticks, every tenth of it."""
+    rows = list(trial_log.last)
+    shown = rows[:: -max(1, len(rows) // 10)][::-1]
+    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in ACTIVE), "state")
+    cells = [
+        (
+            round(row["time"], 3),
+            round(float(np.degrees(row["theta"])), 2),
+            round(float(np.degrees(row["theta_ref"])), 2),
+            str(row["verdict"]) or "-",
+            *(round(row[f"tension_{k}"], 2) for k in ACTIVE),
+            row["state"],
+        )
+        for row in shown
+    ]
+    return Table("The last second", columns, cells)

@@ -1,0 +1,1 @@
+"""`hysteresis`: loops of a wrist whose tendons have friction."""

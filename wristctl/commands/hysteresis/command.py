@@ -1,0 +1,356 @@
+"""Hysteresis of the wrist: loops of tension and angle, the dead band, and friction fitted to a measured loop."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import Table, number
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
+    from wristctl.identification.loop_problem import LoopProblem
+    from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
+    from wristctl.simulation.strokes import FrictionCase
+
+
+log = logging.getLogger(__name__)
+
+FITTED = {
+    "friction": ("", "coefficient of the tendons' friction, mu"),
+    "sheath": ("rad", "angle by which a tendon is wrapped before it reaches the wrist"),
+    "presliding": ("m", "path in which friction turns round"),
+}
+"""What is found: unit and meaning."""
+_COARSE = 0.25
+"""Share of the presliding by which a loop may leap between two samples at its turns."""
+
+_STEP_ERROR = 0.1
+"""Share of the noise by which what is expected may change with the integration step."""
+_TREMBLE = 0.01
+"""Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble."""
+
+
+def problem_of(study: Study) -> LoopProblem:
+    """The study's measured loop. Raises UserError for a file that is none."""
+    from wristctl.identification.loop_problem import LoopProblem, read_loop
+
+    assert study.hysteresis.measured is not None
+    return LoopProblem(read_loop(Path(study.hysteresis.measured), study.wrist), study.wrist, study.hysteresis)
+
+
+def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
+    """The fit, and the table that says what came out of it."""
+    from wristctl.commands.hysteresis.figures import measured
+    from wristctl.identification.friction_fit import fit_friction
+    from wristctl.identification.intervals import ALIKE
+    from wristctl.records.files import sha256_of
+
+    findings, source = session.findings, Path(str(session.study.hysteresis.measured))
+    with session.progress("fitting the measured loop"):
+        found = fit_friction(problem_of(session.study))
+    if found.autocorrelation > ALIKE:
+        log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
+    if found.step_error > _STEP_ERROR:
+        told = "the fit depends on the integration step: half of it changes the model by %.2g of the noise - fix: %s"
+        log.warning(told, found.step_error, f"hysteresis.step: {0.5 * session.study.hysteresis.step:g}")
+    if found.leap > _COARSE * found.presliding.value:
+        leap, path = 1e6 * found.leap, 1e6 * found.presliding.value
+        fix = "sample more often, or turn more softly"
+        told = "the loop leaps %.2g um between two samples at its turns, and presliding is some %.2g um: %s - fix: %s"
+        log.warning(told, leap, path, "values may be off by more than their intervals", fix)
+    loop = found.problem.loop
+    if loop.winch and loop.tremble > _TREMBLE * found.exponent.value * float(loop.drive.mean()):
+        fix = "measure the spools' positions too, or hang weights"
+        told = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
+        log.warning(told, loop.tremble, fix)
+    findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
+    _write_fit(findings, found)
+    findings.figure("measured", measured, found)
+    return found, _table(findings, found)
+
+
+def _write_fit(findings: Findings, found: FrictionFit) -> None:
+    columns = {"time": found.problem.loop.time[found.problem.first :]}
+    names = ("theta", "tension_plus", "tension_minus")
+    for name, seen, residual in zip(names, found.problem.measured, found.residuals, strict=False):
+        columns |= {name: seen, f"{name}_model": seen - residual}
+    units = {name: "s" if name == "time" else "rad" if name.startswith("theta") else "N" for name in columns}
+    findings.table("data/measured.csv", columns, units)
+
+
+def _table(findings: Findings, found: FrictionFit) -> Table:
+    rows: list[tuple[str, float, float | None, float | None, str, str]] = []
+    for name, (unit, meaning) in FITTED.items():
+        value, low, high = getattr(found, name)
+        ended = math.isfinite(high)
+        rows.append((name, value, low, high if ended else None, unit, meaning))
+        findings.metric(name, value if ended else None, unit, "", found.count, (low, high) if ended else None, meaning)
+    bend, exponent = found.told_best
+    meaning = f"mu (bend + sheath) at a bend of {math.degrees(bend):.3g} deg, where it is told best"
+    findings.metric("exponent", exponent.value, "", "", found.count, (exponent.low, exponent.high), meaning)
+    rows.append(("exponent", *exponent, "", meaning))
+    findings.metric("correlation", found.correlation, n=found.count, meaning=_CORRELATION)
+    rows.append(("correlation", found.correlation, None, None, "", _CORRELATION))
+    for name, unit, noise in zip(("angle", "+ tension", "- tension"), ("rad", "N", "N"), found.noise, strict=False):
+        rows.append((f"{name}, left over", float(noise), None, None, unit, "standard deviation of measured less model"))
+    heads = ("", "value", "95 % low", "95 % high", "unit", "meaning")
+    return Table(_fit_heading(found), heads, rows)
+
+
+_CORRELATION = "of mu with bend + sheath, as logarithms, at the mean bend"
+
+
+def _fit_heading(found: FrictionFit) -> str:
+    """What came out, in words."""
+    friction, sheath, path = found.friction, found.sheath, found.presliding
+    presliding = f"presliding {_between(path, 1e6)} um" if math.isfinite(path.high) else "nothing of presliding"
+    if friction.low > 0.0 and math.isfinite(sheath.high):
+        apart = f"mu {_between(friction)}, sheath {_between(sheath)} rad"
+        return f"{found.problem.loop.name} tells {apart} and {presliding}"
+    bend, exponent = found.told_best
+    return (
+        f"{found.problem.loop.name} tells mu (bend + sheath), {_between(exponent)} at a bend of "
+        f"{math.degrees(bend):.3g} deg, and {presliding},\nbut not mu and the sheath apart: mu may be up to "
+        f"{number(friction.high)}, the sheath {number(sheath.low)} rad or more; a wider range of bend would tell"
+    )
+
+
+def _between(found: FrictionEstimate, scale: float = 1.0) -> str:
+    value, low, high = (number(scale * each) for each in found)
+    return f"{value} ({low} to {high})"
+
+
+_LOOPS = {
+    "friction": ("", "coefficient of the tendons' friction"),
+    "sheath": ("rad", "angle by which a tendon is wrapped before it reaches the wrist"),
+    "presliding": ("m", "path in which friction turns round"),
+    "frequency": ("1/s", "cycles per second"),
+    "low": ("rad", "angle without friction at one end"),
+    "high": ("rad", "and at the other"),
+    "width": ("rad", "by how much more it is bent on its way back, in the middle of the range"),
+    "exact_width": ("rad", "dead band there, by the roots of the statics"),
+    "friction_work": ("J", "what friction took in a cycle: pull at the spool less pull at the wrist, along the path"),
+    "raw_work": ("J", "area of the loop of pulls at the spools along the path"),
+    "damped_work": ("J", "what the wrist's damping took in a cycle"),
+    "step": ("s", "integration step that it took"),
+    "drift": ("", "largest relative change of width and works with the step, at the shortest tried; 0: converged"),
+}
+_COURSES = {
+    "loop": ("", "row of loops.csv, from 0"),
+    "time": ("s", "since the range's high end"),
+    "unhindered": ("rad", "angle without friction on these spools"),
+    "theta": ("rad", "angle"),
+    "given_plus": ("m", "what the + side has reeled in"),
+    "given_minus": ("m", "what the - side has"),
+    "spool_plus": ("N", "pull of both tendons of the + side at the spool"),
+    "spool_minus": ("N", "of the - side"),
+    "wrist_plus": ("N", "pull of the + side at the wrist"),
+    "wrist_minus": ("N", "of the - side"),
+    "z_plus": ("", "state of the + side's bristle"),
+    "z_minus": ("", "of the - side's"),
+}
+_BANDS = {
+    "friction": _LOOPS["friction"],
+    "sheath": _LOOPS["sheath"],
+    "presliding": _LOOPS["presliding"],
+    "unhindered": ("rad", "angle without friction"),
+    "exact_below": ("rad", "rest from below by the statics"),
+    "exact_above": ("rad", "rest from above by the statics"),
+    "below": ("rad", "rest after a ramp from below"),
+    "above": ("rad", "rest after a ramp from above"),
+    "slid": ("", "whether tendons slid far enough on both ramps to bend their bristles fully"),
+    "step": _LOOPS["step"],
+    "drift": ("", "largest change of a rest with the step, over the width, at the shortest tried; 0: converged"),
+}
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Hysteresis(StudyResult):
+    """Loops of a wrist on its tendons, the dead band, and the fit of a measured loop where there was one."""
+
+    kind = "hysteresis"
+
+    loops: list[HysteresisLoop]
+    dead_bands: list[DeadBand]
+    fit: FrictionFit | None
+
+    @property
+    def marks(self) -> list[str]:
+        """How many loops and dead bands still change with the integration step."""
+        open_ = _still_change(self.loops, self.dead_bands)
+        return [f"not converged: {open_} of {len(self.loops) + len(self.dead_bands)}"] * bool(open_)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per loop: friction, speed, range, the dead band in its middle, and works; SI units."""
+        import pandas as pd
+
+        cases = [each.case.tendons._asdict() | each.case._asdict() for each in self.loops]
+        own = [name for name in _LOOPS if name not in (cases[0] if cases else ())]
+        found = [{name: getattr(each, name) for name in own} for each in self.loops]
+        rows = [case | values for case, values in zip(cases, found, strict=True)]
+        return pd.DataFrame(rows, columns=list(_LOOPS))
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """See that the wrist can be driven so, and that a measured loop can be read."""
+    from wristctl.simulation.hysteresis import loop_cases
+    from wristctl.simulation.strokes import strokes
+
+    settings = study.hysteresis
+    strokes(study.wrist, settings)
+    count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / each for each in settings.frequencies)
+    told = f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
+    if settings.measured is None:
+        return told
+    problem = problem_of(study)
+    return f"{told}; {', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
+
+
+def hysteresis(session: Session) -> Hysteresis:
+    """Drive the wrist through hysteresis loops, and fit tendon friction to a measured one.
+
+    Its spools go to and fro at several speeds, over several ranges, for several frictions. Of a measured loop (a CSV
+    file) coefficient, sheath and presliding are found, with 95 % intervals.
+    """
+    from wristctl.commands.hysteresis import figures
+    from wristctl.simulation.hysteresis import dead_bands, loops, main_case
+    from wristctl.simulation.strokes import strokes
+
+    findings, settings = session.findings, session.study.hysteresis
+    own = strokes(session.study.wrist, settings)
+    with session.progress("compiling and driving loops", 100, "%") as done:
+        driven = loops(own, lambda share: done(round(100.0 * share)))
+        bands = dead_bands(own)
+    fit, answer = fit_measured(session) if settings.measured is not None else (None, None)
+    shortest = min([each.step for each in driven] + [each.step for each in bands])
+    findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments)
+    open_ = _still_change(driven, bands)
+    findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
+    tables = [*([answer] if answer else []), *_tables(findings, driven, bands, main_case(settings))]
+    result = Hysteresis(session.study, findings, tables, driven, bands, fit)
+    _write(findings, result)
+    with session.progress("drawing"):
+        if bands:
+            findings.figure("dead-band", figures.dead_band, own, bands)
+        findings.figure("loops", figures.loops, own, driven)
+        if len(settings.ranges_deg) > 1:
+            findings.figure("minor-loops", figures.minor_loops, own, driven)
+        findings.figure("work", figures.work, own, driven)
+    return result
+
+
+def _write(findings: Findings, found: Hysteresis) -> None:
+    import numpy as np
+    import pandas as pd
+
+    def units(columns: dict[str, tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
+        return {name: each[0] for name, each in columns.items()}, {name: each[1] for name, each in columns.items()}
+
+    findings.table("data/loops.csv", found.frame(), *units(_LOOPS))
+    courses = [
+        {"loop": np.full(len(each.time), at), "time": each.time, "unhindered": each.unhindered} | each.course._asdict()
+        for at, each in enumerate(found.loops)
+    ]
+    columns = {name: np.concatenate([each[name] for each in courses]) for name in _COURSES}
+    findings.table("data/courses.csv", columns, *units(_COURSES))
+    if found.dead_bands:
+        rows = [
+            {name: getattr(each, name, None) for name in _BANDS} | each.tendons._asdict() for each in found.dead_bands
+        ]
+        findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
+
+
+_NOT_CONVERGED = "loops and dead bands that still change with the integration step"
+_MOST = 60
+"""Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data."""
+
+
+def _tables(
+    findings: Findings, driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase
+) -> list[Table]:
+    """The outer loops, under what they say in words, and the dead bands."""
+    first, many = driven[0].case, len(driven) + len(bands) > _MOST
+    outer = [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
+    fate = ("fate",) * (_still_change(driven, bands) > 0)
+    heads = ("friction", "sheath [rad]", "presliding [um]")
+    loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]",
+                  "step [ms]", *fate)  # fmt: skip
+    rows = [
+        (*_in_um(each.case.tendons), each.case.frequency, math.degrees(each.width), math.degrees(each.exact_width),
+         *(1e3 * part for part in (each.friction_work, each.damped_work, each.raw_work, each.step)),
+         *(_fate(each),) * len(fate))
+        for each in outer
+        if not many or each.case.tendons.presliding == main.presliding
+    ]  # fmt: skip
+    tables = [Table(_told(findings, outer, bands, main), (*heads, *loop_heads), rows)]
+    if bands:
+        held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully", "step [ms]", *fate)
+        rests = [
+            (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid,
+             1e3 * each.step, *(_fate(each),) * len(fate))
+            for each in bands
+            if not many or each.tendons.presliding == main.presliding
+        ]  # fmt: skip
+        tables.append(Table("Where ramps leave the wrist", (*heads, *held), rests))
+    return tables
+
+
+def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[DeadBand], chosen: FrictionCase) -> str:
+    """What was found, in words, of the main one of the frictions; its numbers are the run's metrics."""
+    slow, *faster = sorted((e for e in outer if e.case.tendons == chosen), key=lambda e: e.case.frequency)
+    case = f"mu {chosen.friction:g}, sheath {chosen.sheath:g} rad"
+    swing = f"{math.degrees(slow.case.low):g} to {math.degrees(slow.case.high):g} deg"
+    lines = []
+    if mine := [each for each in bands if each.tendons == chosen]:
+        band = mine[len(mine) // 2]
+        width, exact, at = (math.degrees(each) for each in (band.width, band.exact_width, band.unhindered))
+        lines.append(f"dead band {width:.3g} deg at {at:g} deg (roots of the statics: {exact:.3g} deg)")
+        findings.metric("dead_band", width, "deg", "lower", meaning=f"at {at:g} deg, {case}")
+    lines.append(f"friction takes {1e3 * slow.friction_work:.3g} mJ a cycle of {swing}")
+    findings.metric("friction_work", slow.friction_work, "J", "lower", meaning=f"a cycle of {swing}, {case}")
+    if faster and slow.friction_work > 0.0:
+        change = abs(faster[0].friction_work / slow.friction_work - 1.0)
+        speeds = f"{slow.case.frequency:g} and {faster[0].case.frequency:g} Hz"
+        lines[-1] += f", the same within {100.0 * change:.2g} % at {speeds}"
+        findings.metric("friction_work_change", change, "", "lower", meaning=f"between {speeds}, {case}")
+    damped = ", ".join(f"{1e3 * e.damped_work:.3g} mJ at {e.case.frequency:g} Hz" for e in (slow, *faster))
+    lines.append(f"the wrist's damping makes up the rest of the raw loop: {damped}")
+    if slid := [each for each in bands if each.slid and each.exact_width > 1e-9]:
+        worst = max(abs(each.width / each.exact_width - 1.0) for each in slid)
+        meaning = "largest relative error of a simulated dead band against the roots of the statics"
+        findings.metric("root_error", worst, "", "lower", len(slid), meaning=meaning)
+    if open_ := _still_change(outer, bands):
+        lines.append(f"NOT CONVERGED: {open_} of {len(outer) + len(bands)} change with the integration step")
+    return f"{case}: " + ";\n".join(lines)
+
+
+def _still_change(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand]) -> int:
+    """How many change with the integration step."""
+    return sum(each.drift > 0.0 for each in driven) + sum(each.drift > 0.0 for each in bands)
+
+
+def _fate(found: HysteresisLoop | DeadBand) -> str:
+    """By how much it still changes with the integration step; empty where it does not."""
+    if found.drift == 0.0:
+        return ""
+    by = f"by {100.0 * found.drift:.2g} % " if math.isfinite(found.drift) else ""
+    return f"NOT CONVERGED: changes {by}with the integration step"
+
+
+def _in_um(case: FrictionCase) -> tuple[float, float, float]:
+    return case.friction, case.sheath, 1e6 * case.presliding
+
+
+HYSTERESIS = Procedure("hysteresis", plan, hysteresis)

@@ -1,0 +1,1 @@
+"""`identify`: the wrist's parameters from logged trials."""

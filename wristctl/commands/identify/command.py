@@ -1,0 +1,164 @@
+"""The wrist's parameters from logged trials."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.identification.fit import Fit, Problem
+    from wristctl.identification.intervals import Knowledge
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Identified(StudyResult):
+    """A wrist's stiffness, damping, tendons and delay, with 95 % intervals."""
+
+    kind = "identify"
+
+    fit: Fit
+    knowledge: Knowledge
+    yaml: str
+    """A study file with what was found: the wrist, and the actuator and sensor of a loop."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter, found or fixed, in the units of `frame`."""
+        return self.fit.values
+
+    def frame(self) -> pd.DataFrame:
+        """One row per parameter: value, ends of its 95 % interval, unit, what was believed, verdict."""
+        import pandas as pd
+
+        from wristctl.commands.identify.tables import COLUMNS, parameter_rows
+
+        return pd.DataFrame(parameter_rows(self.fit, self.knowledge, {}), columns=COLUMNS)
+
+
+class _Logged(NamedTuple):
+    """The tables of a run of trials."""
+
+    ticks: pd.DataFrame
+    frames: pd.DataFrame
+    kinds: pd.DataFrame
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Say what will be found from which trials."""
+    problem = _problem(study, inputs)
+    poses = len({(trial.wrist.gravity, trial.wrist.hand_mass) for trial in problem.trials})
+    frames = sum(len(trial.angle) for trial in problem.trials)
+    return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {frames} frames, {poses} poses or masses"
+
+
+def identify(session: Session) -> Identified:
+    """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals."""
+    from wristctl.commands.identify.figures import angles, correlations, residuals
+    from wristctl.commands.identify.tables import budget_table, causes, fit_table, offers, parameters, residual_table
+    from wristctl.identification.fit import fit
+    from wristctl.identification.identifiability import FINER, additions, budget, not_identified, refuse
+    from wristctl.identification.intervals import knowledge
+    from wristctl.identification.lack_of_fit import misfits, refuse_misfit, suspicions, widened
+    from wristctl.identification.unknowns import identified_yaml
+
+    findings, settings = session.findings, session.study.identify
+    problem = _problem(session.study, session.inputs)
+    with session.progress("compiling and searching"):
+        found = fit(problem)
+        sure, suspected, missed = knowledge(found), suspicions(found), misfits(found)
+        moved = budget(found, sure)
+        known = widened(sure, suspected, moved[FINER])
+        lacking = not_identified(found, known)
+        offered = additions(found, lacking) if lacking else []
+    findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments)
+    tables = [
+        parameters(findings, found, known, lacking), fit_table(findings, found, known), residual_table(missed),
+        causes(found, sure, suspected), budget_table(found, moved),
+    ]  # fmt: skip
+    if offered:
+        tables.append(offers(offered))
+    with session.progress("drawing"):
+        findings.figure("angles", angles, found)
+        findings.figure("residuals", residuals, found, known)
+        findings.figure("correlations", correlations, found, known)
+    if known.misses_something:
+        log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
+    for each in suspected:
+        if each.evident:
+            log.warning("the trials look like %s, which the model has not; intervals are widened", each.told)
+    with _told_if_refused(session, tables):
+        if settings.misfit == "refuse":
+            refuse_misfit(found, sure, suspected, missed)
+        refuse(lacking, offered, known.condition, problem.start)
+    yaml = identified_yaml(found.values, _camera(session.inputs, found))
+    findings.text("data/identified.yaml", yaml)
+    return Identified(session.study, findings, tables, found, known, yaml)
+
+
+@contextmanager
+def _told_if_refused(session: Session, tables: Sequence[Table]) -> Iterator[None]:
+    """The tables are told all the same, where what they say is refused."""
+    try:
+        yield
+    except UserError:
+        text = "\n\n".join(table.text() for table in tables)
+        session.findings.summary(f"```\n{text}\n```")
+        session.operator.tell(text)
+        raise
+
+
+def _problem(study: Study, inputs: Inputs) -> Problem:
+    """The trials of all runs, and where the search for the parameters begins: at what the first run's study says."""
+    from wristctl.config.plant import Actuator
+    from wristctl.identification.fit import Problem
+    from wristctl.identification.measured_trials import measured_trials
+    from wristctl.identification.unknowns import believed_of
+
+    settings, trials = study.identify, []
+    start: dict[str, float] = {}
+    believed = Actuator()
+    for role, run in inputs.runs().items():
+        config, logged = run.config, inputs.read(role, _logged)
+        assert logged is not None
+        actuator, wrist = config.hw_run.actuator, config.wrist
+        exposure = settings.exposure
+        if exposure is None:
+            exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
+        trials += measured_trials(run.id, wrist, actuator.step_length, settings.step, *logged, exposure)
+        if not start:
+            start, believed = believed_of(wrist, actuator), actuator
+    return Problem(trials, start, settings, believed)
+
+
+def _logged(run: Run) -> _Logged:
+    return _Logged(*(run.data(name) for name in ("log", "frames", "trials")))
+
+
+def _camera(inputs: Inputs, found: Fit) -> dict[str, float]:
+    """The camera as the frames of all runs show it."""
+    import pandas as pd
+
+    from wristctl.identification.measured_trials import camera_parameters
+
+    logged = {role: inputs.read(role, _logged) for role in inputs}
+    frames = pd.concat([each.frames.assign(run=role) for role, each in logged.items() if each is not None])
+    return camera_parameters(frames, found.values["delay"], found.noise)
+
+
+IDENTIFY = Procedure("identify", plan, identify, (EarlierRun("runs", kind="hw-run"),))

@@ -1,0 +1,199 @@
+"""What closed loops begin with: network, gains and parameters of earlier runs, and a wrist that does not buckle."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Protocol
+
+from wristctl.commands.inputs import Inputs
+from wristctl.config.controllers import CompareSettings, Row, SimulateSettings, TuneSettings
+from wristctl.config.families import Family
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import Argument, Call, UserError, meant
+from wristctl.records import Run
+
+if TYPE_CHECKING:
+    from wristctl.control.table import Gains
+    from wristctl.learning.network import Network
+    from wristctl.wrist.kinematics import Inverse
+
+log = logging.getLogger(__name__)
+
+
+class _Tuning(Protocol):
+    """Gains that were found, in memory."""
+
+    @property
+    def study(self) -> Study: ...
+
+    @property
+    def gains(self) -> Gains: ...
+
+
+class _Training(Protocol):
+    """A network that was trained, in memory."""
+
+    @property
+    def network(self) -> Network: ...
+
+
+class _Identification(Protocol):
+    """Parameters that were identified, in memory, as the text of a study file."""
+
+    @property
+    def yaml(self) -> str: ...
+
+
+def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None = None) -> None:
+    """UserError, naming the key, for an unknown controller, preset or gain, or gains that are not among the tuned.
+
+    `run` is where those are from.
+    """
+    from wristctl.control.table import controller, gains_of
+
+    law = controller(row.controller)
+    if row.gains == "tuned" and law.name not in (tuned or {}):
+        looked = f" in {run.id}, which tuned {', '.join(tuned or ()) or 'nothing'}" if run else ""
+        fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), "` shows the runs")
+        raise UserError(f"no tuned gains of {law.name}{looked}", "gains", fix)
+    gains_of(law, row.gains, tuned)
+
+
+def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:
+    """UserError for the first reference that asks for more than the wrist's range, or whose course fails."""
+    import numpy as np
+
+    from wristctl.simulation.reference import motion
+
+    for number, reference in enumerate(references):
+        try:
+            motion(by_angles(reference), wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
+        except UserError as error:
+            if not error.where.startswith("reference"):  # in a file
+                raise
+            raise error.at(where.format(number) + error.where.removeprefix("reference")) from error
+
+
+def by_angles(reference: Reference) -> Reference:
+    """The reference without a network: the angles that one arc has."""
+    tips = reference.tip is not None or reference.kind == "tip-path"
+    return reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
+
+
+def ends_of_family(family: Family) -> list[Reference]:
+    """The motions of a family with all that is drawn of them at its lower end, then at its upper end."""
+    ends = [dict.fromkeys(family.draw, share) for share in (0.0, 1.0 - 1e-12)]
+    return [family.motion(number, shares) for shares in ends for number in range(len(family.references))]
+
+
+def check_family_reach(study: Study, name: str) -> None:
+    """As `check_reach` for the motions of a family, at both ends of what is drawn; an unknown family has none."""
+    motions = ends_of_family(study.families.get(name, Family()))
+    half = len(motions) // 2
+    for own in (motions[:half], motions[half:]):
+        check_reach(own, study.wrist, f"families.{name}.references.{{}}")
+
+
+def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
+    """UserError where a reference goes through a network and none is among the inputs."""
+    if "network" in inverses and "network" not in inputs:
+        what = "the reference goes through a network, and none is given"
+        raise UserError(what, "reference.inverse", Argument("network"))
+
+
+def inverses_of(references: Iterable[Reference]) -> set[str]:
+    """How the tip targets of these references become angles."""
+    return {reference.inverse for reference in references}
+
+
+def tuned_gains(inputs: Inputs) -> Gains | None:
+    """The gains of the tuning among the inputs, by controller and name; None without one."""
+    return inputs.read("tuned", _gains)
+
+
+def tuned_on(inputs: Inputs) -> TuneSettings | None:
+    """What the gains of the tuning among the inputs were tuned on; None without one."""
+    return inputs.read("tuned", _tune_settings)
+
+
+def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop]) -> Inverse | None:
+    """The network of the training among the inputs at the wrist's pose and hand, None without one.
+
+    UserError where it learned a wrist of another number of segments than the loops simulate.
+    """
+    from wristctl.learning.network_file import NETWORK
+
+    network = inputs.read("network", _network)
+    if network is None:
+        return None
+    others = sorted({loop.plant_segments for loop in loops} - {network.segments})
+    if network.segments > 1 and others:
+        run = inputs.runs().get("network")
+        raise UserError(
+            f"the network learned a wrist of {network.segments} segments, the loop has {others[0]}",
+            str(run.file(NETWORK)) if run else "network",
+            f"plant_segments: {network.segments} in every loop, or train on data with segments: {others[0]}",
+        )
+    pose = math.atan2(wrist.gravity[1], -wrist.gravity[0])
+    at = network.at({"pose": pose, "hand_mass": wrist.hand_mass}) if network.others else network
+    if at.domain.is_empty:
+        log.warning("the study's pose or hand mass lies outside what the network learned: every angle is a guess")
+    return at.along
+
+
+def identified(study: Study, command: str, inputs: Inputs) -> Study:
+    """The study with the parameters of the identification among the inputs, as it is without one."""
+    from wristctl.identification.unknowns import with_identified
+
+    text = inputs.read("from_identified", _identified_yaml)
+    return study if text is None else with_identified(study, command, text)
+
+
+def _gains(given: Run | _Tuning) -> Gains:
+    from wristctl.control.table import read_gains
+
+    return read_gains(given.file("data/gains.json")) if isinstance(given, Run) else given.gains
+
+
+def _tune_settings(given: Run | _Tuning) -> TuneSettings:
+    return given.config.tune if isinstance(given, Run) else given.study.tune
+
+
+def _network(given: Run | _Training) -> Network:
+    from wristctl.learning.network_file import NETWORK, load_network
+
+    return load_network(given.file(NETWORK)) if isinstance(given, Run) else given.network
+
+
+def _identified_yaml(given: Run | _Identification) -> str:
+    if isinstance(given, Run):
+        return given.file("data/identified.yaml").read_text(encoding="utf-8")
+    return given.yaml
+
+
+def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:
+    """The family of this name; UserError with the nearest one if there is none."""
+    if name not in families:
+        fix = meant(name, families) if families else "give one in `families`: experiments/scenarios has some"
+        raise UserError(f"unknown family of worlds '{name}'", where, fix)
+    return families[name]
+
+
+def judged_loops(study: Study, settings: TuneSettings | CompareSettings) -> Mapping[str, Loop]:
+    """The loops that gains are tuned or rows judged on, by name; of a family its loop before anything is drawn."""
+    worlds = settings.worlds
+    return (
+        {worlds.family: family_of(study.families, worlds.family, "worlds.family").loop}
+        if worlds.family
+        else settings.loops
+    )
+
+
+def compared_inverses(study: Study) -> Iterable[str]:
+    """How the tip targets of what is judged on become angles."""
+    name = study.compare.worlds.family
+    return inverses_of(study.families[name].references) if name else study.compare.inverses

@@ -1,0 +1,198 @@
+"""What a person should know before a closed loop's numbers are believed."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs_of_loops import by_angles, ends_of_family, identified
+from wristctl.commands.results import Findings
+from wristctl.config.controllers import CompareSettings, Row, SimulateSettings, TuneSettings
+from wristctl.config.loop import DirectionName, Loop, Reference, longest_step
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    from wristctl.control.law import Conditions
+    from wristctl.wrist.holding import Shortfall
+
+
+log = logging.getLogger(__name__)
+
+
+def warn_if_outside(share: float) -> None:
+    """Warn where this share of the wanted tips lies outside what the network learned."""
+    if share > 0.0:
+        log.warning("%.3g %% of the wanted tips lie outside what the network learned: guesses", 100.0 * share)
+
+
+def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop]) -> None:
+    """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
+    from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.statics import least_stiffness
+
+    least = min(least_stiffness(plant_of(wrist, loop.plant), loop.plant_segments) for loop in loops)
+    findings.numerics(least_stiffness=least, buckles=least <= 0.0)
+    if least <= 0.0:
+        log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)
+
+
+def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
+    """In words each preset that is not made for a loop with motors, tendons and a camera."""
+    from wristctl.control.table import controller
+
+    real, found = [each for each in loops if each.actuator.level == "tendon" and each.sensor.level == "camera"], []
+    presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
+    for name, preset in sorted(presets):
+        law = controller(name)
+        stated = law.conditions.get(preset)
+        if real and stated is None:
+            instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
+            found.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
+        for loop in real:
+            if stated and (told := _outside(stated, loop)):
+                found.append(f"{name}/{preset} was made for {told}: it may swing (docs/margins.md)")
+    return found
+
+
+def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
+    """Warn of each of them."""
+    for each in outside_conditions(rows, loops):
+        log.warning("%s", each)
+
+
+def _outside(stated: Conditions, loop: Loop) -> str:
+    (fast, slow), (soft, stiff) = stated
+    told = []
+    if not fast <= loop.control_period <= slow:
+        told.append(f"periods of {1e3 * fast:g} to {1e3 * slow:g} ms, not {1e3 * loop.control_period:g}")
+    believed = loop.actuator.tendon_stiffness
+    if not soft <= believed <= stiff:
+        told.append(f"tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m, not {believed / 1e3:g}")
+    return " and ".join(told)
+
+
+def warn_if_coarse(loops: Iterable[Loop]) -> None:
+    """Warn where configured substeps are longer than elastic tendons allow."""
+    for loop in loops:
+        step = loop.control_period / loop.steps
+        if loop.actuator.level == "tendon" and step > longest_step(loop.actuator) * (1.0 + 1e-9):
+            told = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
+            log.warning(told, 1e3 * step, loop.fewest_steps)
+
+
+class AskedMotion(NamedTuple):
+    """A motion that a loop is asked for."""
+
+    name: str
+    """Of the loop; empty where there is one alone."""
+    loop: Loop
+    reference: Reference
+    direction: DirectionName
+    horizon: float
+
+
+class OutOfReach(NamedTuple):
+    """A shortfall of one or more loops and motions."""
+
+    where: str
+    what: str
+    fix: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}; {self.fix}"
+
+
+def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSettings) -> list[AskedMotion]:
+    """The motions of a section; of a family those at both ends of what they are drawn from, on its own loop."""
+    if isinstance(settings, SimulateSettings):
+        return [AskedMotion("", settings.loop, settings.reference, settings.direction, settings.horizon)]
+    if name := settings.worlds.family:
+        family = study.families[name]
+        return [AskedMotion(name, family.loop, each, "ulnar", family.horizon) for each in ends_of_family(family)]
+    if isinstance(settings, TuneSettings):
+        scenarios = settings.scenarios
+        return [AskedMotion(s.loop, settings.loops[s.loop], s.reference, "ulnar", settings.horizon) for s in scenarios]
+    found = [
+        AskedMotion(name, loop, reference, direction, settings.horizon)
+        for name, loop in settings.loops.items()
+        for reference in settings.references
+        for direction in settings.directions
+    ]
+    return found + (asked_by(study, settings.tuning) if settings.tuning else [])
+
+
+def out_of_reach(wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[OutOfReach]:
+    """What the tendons cannot hold of these motions, by the statics of one segment; loops and motions alike at once."""
+    from wristctl.simulation.reference import reference_name
+
+    told: dict[tuple[str, str], dict[str, dict[str, None]]] = {}
+    for each in asked:
+        if (short := _shortfall(wrist, each)) is not None:
+            motion = reference_name(each.reference) + (f", {each.direction}" if each.direction != "ulnar" else "")
+            told.setdefault(_told(wrist, short), {}).setdefault(motion, {})[each.name] = None
+    found = []
+    for (what, fix), motions in told.items():
+        for loops in dict.fromkeys(map(tuple, motions.values())):
+            names = ", ".join(motion for motion, own in motions.items() if tuple(own) == loops)
+            found.append(OutOfReach(names + (f" on {', '.join(loops)}" if any(loops) else ""), what, fix))
+    return found
+
+
+def warn_out_of_reach(findings: Findings, wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[OutOfReach]:
+    """Warn of each of them, and note it in the manifest."""
+    found = out_of_reach(wrist, asked)
+    for each in found:
+        log.warning("%s", each)
+    if found:
+        findings.numerics(out_of_reach=[str(each) for each in found])
+    return found
+
+
+def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
+    """UserError where gains are to be searched on motions that no gains can hold; a sweep's points are warned of."""
+    settings = study.tune
+    found = [] if study.sweep else out_of_reach(identified(study, "tune", inputs).wrist, asked_by(study, settings))
+    if found:
+        first, family = found[0], settings.worlds.family
+        where = f"families.{family}.references" if family else "tune.scenarios"
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        what = f"no gains can help: {first.where}: {first.what}{more}"
+        raise UserError(what, where, f"{first.fix}; or go on with --force")
+
+
+def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
+    from wristctl.simulation.batch import sample_period
+    from wristctl.simulation.reference import motion, toward
+    from wristctl.simulation.worlds import loop_facing, plant_of
+    from wristctl.wrist.holding import shortfall
+
+    if not asked.loop.limits:
+        return None
+    seen, loop = loop_facing(wrist, asked.loop, asked.direction)
+    reference = by_angles(toward(asked.reference, asked.direction))
+    theta = motion(reference, seen, asked.horizon, sample_period(loop.control_period)).theta_ref
+    low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
+    return shortfall(plant_of(seen, loop.plant), low, high, loop.disturbances.load)
+
+
+def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:
+    what = (
+        f"the tendons cannot hold {math.degrees(short.theta):.3g} deg, which asks for {abs(short.asked):.3g} N m where "
+        f"{wrist.tension_limit:g} N give {abs(short.given):.3g}"
+    )
+    way = [f"a tension_limit of {_rounded(short.tension_limit, math.ceil):.3g} N"]
+    if abs(short.angle) > 0.0:  # nan where they do not hold it straight
+        way.append(f"at most {_rounded(math.degrees(abs(short.angle)), math.floor):.3g} deg")
+    way.append(f"a tendon_radius of {_rounded(short.tendon_radius, math.ceil):.3g} m")
+    return what, f"{', '.join(way[:-1])} or {way[-1]} would do"
+
+
+def _rounded(value: float, way: Callable[[float], int]) -> float:
+    """To three digits, up or down."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return way(value / step) * step

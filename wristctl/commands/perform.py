@@ -1,0 +1,240 @@
+"""How a study is performed: inputs opened and named, a plan, then the doing, in a run directory or in memory."""
+
+import json
+import math
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic
+
+from wristctl.commands.adoption import adopted, with_places
+from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Found, Procedure, procedure_of
+from wristctl.commands.progress import Watch, watched
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Operator, Session, ShowProgress, Unattended
+from wristctl.config.foreign import Foreign
+from wristctl.config.given_files import with_files
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import LiveRun, Run, start_run
+from wristctl.records.copied_inputs import sealed_references
+from wristctl.records.journal import jsonable
+from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
+
+_NAMED = 2
+"""Laws that a listing names."""
+
+
+@dataclass(frozen=True)
+class Prepared(Generic[Found]):
+    """A study that can be performed: its inputs are open, and named for good in it, its laws loaded and tried."""
+
+    procedure: Procedure[Found]
+    study: Study
+    inputs: Inputs
+    foreign: tuple[Foreign, ...] = ()
+    """Where those of its laws are from that are not this package's."""
+
+    def plan(self) -> str:
+        """What would be done. Raises UserError for what can be known before."""
+        return self.procedure.plan(self.study, self.inputs)
+
+
+def prepare(
+    procedure: Procedure[Found],
+    study: Study,
+    out: Path,
+    given: Mapping[str, Any] | None = None,
+    files: Sequence[Path] = (),
+) -> Prepared[Found]:
+    """Open the inputs: those `given` by name, else those that the study names, runs in `out`; load laws from elsewhere.
+
+    Where one of the study's `files` is the configuration of a run, its inputs may also be beside that. Raises
+    UserError.
+    """
+    section = procedure.section(study)
+    beside = [file.absolute().parent.parent for file in files if (file.parent / MANIFEST).is_file()]
+    inputs = opened(procedure.kind, section, procedure.needs, given or {}, out, beside)
+    if inputs:
+        own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
+        study = study.model_copy(update=own)
+    check_motions(study, procedure.kind)
+    study, foreign = adopted(study, procedure.kind)
+    return Prepared(procedure, study, inputs, foreign)
+
+
+@contextmanager
+def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str]) -> Iterator[LiveRun]:
+    """A run directory in `out` for a prepared study, sealed with a report at the block's end, however it ends."""
+    read, study = prepared.inputs.recorded(), with_places(prepared.study, sealed_references(prepared.foreign))
+    kind, about = prepared.procedure.kind, _about(prepared.procedure.section(prepared.study))
+    with start_run(kind, study, label, out, argv, read, _page, prepared.foreign, about) as run:
+        yield run
+
+
+def _about(section: Any) -> str:
+    """What tells a study from others of its kind: its laws with their gains."""
+    rows = [section] if hasattr(section, "controller") else getattr(section, "rows", ())
+    names = [_law(row) for row in rows] or list(getattr(section, "controllers", ()))
+    return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} more" * (len(names) > _NAMED)
+
+
+def _law(row: Any) -> str:
+    if not hasattr(row, "controller"):
+        return str(row.name)
+    return f"{row.controller}/{row.gains if isinstance(row.gains, str) else 'given'}"
+
+
+def perform(
+    prepared: Prepared[Found],
+    run: LiveRun | None,
+    show: ShowProgress,
+    operator: Operator,
+    executor: str = "serial",
+    typed: Sequence[str] = (),
+) -> Found:
+    """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
+    work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
+    if run is not None and run.files:  # what is read is what was sealed
+        study = with_files(
+            study, lambda name: str(run.path.absolute() / run.files[name]) if name in run.files else name
+        )
+    session = Session(study, prepared.inputs, findings, show, operator, executor, typed)
+    if run is None:
+        return work(session)
+    try:
+        found = work(session)
+        findings.overview.answer[:] = found.summary
+        findings.overview.marks[:] = found.marks
+    except UserError as error:
+        run.console(f"error: {error}")
+        raise
+    except Exception as error:
+        run.console(traceback.format_exc())
+        error.add_note(f"the traceback is in {run.path / 'console.log'}")
+        raise
+    finally:
+        with suppress(OSError, UserError):  # what went wrong is told by another error
+            findings.keep_overview()
+    run.console(str(found))
+    run.summary(_summary(found, findings.overview), first=bool(found.summary))
+    content = json.dumps(plain_tables(found.tables), indent=2, allow_nan=False)
+    run.file(TABLES).write_text(content + "\n", encoding="utf-8")
+    if found.fault is not None:
+        run.exit_code = found.fault.exit_code
+    return found
+
+
+def _summary(found: StudyResult, overview: Overview) -> str:
+    """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
+    tables = "\n\n".join(table.text() for table in found.tables)
+    if not overview.answer:
+        return f"```\n{tables}\n```" if tables else ""
+    picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""
+    lines = "\n".join(overview.answer)
+    return f"```\n{lines}\n```{picture}\n\n<details><summary>All tables</summary>\n\n```\n{tables}\n```\n\n</details>"
+
+
+def plain_tables(tables: Sequence[Table]) -> Any:
+    """Tables for JSON."""
+    return jsonable([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
+
+
+def _page(path: Path, manifest: Manifest) -> str:
+    from wristctl.plotting.page import page
+
+    return page(Run(path), manifest)
+
+
+Ref = str | Path | Run
+Folder = str | Path
+RESULTS = "results"
+"""Where runs are looked for when no folder is given."""
+
+
+@contextmanager
+def in_python() -> Iterator[None]:
+    """Let errors speak of arguments and functions."""
+    try:
+        yield
+    except UserError as error:
+        error.in_python = True
+        raise
+
+
+def check_executor(named: str) -> None:
+    """UserError for what names no executor."""
+    from wristctl.work.executors import Workers
+
+    Workers.of(named)
+
+
+def carry_out(
+    procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
+    progress: Watch | None, executor: str = "serial",
+) -> Found:  # fmt: skip
+    """Plan and perform a procedure with inputs by their roles; with a folder `out` it leaves a sealed run there."""
+    folder, show = Path(RESULTS if out is None else out), watched(progress)
+    prepared = prepare(procedure, study, folder, given)
+    prepared.plan()
+    check_executor(executor)
+    if out is None:
+        return perform(prepared, None, show, Unattended(), executor)
+    with recording(prepared, folder, label, [f"wristctl.{procedure.kind.replace('-', '_')}()"]) as run:
+        return perform(prepared, run, show, Unattended(), executor)
+
+
+AGAIN = ("gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "identify", "audit")
+"""Kinds of runs that come out the same again."""
+_ALIKE = 1e-6
+"""Relative difference of metrics up to which a repetition shows what the run found."""
+
+
+def redrawn(run: Run, show: ShowProgress) -> StudyResult:
+    """What a run found, with all its figures, each drawn when it is asked for.
+
+    UserError for a kind of run that cannot be had again, for one that did not end well, and where the repetition does
+    not find what the run did: a figure of it would show something else.
+    """
+    if run.kind not in AGAIN:
+        raise UserError(
+            f"{run.kind} runs cannot be drawn again: they are no calculation",
+            str(run.path),
+            "take the PNG and SVG of the run's figures/",
+        )
+    if run.state != "ok":
+        raise UserError(f"the run is {run.state}, not ok", str(run.path), "name one that ended ok")
+    prepared = _prepared(run)
+    found: StudyResult = perform(prepared, None, show, Unattended())
+    again = {name: each["value"] for name, each in found.findings.metrics.items()}
+    searched = run.kind == "compare" and run.config.compare.tuning is not None
+    known = {name: each["value"] for name, each in run.metrics.items() if name in again or not searched}
+    other = [name for name, value in known.items() if name not in again or not _alike(value, again[name])]
+    if other:
+        raise UserError(
+            f"again it finds something else: {other[0]}{f' and {len(other) - 1} more' * (len(other) > 1)}",
+            str(run.path),
+            f"wristctl runs replay {run.id} says why",
+            exit_code=3,
+        )
+    return found
+
+
+def _prepared(run: Run) -> Prepared[Any]:
+    """The run's study with its inputs; gains that a comparison searched for itself are those that it found."""
+    procedure, study, out = procedure_of(run), run.config, run.path.parent
+    prepared = prepare(procedure, study, out)
+    if run.kind == "compare" and study.compare.tuning is not None:
+        settled = study.compare.model_copy(update={"tuning": None})
+        inputs = Inputs({**prepared.inputs, "tuned": run})
+        return Prepared(procedure, study.model_copy(update={"compare": settled}), inputs)
+    return prepared
+
+
+def _alike(value: float | None, again: float | None) -> bool:
+    known = [each for each in (value, again) if each is not None and math.isfinite(each)]
+    return not known or (len(known) == 2 and math.isclose(*known, rel_tol=_ALIKE, abs_tol=1e-12))

@@ -1,0 +1,144 @@
+"""Results as text: aligned tables for people, plain values for programs, LaTeX for papers, and sentences in lines."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from wristctl.escape import printable
+
+if TYPE_CHECKING:
+    from wristctl.comparison.tie_groups import Share
+
+
+@dataclass(frozen=True)
+class Table:
+    """A titled table; units stand in the column names. Cells are text, numbers, booleans or None."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+    def text(self, width: int | None = None) -> str:
+        """Aligned columns, numbers to four digits; columns beyond `width` go below, the first repeated."""
+        heads = [printable(each) for each in self.columns]
+        rows = [[_plain(value) for value in row] for row in self.rows]
+        cells = [[_cell(value) for value in row] for row in rows]
+        widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
+        right = [_numeric([row[at] for row in rows]) for at in range(len(self.columns))]
+
+        def line(values: Sequence[str], chosen: Sequence[int]) -> str:
+            padded = [values[at].rjust(widths[at]) if right[at] else values[at].ljust(widths[at]) for at in chosen]
+            return "  ".join(padded).rstrip()
+
+        blocks = []
+        for chosen in _blocks(widths, width):
+            rule = "  ".join("-" * widths[at] for at in chosen)
+            blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
+        return "\n".join([printable(self.title), ""] * bool(self.title) + ["\n\n".join(blocks)])
+
+
+def number(value: float) -> str:
+    """Four significant digits; infinities and NaN as a dash."""
+    return f"{value:.4g}" if math.isfinite(value) else "-"
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str | int):
+        return printable(value)
+    return number(float(value))
+
+
+def _numeric(column: Sequence[Any]) -> bool:
+    return not any(isinstance(value, str | bool) for value in column)
+
+
+def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
+    """Which columns stand beside each other: the first everywhere, the others as far as `width` reaches."""
+    blocks, used = [[0]], widths[0]
+    for at in range(1, len(widths)):
+        if width is not None and at > 1 and used + 2 + widths[at] > width:
+            blocks.append([0])
+            used = widths[0]
+        blocks[-1].append(at)
+        used += 2 + widths[at]
+    return blocks
+
+
+def latex_table(table: Table) -> str:
+    """A table for the packages booktabs and caption, numbers to four digits and aligned to the right."""
+    import pandas as pd
+
+    columns = [printable(each) for each in table.columns]
+    cells = [[_latex_cell(value) for value in row] for row in table.rows]
+    numeric = [not any(isinstance(row[at], str | bool) for row in table.rows) for at in range(len(columns))]
+    styled = pd.DataFrame(cells, columns=columns).style.hide(axis="index").format(escape="latex")
+    styled = styled.format_index(escape="latex", axis="columns")
+    aligned = "".join("r" if each else "l" for each in numeric)
+    text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(printable(table.title)) or None)
+    return text.rstrip()
+
+
+def _latex_cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return printable(value) if isinstance(value, str) else number(float(value))
+
+
+_ESCAPED = {each: f"\\{each}" for each in "&%$#_{}"} | {
+    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}",
+}  # fmt: skip
+
+
+def escaped(text: str) -> str:
+    """Text with what LaTeX reads as its own written out."""
+    return "".join(_ESCAPED.get(each, each) for each in text)
+
+
+COLUMNS = 100
+"""What a line of an answer may take."""
+
+
+def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent: str = "") -> list[str]:
+    """A text in at most so many lines, broken between words; where some is left out a mark says so."""
+    return textwrap.wrap(
+        text, columns, subsequent_indent=indent, max_lines=most, placeholder=" ...",
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def two(value: float, digits: int = 2) -> str:
+    """A number to two digits (or so many), as short as it goes: 15000, 0.012, 3.1e-5."""
+    shown = f"{value:.{digits}g}"
+    if "e+" in shown and abs(value) < 1e6:
+        return f"{float(shown):.0f}"
+    mantissa, _, power = shown.partition("e")
+    return f"{mantissa}e{int(power)}" if power else mantissa
+
+
+def degrees(error: float, digits: int = 2) -> str:
+    """An error [rad] in degrees, to so many digits; `<0.001` where nobody could measure it."""
+    from wristctl.comparison.geometric_means import MEASURABLE
+
+    if error <= MEASURABLE * (1.0 + 1e-9):
+        return f"<{math.degrees(MEASURABLE):g}"
+    return two(math.degrees(error), digits)
+
+
+def percent(share: Share) -> str:
+    """A share with its 95 % interval: 0.8 % [0.1, 2.9]."""
+    value, low, high = (f"{100.0 * each:.2g}" for each in (share.value, share.low, share.high))
+    return f"{value} % [{low}, {high}]"

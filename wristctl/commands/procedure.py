@@ -1,0 +1,96 @@
+"""A command as it can be called for: the earlier runs that it reads, what it would do, and the doing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import Run
+from wristctl.records.manifest import KINDS, MANIFEST, Input
+from wristctl.records.run import NAME_A_RUN
+from wristctl.study_files.keys import SUBJECTS
+
+if TYPE_CHECKING:
+    from wristctl.simulation.size import Size
+
+
+Found = TypeVar("Found", bound=StudyResult)
+
+
+@dataclass(frozen=True)
+class Procedure(Generic[Found]):
+    """What a command does with its section of a study. Its docstring is that of `perform`."""
+
+    kind: str
+    """The command's name, and its runs' kind."""
+    plan: Callable[[Study, Inputs], str]
+    """Says what will be done; raises UserError for what can be known before anything is computed or written."""
+    perform: Callable[[Session], Found]
+    """Computes; writes what it finds where the session's findings have a run directory."""
+    needs: tuple[EarlierRun, ...] = ()
+    in_units: bool = False
+    """Whether it works in units, which other processes and machines may do."""
+    doubts: Callable[[Study, Inputs], None] | None = None
+    """Raises UserError for what the command does not do without `--force`."""
+    size: Callable[[Study], Size] | None = None
+    """The rollouts that it asks for, where it can be done at many values of its settings."""
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it can be done at many values of its settings."""
+        return self.size is not None
+
+    def section(self, study: Study) -> Any:
+        """The section of a study that names what it reads."""
+        return getattr(study, self.subject.replace("-", "_"))
+
+    @property
+    def subject(self) -> str:
+        """The command in whose section that is: its own, or that of the one it works on."""
+        return SUBJECTS.get(self.kind, self.kind)
+
+
+_PLACES = {kind: f"{kind.replace('-', '_')}.command:{kind.replace('-', '_').upper()}" for kind in KINDS}
+_PLACES |= {
+    "calibrate-camera": "calibrate.camera:CALIBRATE_CAMERA",
+    "calibrate-wrist": "calibrate.wrist:CALIBRATE_WRIST",
+}
+_PLACES |= {"study": "study.command:FAIR_STUDY"}
+"""Module, below this package, and name of the procedure behind each kind of run."""
+
+
+def procedure_of(run: Run) -> Procedure[Any]:
+    """What made a run. Raises UserError for a kind that no command makes."""
+    if run.kind not in _PLACES:
+        raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
+    module, _, name = _PLACES[run.kind].partition(":")
+    procedure: Procedure[Any] = getattr(import_module(f"wristctl.commands.{module}"), name)
+    return procedure
+
+
+def inputs_of(run: Run) -> dict[str, Input | list[Input]]:
+    """The inputs of a run by the leaf that names each, a list where it may name several.
+
+    Raises UserError where its manifest has one play a part that the run's command knows nothing of.
+    """
+    procedure, found = procedure_of(run), dict[str, Input | list[Input]]()
+    defaults = procedure.section(Study())
+    several = {need.leaf: isinstance(getattr(defaults, need.leaf), tuple) for need in procedure.needs}
+    for each in run.manifest.inputs:
+        leaf = each.role.partition("[")[0]
+        before = found.setdefault(leaf, []) if several.get(leaf) else None
+        if isinstance(before, list) and each.role == f"{leaf}[{len(before)}]":
+            before.append(each)
+        elif before is None and each.role in several and leaf not in found:
+            found[leaf] = each
+        else:
+            what = f"{run.kind} has no place for a run as its {each.role!r}"
+            raise UserError(what, str(run.path / MANIFEST), NAME_A_RUN, exit_code=3)
+    return found

@@ -1,0 +1,107 @@
+"""How far something has come: counted for whoever shows it, noted in the run's events, told in the end."""
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from wristctl.commands.printed_table import number
+from wristctl.commands.session import Done, Event, ShowProgress
+
+log = logging.getLogger(__name__)
+
+Watch = Callable[[str, int, int | None, Mapping[str, float]], None]
+"""Called with what goes on, how much of it is done, of how much (None: unknown), and figures beside it."""
+
+_EVENT_EVERY = 1.0
+"""Seconds between two events."""
+_TELLS = 2.0
+"""Seconds after which a pace tells something."""
+
+
+@dataclass
+class Count:
+    """How far something has come, and the figures beside it."""
+
+    what: str
+    total: int | None
+    unit: str
+    count: int = 0
+    figures: dict[str, float] = field(default_factory=dict)
+    began: float = field(default_factory=lambda: time.monotonic())
+
+    def seconds_left(self) -> float | None:
+        """What is left at the pace so far [s]; None where nothing is known of it, or all is done."""
+        passed = time.monotonic() - self.began
+        if self.total is None or not 0 < self.count < self.total or passed < _TELLS:
+            return None
+        return passed * (self.total - self.count) / self.count
+
+    def remaining(self) -> str:
+        """The same in words; empty where it is not known."""
+        left = self.seconds_left()
+        return "" if left is None else f"about {duration(left)} left"
+
+    def beside(self) -> str:
+        """The figures as text."""
+        return ", ".join(f"{name} {number(float(value))}" for name, value in self.figures.items())
+
+    def line(self) -> str:
+        """All of it as text."""
+        of = "" if self.total is None else f" of {self.total}"
+        counted = f"{self.count}{of} {self.unit}".rstrip() if self.count else ""
+        shown = ", ".join(part for part in (counted, self.beside()) if part)
+        return f"{self.what}: {shown}" if shown else self.what
+
+    def fields(self) -> dict[str, Any]:
+        """All of it as an event has it."""
+        return {"what": self.what, "total": self.total, "count": self.count, **self.figures}
+
+
+@contextmanager
+def counting(event: Event, what: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
+    """Count while a block works: each call is shown, at most one a second is an event; the end is one and a message."""
+    state = Count(what, total, unit)
+    last_event = state.began - _EVENT_EVERY
+
+    def done(count: int = 0, **figures: float) -> None:
+        nonlocal last_event
+        state.count = count
+        state.figures |= figures
+        show(state)
+        instant = time.monotonic()
+        if instant - last_event >= _EVENT_EVERY:
+            last_event = instant
+            event("progress", **state.fields())
+
+    yield done
+    event("progress", **state.fields())
+    log.info("%s, %.1f s", state.line(), time.monotonic() - state.began)
+
+
+def duration(seconds: float) -> str:
+    """A time as a person says it: 12 s, 4 min, 3 h."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
+
+
+def watched(watch: Watch | None) -> ShowProgress:
+    """Progress for a script or notebook: nothing is printed, and `watch` is called at the start and at every step."""
+
+    def show(count: Count) -> None:
+        if watch is not None:
+            watch(count.what, count.count, count.total, dict(count.figures))
+
+    def shown(event: Event, what: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+        show(Count(what, total, unit))
+        return counting(event, what, total, unit, show)
+
+    return shown
+
+
+def no_event(*_kind: object, **_fields: object) -> None:
+    """For whatever keeps no journal."""

@@ -1,0 +1,231 @@
+"""What a study has found so far: kept in memory, and written at once into the run directory where there is one."""
+
+from __future__ import annotations
+
+import json
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from wristctl.commands.printed_table import Table
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import LiveRun, Run, stream
+from wristctl.records.manifest import OVERVIEW, Overview
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from wristctl.records.formats import Columns
+
+
+class Figures(Mapping[str, "Figure"]):
+    """Figures by name, each drawn when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._drawers: dict[str, Callable[[], Figure]] = {}
+        self._drawn: dict[str, Figure] = {}
+
+    def add(self, name: str, draw: Callable[[], Figure]) -> None:
+        """One more, or another in place of one that was there."""
+        self._drawers[name] = draw
+        self._drawn.pop(name, None)
+
+    def __getitem__(self, name: str) -> Figure:
+        if name not in self._drawn:
+            self._drawn[name] = self._drawers[name]()
+        return self._drawn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._drawers)
+
+    def __len__(self) -> int:
+        return len(self._drawers)
+
+    def __repr__(self) -> str:
+        return f"figures {', '.join(self)}"
+
+
+class Findings:
+    """Metrics and figures of a study; with a run directory these, tables, arrays and files are written as they come.
+
+    Without one nothing touches the disk: what is only written is passed over. Where it `draws` not, every figure is for
+    later.
+    """
+
+    def __init__(self, seed: int, run: LiveRun | None = None, draws: bool = True) -> None:
+        self.run = run
+        self.metrics: dict[str, dict[str, Any]] = {}
+        """value, unit, better, n, interval and meaning by name, as a run's metrics.json has them"""
+        self.figures = Figures()
+        self.overview = Overview()
+        """What the run's page begins with, and in which order it shows the figures."""
+        self._seed, self._draws = seed, draws
+
+    def stream(self, name: str) -> tuple[int, int]:
+        """Entropy of the random stream `name` for `numpy.random.default_rng`: the same with and without a run."""
+        return self.run.stream(name) if self.run else stream(self._seed, name)
+
+    def note_streams(self, names: Iterable[str]) -> None:
+        """Note in the run which streams were drawn from."""
+        for name in names:
+            self.stream(name)
+
+    def metric(
+        self,
+        name: str,
+        value: float | None,
+        unit: str = "",
+        better: Literal["lower", "higher", ""] = "",
+        n: int = 1,
+        interval: tuple[float, float] | None = None,
+        meaning: str = "",
+    ) -> None:
+        """A number with unit, better direction, sample size and interval; None: there is none."""
+        known = {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
+        self.metrics[name] = known
+        if self.run:
+            self.run.metric(name, value, unit, better, n, interval, meaning)
+
+    def figure(
+        self, name: str, draw: Callable[..., Figure], *of: Any, caption: str = "", later: bool = False, **how: Any
+    ) -> None:
+        """The figure that `draw(*of, **how)` gives: drawn now into a run, else when somebody asks for it.
+
+        The `caption` says what it shows; one for `later` is drawn when somebody asks for it in any case.
+        """
+        drawer = partial(draw, *of, **how)
+        self.figures.add(name, drawer)
+        self.overview.captions[name] = caption
+        if self.run and self._draws and not later:
+            self.run.figure(name, drawer())
+
+    def headline(self, *metrics: str) -> None:
+        """The metrics that head the run's page."""
+        self.overview.cards[:] = metrics
+
+    def keep_overview(self) -> None:
+        """Write down for the run's page what is known of it by now."""
+        if self.run:
+            self.run.file(OVERVIEW).write_text(self.overview.text(), encoding="utf-8")
+
+    def table(
+        self,
+        name: str,
+        columns: Columns,
+        units: Mapping[str, str] | None = None,
+        meaning: Mapping[str, str] | None = None,
+    ) -> None:
+        """Columns, or a DataFrame, for a CSV file of the run; the columns' units and meaning are noted."""
+        if self.run:
+            self.run.table(name, columns, units, meaning)
+
+    def arrays(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Arrays for an npz file of the run."""
+        if self.run:
+            self.run.arrays(name, arrays)
+
+    def text(self, name: str, text: str) -> None:
+        """A text file of the run."""
+        if self.run:
+            self.run.file(name).write_text(text, encoding="utf-8")
+
+    def plain(self, name: str, content: Any, volatile: bool = False) -> None:
+        """A JSON file of the run; volatile ones stand outside the result hash."""
+        self.text(name, json.dumps(content, indent=2, allow_nan=False) + "\n")
+        if self.run and volatile:
+            self.run.volatile(name)
+
+    def file(self, name: str) -> Path | None:
+        """Where to write a file of another format; None without a run."""
+        return self.run.file(name) if self.run else None
+
+    def event(self, name: str, /, **fields: Any) -> None:
+        """A line of the run's journal."""
+        if self.run:
+            self.run.event(name, **fields)
+
+    def numerics(self, **facts: Any) -> None:
+        """How numbers were computed, for the run's manifest."""
+        if self.run:
+            self.run.numerics(**facts)
+
+    def summary(self, markdown: str) -> None:
+        """Words for the run's README.md."""
+        if self.run:
+            self.run.summary(markdown)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class StudyResult(ABC):
+    """A study's metrics, tables and figures; each kind of study adds what else it found.
+
+    The same with and without a run directory.
+    """
+
+    kind: ClassVar[str]
+    """The command that makes such a result."""
+
+    study: Study
+    """As it was performed: inputs that have a run directory are named in it."""
+    findings: Findings
+    tables: Sequence[Table]
+    """What the command prints."""
+
+    @abstractmethod
+    def frame(self) -> pd.DataFrame:
+        """The main table."""
+
+    def courses(self) -> Mapping[str, Mapping[str, Any]]:
+        """Columns over time, under the name of the file in which a run directory keeps them; none by default."""
+        return {}
+
+    @property
+    def fault(self) -> UserError | None:
+        """What the command ends with although the study was done: a result that cannot stand; None where it can."""
+        return None
+
+    @property
+    def summary(self) -> Sequence[str]:
+        """What was found in a few lines of at most 100 columns, as its `answer`; empty where the tables are that."""
+        answer = getattr(self, "answer", ())
+        return answer if isinstance(answer, list) else ()
+
+    @property
+    def marks(self) -> list[str]:
+        """Why a result is no good, in a word or two each: the verdict on the run's page; empty where it is sound."""
+        return []
+
+    @property
+    def remark(self) -> bool:
+        """Whether the summary only introduces the tables, which are printed all the same."""
+        return False
+
+    @property
+    def metrics(self) -> dict[str, float]:
+        """Numbers by name, in the units that the run's metrics.json gives; nan where there is none."""
+        known = {name: each["value"] for name, each in self.findings.metrics.items()}
+        return {name: math.nan if value is None else value for name, value in known.items()}
+
+    @property
+    def figures(self) -> Figures:
+        """matplotlib figures by name, each drawn when it is first asked for."""
+        return self.findings.figures
+
+    @cached_property
+    def run(self) -> Run | None:
+        """The sealed run directory; None where the result is in memory only."""
+        return Run(self.findings.run.path) if self.findings.run else None
+
+    def __str__(self) -> str:
+        return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])
+
+    def __repr__(self) -> str:
+        where = str(self.findings.run.path) if self.findings.run else "in memory"
+        return f"<{type(self).__name__}: {where}; {len(self.metrics)} metrics; {self.figures!r}>"

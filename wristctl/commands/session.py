@@ -1,0 +1,101 @@
+"""What a study works with while it is performed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.results import Findings
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    from wristctl.trial.control_loop import Shown
+    from wristctl.trial.supervised_wait import Meanwhile
+    from wristctl.trial.trials import Trial
+
+
+class Done(Protocol):
+    """Called with how much is done by now, and figures to show beside it."""
+
+    def __call__(self, count: int = 0, **figures: float) -> None:
+        """Say it."""
+
+
+Event = Callable[..., None]
+"""Notes an event by its name, with fields."""
+
+
+class ShowProgress(Protocol):
+    """Shows how far something has come while a block works on it, and notes that as events."""
+
+    def __call__(self, event: Event, what: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+        """Begin to show `what`; without a `total` its length is unknown."""
+
+
+class Operator(Protocol):
+    """The person at the rig, or whoever else watches."""
+
+    def tell(self, text: str) -> None:
+        """Show a text that is no part of the result."""
+
+    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
+        """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not.
+
+        Until then `meanwhile` is called again and again: what it raises ends the question.
+        """
+
+    def dare(self, what: str) -> None:
+        """What should not be done on hardware. Raises UserError where nobody has said that it is to be done anyway."""
+
+    def wait_for(self, what: str) -> None:
+        """Say what is to be done, and come back once it is."""
+
+    def watch(self, trials: Sequence[Trial], session: Session) -> AbstractContextManager[Shown]:
+        """Show the trials while a block performs them: it yields what each tick is handed to."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """The study with its inputs named for good, the inputs, where findings go, and who is told or asked meanwhile."""
+
+    study: Study
+    inputs: Inputs
+    findings: Findings
+    show: ShowProgress
+    operator: Operator
+    executor: str = "serial"
+    """Who does units of work, as `--executor` names it: what is found does not depend on it."""
+    typed: Sequence[str] = ()
+    """The study's files and settings as the command line had them, for commands that are advised."""
+
+    def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
+        """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""
+        return self.show(self.findings.event, what, total, unit)
+
+
+class Unattended:
+    """Shows nothing, and agrees to nothing."""
+
+    def tell(self, text: str) -> None:
+        """Nobody to tell."""
+
+    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
+        """Raises UserError."""
+        raise UserError(f"nobody is there to agree to this: {what}", fix="use the command line", exit_code=3)
+
+    def dare(self, what: str) -> None:
+        """Raises UserError."""
+        self.confirm(what)
+
+    def wait_for(self, what: str) -> None:
+        """Raises UserError."""
+        self.confirm(what)
+
+    @contextmanager
+    def watch(self, trials: Sequence[Trial], session: Session) -> Iterator[Shown]:
+        """The ticks are looked at by nobody."""
+        yield lambda row: None

@@ -1,0 +1,244 @@
+"""One closed loop, with pictures."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs_of_loops import (
+    check_inverses,
+    check_reach,
+    check_row,
+    identified,
+    inverses_of,
+    network_for,
+    tuned_gains,
+)
+from wristctl.commands.loop_warnings import (
+    OutOfReach,
+    asked_by,
+    warn_if_coarse,
+    warn_if_it_buckles,
+    warn_if_outside,
+    warn_out_of_reach,
+    warn_outside_conditions,
+)
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Session
+from wristctl.commands.sweep.command import sweepable
+from wristctl.config.study import Study
+from wristctl.errors import UserError, under
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.simulation.repetitions import Repeated
+    from wristctl.simulation.size import Size
+    from wristctl.simulation.trajectory import Trajectory
+    from wristctl.wrist.kinematics import Inverse
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Simulated(StudyResult):
+    """One closed loop, as often as the study says, and whether the wrist ever left its range."""
+
+    kind = "simulate"
+
+    repeated: Repeated
+    """Metrics of every repetition."""
+    failed: bool
+    short_of: str = ""
+    """in a line why it does not arrive where it was asked to, and what to try"""
+
+    @property
+    def fault(self) -> UserError | None:
+        """That the wrist left its range."""
+        if not self.failed:
+            return None
+        where = str(self.findings.run.path) if self.findings.run else ""
+        fix = "look at the figures; try other gains or a slower move"
+        return UserError(f"the wrist {self.repeated.failure}", where, fix, exit_code=3)
+
+    @property
+    def summary(self) -> list[str]:
+        """Why a loop does not arrive, and what does, a command on a line of its own; empty where it arrives."""
+        from wristctl.commands.printed_table import in_lines
+
+        why, *command = self.short_of.split("\n")
+        return [*in_lines(why), *command]
+
+    @property
+    def marks(self) -> list[str]:
+        """What became of the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
+        return self.repeated.marks
+
+    @property
+    def remark(self) -> bool:
+        """The metrics are the answer."""
+        return True
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of the first repetition."""
+        return self.repeated.first.trajectory
+
+    def courses(self) -> Mapping[str, Mapping[str, Any]]:
+        """The columns of the trajectory."""
+        return {"trajectory": self.trajectory.columns()}
+
+    def frame(self) -> pd.DataFrame:
+        """The trajectory: time, angles, tip, tensions, ...; SI units."""
+        return self.trajectory.frame()
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check the controller and its gains."""
+    settings = study.simulate
+    from wristctl.commands.truth_table import truth_told
+    from wristctl.simulation.size import check_size
+
+    with under("simulate"):
+        check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
+        check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
+        check_inverses(inverses_of([settings.reference]), inputs)
+        check_size(size(study))
+
+    times = size(study).rollouts
+    told = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{told}"
+
+
+def size(study: Study) -> Size:
+    """One rollout, or as many as there are repetitions of what is drawn."""
+    from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import Size
+
+    chosen = study.simulate
+    return Size([chosen.loop], chosen.horizon, chosen.repetitions if is_random(chosen.loop) else 1)
+
+
+def simulate(session: Session) -> Simulated:
+    """Simulate one closed loop and draw it."""
+    from wristctl.commands.simulate.figures import consistency, sliding
+    from wristctl.commands.truth_table import truth_heading, truth_tables
+    from wristctl.control.table import controller, gains_of
+    from wristctl.plotting.loop_figures import angles, error_sizes, errors, tensions
+    from wristctl.plotting.wrist_drawing import stroboscope
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.draws import Draws
+    from wristctl.simulation.trajectory import COLUMNS
+
+    study, findings = identified(session.study, "simulate", session.inputs), session.findings
+    settings, wrist = study.simulate, study.wrist
+    warn_if_it_buckles(findings, wrist, [settings.loop])
+    warn_if_coarse([settings.loop])
+    warn_outside_conditions([settings], [settings.loop])
+    beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
+    network = network_for(session.inputs, wrist, [settings.loop])
+    with session.progress("compiling and simulating the loop"):
+        repeated = run_simulation(study, network, tuned_gains(session.inputs))
+    scenario = scenario_of(settings.reference, settings.direction)
+    findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
+    course, failed = repeated.first.trajectory, bool(repeated.failed.any())
+    warn_if_outside(course.outside)
+    own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
+    columns = COLUMNS | own
+    units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
+    findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
+    title = ", ".join(part for part in (course.label, repeated.fate) if part)
+    tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    with session.progress("drawing"):
+        world = truth_heading(wrist, settings.loop)
+        findings.figure("angle", angles, [course], heading=world)
+        findings.figure("error", errors, [course], heading=world)
+        if len(repeated.failed) > 1:
+            findings.figure("error-repetitions", error_sizes, [repeated])
+        findings.figure("tensions", tensions, course)
+        if course.load is not None and course.expected > 0.0:
+            findings.figure("observer", consistency, course, heading=world)
+        law = controller(settings.controller)
+        if law.surface is not None and not failed:
+            gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
+            caption = "How the motion comes to the law's sliding surface: phase plane, and sigma over time"
+            findings.figure("sliding", sliding, course, law.surface, gains, caption=caption)
+        findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
+    short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
+    return Simulated(session.study, findings, tables, repeated, failed, short_of)
+
+
+def _short_of(
+    session: Session, study: Study, repeated: Repeated, network: Inverse | None, beyond: Sequence[OutOfReach]
+) -> str:
+    """Why the loop does not arrive, and what may help.
+
+    Beyond what tendons hold that is other tendons or another motion; else those of its law's presets that arrive: they
+    are tried on the very same loop.
+    """
+    from wristctl.control.table import controller
+    from wristctl.simulation.arrival import why_not
+    from wristctl.simulation.closed_loop import simulate as run_simulation
+
+    chosen = study.simulate
+    limit = study.wrist.tension_limit if chosen.loop.limits else math.inf
+    short = f"does not arrive: {why_not(repeated.first.trajectory, limit)}"
+    if beyond:
+        return f"{short}; {beyond[0].what}: no gains can help; {beyond[0].fix}"
+    arriving = []
+    with session.progress("trying the law's other gains"):
+        for preset in controller(chosen.controller).presets:
+            other = chosen.model_copy(update={"gains": preset, "repetitions": 1})
+            if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": other}), network).arrives:
+                arriving.append(preset)
+    if arriving:
+        return f"{short}; try --gains {' or '.join(arriving)}"
+    tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
+    return f"{short}; no preset of the law does here:\n{tune}"
+
+
+def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
+    """Every metric: its value, or of several repetitions the median with its 95 % interval."""
+    import pandas as pd
+
+    from wristctl.comparison.statistics import spread
+    from wristctl.simulation.metrics import METRICS
+
+    findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")
+    once, rows = len(repeated.failed) == 1, list[tuple[object, ...]]()
+    for name, metric in METRICS.items():
+        if once:
+            value = repeated.first.metrics[name]
+            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
+            rows.append((name, value, metric.unit, metric.formula))
+        else:
+            found = spread(repeated.metrics[name])
+            meaning = f"{metric.formula}; median"
+            findings.metric(name, found.median, metric.unit, "lower", found.n, found.interval, meaning)
+            rows.append((name, found.median, found.low, found.high, metric.unit, metric.formula))
+    if once:
+        return Table(title, ("metric", "value", "unit", "meaning"), rows)
+    every = pd.DataFrame({"repetition": range(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics})
+    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in METRICS.items()})
+    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
+    return Table(f"{title}, {len(every)} repetitions", heads, rows)
+
+
+SIMULATE = sweepable(
+    Procedure(
+        "simulate",
+        plan,
+        simulate,
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("tuned", kind="tune", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+        ),
+        size=size,
+    )
+)

@@ -1,0 +1,1 @@
+"""`study`: every law tuned and judged at equal budget."""

@@ -1,0 +1,132 @@
+"""The study of all laws: tuned and judged at equal budget on every family of worlds, and which is for which rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.session import Session
+from wristctl.commands.study.results import written
+from wristctl.commands.study.units import (
+    Studied,
+    budget_of,
+    families_of,
+    golden_of,
+    judge_all,
+    search_units,
+    ways_to_tune,
+)
+from wristctl.commands.units import performed
+from wristctl.config.study import Study
+from wristctl.errors import UserError, meant, under
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from wristctl.commands.study.units import StudyPlace
+    from wristctl.work.worker import Unit
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check all names, and say what it costs."""
+    from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
+    from wristctl.comparison.world_ranking import noises_of
+    from wristctl.control.table import controller
+    from wristctl.simulation.size import Size, check_size, check_steps
+    from wristctl.tuning.search import check_optimiser, check_tunable
+
+    settings = study.study
+    with under("study"):
+        budget = budget_of(settings)
+        if not families_of(study):
+            raise UserError("no families of worlds", "families", "include some of experiments/scenarios")
+        for name in (*families_of(study), *filter(None, [settings.varied])):
+            family_of(study.families, name, "families")
+        for number, name in enumerate(settings.laws):
+            with under(f"laws.{number}"):
+                check_tunable(controller(name))
+        for number, row in enumerate(settings.presets):
+            with under(f"presets.{number}"):
+                check_row(row, None)
+        labels = _labels(study)
+        for term, pair in settings.terms.items():
+            for label in pair:
+                if label not in labels:
+                    raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
+        for name, _, way in ways_to_tune(study):
+            own = name in settings.variants and settings.variants[name].optimiser
+            places = {
+                "tune.candidates": f"budgets.{settings.budget}.candidates",
+                "tune.optimiser": f"variants.{name}.optimiser" if own else "optimiser",
+            }
+            try:
+                check_optimiser(way)
+            except UserError as error:
+                raise error.at(places.get(str(error.where), "optimiser")) from error
+        families = {name: study.families[name] for name in families_of(study)}
+        for family in families.values():
+            check_size(Size([family.loop], family.horizon))
+            check_inverses(inverses_of(family.references), inputs)
+    for name in families:
+        check_family_reach(study, name)
+    searches = sum(unit.size for unit in search_units(study).values())
+    each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
+    judged = each * budget.worlds * len(labels)
+    longest = max(Size([each.loop], each.horizon).steps for each in families.values())
+    with under("study"):
+        check_steps((searches + judged) * longest, searches + judged)
+    evaluations = budget.candidates * budget.iterations
+    return (
+        f"{len(settings.laws)} laws with {evaluations} evaluations each on {', '.join(families)}, judged with "
+        f"{len(labels) - len(settings.laws)} presets on {budget.worlds} held-out worlds of each: "
+        f"{searches} rollouts of searches and {judged} of judgements"
+    )
+
+
+def _labels(study: Study) -> list[str]:
+    """The rows of every ranking."""
+    from wristctl.tuning.objective import YARDSTICK
+
+    presets = [row.label for row in study.study.presets]
+    return list(dict.fromkeys([*(f"{law}/tuned" for law in study.study.laws), *presets, f"{YARDSTICK}/default"]))
+
+
+def fair_study(session: Session) -> Studied:
+    """Tune and judge all laws at equal budget on families of worlds: which is for which rig, what each term buys."""
+    from wristctl.tuning.search import search_of
+
+    study = session.study
+    with session.progress("compiling, and computing the golden rollouts"):
+        golden = golden_of(study)
+    session.findings.numerics(golden=golden.expected, executor=session.executor)
+    wanted = search_units(study)
+    tuned = performed(session, "study", "tuning", list(wanted.values()), golden)
+    searches = {
+        place: search_of(arrays, place.law, 1)
+        for place, arrays in zip(wanted, tuned.arrays, strict=True)
+        if arrays is not None
+    }
+    pieces = judge_all(study, {place: found.gains for place, found in searches.items()})
+    judged = performed(session, "study", "judging", [unit for units in pieces.values() for unit in units], golden)
+    poisoned = [*tuned.poisoned, *judged.poisoned]
+    return written(session, _whole(pieces, judged.arrays), searches, poisoned)
+
+
+def _whole(
+    wanted: Mapping[StudyPlace, Sequence[Unit]], arrays: Sequence[dict[str, np.ndarray] | None]
+) -> dict[StudyPlace, list[dict[str, np.ndarray]]]:
+    """What was judged whole, in its ranges of worlds."""
+    found, given = {}, iter(arrays)
+    for place, units in wanted.items():
+        own = [next(given) for _ in units]
+        known = [each for each in own if each is not None]
+        if len(known) == len(own):
+            found[place] = known
+    return found
+
+
+FAIR_STUDY = Procedure(
+    "study", plan, fair_study, (EarlierRun("resume", kind="study", optional=True, unfinished=True),), in_units=True
+)

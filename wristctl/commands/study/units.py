@@ -1,0 +1,152 @@
+"""The units of work of a study of all laws: its searches, then its judgements of the gains that they found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.results import StudyResult
+from wristctl.config.controllers import TuneSettings
+from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVariant
+from wristctl.config.families import TuningWorlds
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.comparison.paired_worlds import OrderShift, TermValue
+    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.tuning.search import Search
+    from wristctl.work.fan_out import Poisoned
+    from wristctl.work.worker import Golden, Unit
+
+
+BASE = ""
+"""The study's own way to tune, among its variants."""
+
+
+class StudyPlace(NamedTuple):
+    """What a search or a judgement is of."""
+
+    variant: str
+    family: str
+    label: str
+    law: str
+
+
+def budget_of(settings: FairStudySettings) -> StudyBudget:
+    """The budget that is named. UserError with the nearest name where there is none."""
+    from wristctl.errors import meant
+
+    if settings.budget not in settings.budgets:
+        raise UserError(f"unknown budget '{settings.budget}'", "budget", meant(settings.budget, settings.budgets))
+    return settings.budgets[settings.budget]
+
+
+def families_of(study: Study) -> tuple[str, ...]:
+    """The names of the families that are studied."""
+    return study.study.families or tuple(study.families)
+
+
+def ways_to_tune(study: Study) -> list[tuple[str, str, TuneSettings]]:
+    """Variant, family and settings of every search of a law: the study's own on each family, and variants on one."""
+    varied = study.study.varied or families_of(study)[0]
+    ways = [(BASE, family, StudyVariant()) for family in families_of(study)]
+    ways += [(name, varied, variant) for name, variant in study.study.variants.items()]
+    return [(name, family, _tune_settings(study, family, variant)) for name, family, variant in ways]
+
+
+def search_units(study: Study) -> dict[StudyPlace, Unit]:
+    """A search for every law on every family, and for every variant on one."""
+    from wristctl.tuning.search import search_unit
+
+    found = dict[StudyPlace, "Unit"]()
+    for name, family, settings in ways_to_tune(study):
+        tuned = study.model_copy(update={"tune": settings})
+        for law in study.study.laws:
+            found[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
+    return found
+
+
+def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> dict[StudyPlace, list[Unit]]:
+    """All gains that were found, and the presets, on the held-out worlds; a variant's with the first noise only."""
+    from wristctl.comparison.world_ranking import judge_units
+    from wristctl.control.table import controller, gains_of
+    from wristctl.tuning.objective import YARDSTICK
+
+    budget, found = budget_of(study.study), dict[StudyPlace, list["Unit"]]()
+    chosen: dict[StudyPlace, Mapping[str, float]] = dict(gains)
+    for family in families_of(study):
+        for row in study.study.presets:
+            law = controller(row.controller)
+            chosen[StudyPlace(BASE, family, row.label, law.name)] = dict(
+                zip(law.gains, gains_of(law, row.gains), strict=True)
+            )
+        chosen.setdefault(StudyPlace(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
+    for place, values in chosen.items():
+        noises = budget.noises if place.variant == BASE else 1
+        found[place] = judge_units(study, place.family, place.law, values, budget.worlds, noises)
+    return found
+
+
+def golden_of(study: Study) -> Golden:
+    """The numbers that all workers must come to; all that the study runs is compiled by then."""
+    from wristctl.simulation.golden import GOLDEN, golden_spec, kinds_of_worlds
+    from wristctl.tuning.objective import YARDSTICK
+    from wristctl.work.worker import Golden
+
+    settings = study.study
+    laws = dict.fromkeys([YARDSTICK, *settings.laws, *(each.controller for each in settings.presets)])
+    loops = kinds_of_worlds(study.families, families_of(study), study.seed)
+    return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
+
+
+def _tune_settings(study: Study, family: str, variant: StudyVariant) -> TuneSettings:
+    """Of a search on a family: the study's own, but for what the variant says."""
+    settings, budget = study.study, budget_of(study.study)
+    return TuneSettings(
+        optimiser=variant.optimiser or settings.optimiser,
+        objective=variant.objective or settings.objective,
+        candidates=budget.candidates,
+        iterations=max(1, round(variant.share * budget.iterations)),
+        finalists=budget.finalists,
+        worlds=TuningWorlds(family=family, draws=budget.draws, validation=budget.validation),
+    )
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Studied(StudyResult):
+    """All laws on all families."""
+
+    kind = "study"
+
+    answer: list[str]
+    """Which law for which rig, what each term buys, and how far the order can be relied on: lines of 100 columns."""
+    rankings: dict[str, WorldRanking]
+    """By family."""
+    searches: dict[StudyPlace, Search]
+    terms: list[TermValue]
+    shifts: list[OrderShift]
+    poisoned: list[Poisoned]
+    """Units that failed wherever they were tried: their rows are left out."""
+
+    @property
+    def fault(self) -> UserError | None:
+        """That units were given up."""
+        if not self.poisoned:
+            return None
+        first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
+        others = f" and {len(self.poisoned) - 1} more" if len(self.poisoned) > 1 else ""
+        what = f"{first.unit.name}{others} failed wherever tried, and is left out: {first.why}"
+        return UserError(what, where, "mend it and resume: what is done is kept", exit_code=3)
+
+    def frame(self) -> pd.DataFrame:
+        """A row per family and row of its ranking, best first; angles in rad."""
+        import pandas as pd
+
+        from wristctl.comparison.world_ranking import ranking_frame
+
+        tables = {name: ranking_frame(found) for name, found in self.rankings.items()}
+        return pd.concat(tables, names=["family"]).reset_index("family").reset_index(drop=True)

@@ -1,0 +1,1 @@
+"""A command at many values of its settings."""

@@ -1,0 +1,335 @@
+"""A command at many values of its settings, in one run directory with one long table."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs_of_loops import identified, tuned_gains
+from wristctl.commands.printed_table import Table, number
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import Argument, UserError
+from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from wristctl.work.fan_out import Poisoned
+    from wristctl.work.worker import Golden, Unit
+
+
+_LANES = 2_000
+"""Points of `simulate` in one unit."""
+_SECTIONS = {"simulate": {"seed", "wrist", "simulate"}}
+_WHOLE = {"seed", "wrist", "families"}
+
+
+def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: Sequence[Sequence[Any]]) -> list[Unit]:
+    """The points in order: many of `simulate` side by side, one of any other command."""
+    from wristctl.work.worker import Unit
+
+    content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
+    together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
+    keys = [(each.key, each.text) for each in axes]
+    units = []
+    for first in range(0, len(points), together):
+        own = [list(each) for each in points[first : first + together]]
+        spec = {"study": content, "command": command, "keys": keys, "points": own}
+        name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, own[0], strict=True))}"
+        units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(own)))
+    return units
+
+
+def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
+    study = Study.model_validate_json(json.dumps(spec["study"]))
+    axes = [SweepAxis(key, (), False, text) for key, text in spec["keys"]]
+    return (study_at(study, axes, _plain(values)) for values in spec["points"])
+
+
+def _plain(values: Sequence[Any]) -> list[Any]:
+    """JSON knows no tuples, and sections nothing else."""
+    return [tuple(_plain(each)) if isinstance(each, list) else each for each in values]
+
+
+def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Closed loops at the points as lanes: metrics by name, which failed, and in words why a loop is no good.
+
+    A row for each point and repetition.
+    """
+    import numpy as np
+
+    from wristctl.simulation.swept_loops import SweptLoop, fates, run_swept, swept_loops
+
+    places, every = list[tuple[int, int]](), list[SweptLoop]()
+
+    def loops() -> Iterator[SweptLoop]:
+        for point, study in enumerate(_studies(spec)):
+            for repetition, each in enumerate(swept_loops(study)):
+                places.append((point, repetition))
+                every.append(each)
+                yield each
+
+    found = run_swept(loops())
+    point, repetition = np.array(places).T
+    rows = {"point": point, "repetition": repetition, "failed": found.failed, "until": found.until}
+    rows |= {"fate": np.array(fates(every, found))}
+    return rows | {f"metric {name}": values for name, values in found.metrics.items()}
+
+
+def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """All metrics of a command that is performed in memory at one point, with their units."""
+    import numpy as np
+
+    from wristctl.commands.perform import Prepared, perform
+    from wristctl.commands.progress import watched
+    from wristctl.commands.session import Unattended
+    from wristctl.work.worker import function_at
+
+    (study,) = _studies(spec)
+    procedure: Any = function_at(_PROCEDURES[spec["command"]])
+    found: Any = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
+    known = found.findings.metrics
+    values = {f"metric {name}": np.array([value]) for name, value in found.metrics.items()}
+    units = {f"unit {name}": np.array([each["unit"]]) for name, each in known.items()}
+    return {"point": np.zeros(1, np.int64), "repetition": np.zeros(1, np.int64), **values, **units}
+
+
+_PROCEDURES: Mapping[str, str] = {
+    "tune": "wristctl.commands.tune.command:TUNE",
+    "compare": "wristctl.commands.compare.command:COMPARE",
+}
+
+
+Found = TypeVar("Found", bound=StudyResult)
+_CHECKED = 20_000
+"""Points that are made before anything is computed, so that a value that cannot be is known by then."""
+_FIRST = ("rmse", "steady_state", "oscillation", "chattering")
+_SHOWN, _SAID = 20, 4
+"""Rows and metrics that are printed and drawn of a sweep."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Swept(StudyResult):
+    """A command at every point of a sweep."""
+
+    kind = "sweep"
+
+    table: pd.DataFrame
+    poisoned: list[Poisoned]
+
+    def frame(self) -> pd.DataFrame:
+        """A row for each point and repetition: what was set, and every metric."""
+        return self.table
+
+    @property
+    def marks(self) -> list[str]:
+        """Of how many rollouts which is no good."""
+        return [f"{mark}: {count} of {len(self.table)}" for mark, count in _fates(self.table).items()]
+
+    @property
+    def fault(self) -> UserError | None:
+        """That points were given up."""
+        if not self.poisoned:
+            return None
+        first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
+        what = f"{len(self.poisoned)} of the sweep's points failed: {first.unit.name}: {first.why}"
+        return UserError(what, where, "leave those values out, or mend them", exit_code=3)
+
+
+def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
+    """The procedure, which does what it does at every point where the study has a sweep."""
+
+    def plan(study: Study, inputs: Inputs) -> str:
+        from wristctl.simulation.size import check_steps
+
+        if not study.sweep:
+            return procedure.plan(study, inputs)
+        base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
+        points = points_of(axes)
+        for each in points[:_CHECKED]:
+            study_at(base, axes, each)
+        assert procedure.size is not None
+        sizes = []
+        for each in _corners(axes):
+            said = procedure.plan(study_at(base, axes, each), Inputs())
+            sizes.append(procedure.size(study_at(base, axes, each)))
+        steps, rollouts = (sum(each) / len(sizes) for each in zip(*((a.steps, a.rollouts) for a in sizes), strict=True))
+        try:
+            check_steps(len(points) * steps, len(points) * rollouts)
+        except UserError as error:
+            raise error.at(Argument("sweep", metavar="KEY=VALUES")) from error
+        return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {said}"
+
+    @wraps(procedure.perform)
+    def perform(session: Session) -> Found | Swept:
+        return _swept(session, procedure.kind) if session.study.sweep else procedure.perform(session)
+
+    found: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True)
+    return cast(Procedure[Found], found)
+
+
+def _base(study: Study, command: str, inputs: Inputs) -> Study:
+    """The study without its sweep, and with what it takes from earlier runs written into it."""
+    from wristctl.control.table import controller, gains_of
+
+    if "network" in inputs:
+        fix = "leave it out: inverse: closed-form follows tips without one"
+        raise UserError("a sweep runs without a network", Argument("network"), fix)
+    by_gain = any(".gains." in f".{each}" for each in study.sweep)
+    study, tuned = study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
+    if command in ("simulate", "tune"):
+        study = identified(study, command, inputs)
+    if command == "simulate":
+        law = controller(study.simulate.controller)
+        values = dict(zip(law.gains, gains_of(law, study.simulate.gains, tuned), strict=True))
+        asked: dict[str, Any] = {"tuned": None, "from_identified": None}
+        if study.simulate.gains == "tuned" or by_gain:
+            asked |= {"gains": values}
+        study = study.model_copy(update={"simulate": study.simulate.model_copy(update=asked)})
+    if command == "compare" and tuned:
+        rows = tuple(
+            row.model_copy(update={"gains": dict(tuned[row.controller])}) if row.gains == "tuned" else row
+            for row in study.compare.rows
+        )
+        study = study.model_copy(update={"compare": study.compare.model_copy(update={"rows": rows, "tuned": None})})
+    return study
+
+
+def _corners(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
+    """The first point, and each axis at its every value that may be unlike the others: names, and both ends."""
+    first = tuple(each.values[0] for each in axes)
+    found = [first]
+    for at, axis in enumerate(axes):
+        names = [each for each in axis.values if isinstance(each, str)]
+        numbers = [each for each in axis.values if not isinstance(each, str)]
+        ends = [min(numbers), max(numbers)] if numbers else []
+        found += [(*first[:at], each, *first[at + 1 :]) for each in [*names[:100], *ends]]
+    return found
+
+
+def _swept(session: Session, command: str) -> Swept:
+    import pandas as pd
+
+    from wristctl.commands.sweep.figures import over_key
+    from wristctl.commands.units import performed
+
+    study, findings = session.study, session.findings
+    base, axes = _base(study, command, session.inputs), axes_of(study, command)
+    points = points_of(axes)
+    units = sweep_units(base, command, axes, points)
+    golden = None if session.executor == "serial" else _golden(base, command)
+    done = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
+    parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
+    for unit, arrays in zip(units, done.arrays, strict=True):
+        if arrays is not None:
+            known_units |= {name[5:]: str(each[0]) for name, each in arrays.items() if name.startswith("unit ")}
+            rows = {name.removeprefix("metric "): each for name, each in arrays.items() if not name.startswith("unit ")}
+            parts.append(pd.DataFrame(rows | {"point": rows["point"] + first}))
+        first += unit.size
+    if not parts:
+        raise UserError(
+            "no point of the sweep could be computed",
+            Argument("sweep", metavar="KEY=VALUES"),
+            f"at the first: {done.poisoned[0].why}",
+            exit_code=3,
+        )
+    table = pd.concat(parts, ignore_index=True)
+    keys = {axis.key: [points[at][number] for at in table["point"]] for number, axis in enumerate(axes)}
+    table = pd.concat([pd.DataFrame(keys), table], axis=1)
+    metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until", "fate"}]
+    findings.table(
+        "data/sweep.csv", table, {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
+    )
+    known = [name for name in metrics if table[name].notna().any()]
+    said = [*(name for name in _FIRST if name in known), *(name for name in known if name not in _FIRST)][:_SAID]
+    _note(session, table, said, known_units)
+    with session.progress("drawing"):
+        for axis in axes:
+            others = [each.key for each in axes if each is not axis]
+            figure_units = {axis.key: unit_at(base, axis.path)} | _units(said, known_units)
+            findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, said, figure_units)
+    title = _answer(command, table, axes, said, _units(said, known_units))
+    findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
+    heads = [*keys, *(["fate"] if "fate" in table else []), *said]
+    lines = [tuple(each) for each in table[heads].head(_SHOWN).itertuples(index=False)]
+    more = f" The first {_SHOWN} of {len(table)} rows; data/sweep.csv has all." if len(table) > _SHOWN else ""
+    return Swept(study, findings, [Table(title + more, heads, lines)], table, done.poisoned)
+
+
+def _golden(study: Study, command: str) -> Golden:
+    """Of the loop of simulate, else of the built-in one: workers show by it that they compute the same."""
+    from wristctl.config.loop import LOOPS
+    from wristctl.simulation.golden import GOLDEN, golden_spec
+    from wristctl.work.worker import Golden
+
+    law, loop = ("feedforward", LOOPS["sampled"])
+    if command == "simulate":
+        law, loop = study.simulate.controller, study.simulate.loop
+    return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist))
+
+
+def _units(metrics: Sequence[str], known: dict[str, str]) -> dict[str, str]:
+    from wristctl.simulation.metrics import METRICS
+
+    of_table = {name: METRICS[name].unit or "1" for name in metrics if name in METRICS}
+    return (
+        {"point": "1", "repetition": "1", "failed": "1", "until": "s", "fate": "1"}
+        | of_table
+        | {k: v or "1" for k, v in known.items()}
+    )
+
+
+def _note(session: Session, table: pd.DataFrame, said: Sequence[str], known: dict[str, str]) -> None:
+    """What `runs ls` can choose by."""
+    findings, units = session.findings, _units(said, known)
+    findings.metric("points", int(table["point"].nunique()), meaning="of the sweep")
+    if "failed" in table:
+        findings.metric(
+            "failed", float(table["failed"].mean()), better="lower", n=len(table), meaning="share that left its range"
+        )
+    for name in said:
+        values = table[name].dropna()
+        findings.metric(f"{name}_least", float(values.min()), units[name], "lower", len(values))
+        findings.metric(f"{name}_most", float(values.max()), units[name], "lower", len(values))
+
+
+def _answer(
+    command: str, table: pd.DataFrame, axes: Sequence[SweepAxis], said: Sequence[str], units: dict[str, str]
+) -> str:
+    """Where the first metric is least and most, and how often the wrist fails."""
+    text = f"{command} at {table['point'].nunique()} points"
+    if said:
+        sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
+        unit = "" if units[said[0]] == "1" else f" {units[said[0]]}"
+        least, most = (sound.loc[getattr(sound[said[0]], each)()] for each in ("idxmin", "idxmax"))
+        ends = [
+            f"{number(float(row[said[0]]))}{unit} at {', '.join(f'{a.key} = {_told(row[a.key])}' for a in axes)}"
+            for row in (least, most)
+        ]
+        text += f": {said[0]} is least, {ends[0]}, and most, {ends[1]}"
+    for fate, count in _fates(table).items():
+        text += f"; {count} of {len(table)} rollouts: {fate}"
+    return f"{text}."
+
+
+def _fates(table: pd.DataFrame) -> dict[str, int]:
+    """How many rollouts have which mark; a rollout may have several."""
+    if "fate" not in table:
+        return {}
+    from wristctl.simulation.repetitions import MARKS
+
+    counts = Counter(mark for fate in table["fate"] for mark in fate.split(", ") if mark)
+    return {mark: counts[mark] for mark in MARKS if counts[mark]}
+
+
+def _told(value: Any) -> str:
+    return number(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -1,0 +1,76 @@
+"""Figures of a sweep: metrics over what was set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic, with_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DECADES, _BINS = 20.0, 25
+"""Range beyond which an axis is logarithmic; places at which a line of medians is drawn."""
+
+
+def over_key(
+    table: pd.DataFrame, key: str, others: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
+) -> Figure:
+    """Each metric over one key: a dot for each rollout, crosses where the wrist failed, a line of medians.
+
+    What else was swept spreads the dots.
+    """
+    rows = max(1, -(-len(metrics) // 2))
+    made, axes = figure(rows, min(2, max(1, len(metrics))), height=0.4 + 2.3 * rows, sharex=True)
+    values = table[key].to_numpy()
+    named = values.dtype.kind not in "if"
+    places, labels = (
+        (np.unique(values.astype(str), return_inverse=True)[::-1]) if named else (values.astype(float), None)
+    )
+    failed = table["failed"].to_numpy(bool) if "failed" in table else np.zeros(len(table), bool)
+    panels = [each for row in axes.tolist() for each in row]
+    for panel, name in zip(panels, metrics, strict=False):
+        heights = table[name].to_numpy(float)
+        panel.plot(places[~failed], heights[~failed], ".", color=BLUE, markersize=3.0, alpha=0.6)
+        panel.plot(places[failed], heights[failed], "x", color=VERMILLION, markersize=4.0)
+        _medians(panel, places[~failed], heights[~failed])
+        panel.set_ylabel(with_unit(name, units[name]))
+        if _is_wide(heights):
+            logarithmic(panel.yaxis)
+    for panel in axes[-1]:
+        panel.set_xlabel(with_unit(key, units[key]))
+        if labels is not None:
+            panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
+        elif _is_wide(places):
+            logarithmic(panel.xaxis)
+    for panel in panels[len(metrics) :]:
+        panel.set_visible(False)
+    rest = f"; {', '.join(others)} as swept" if others else ""
+    crosses = "; crosses left their range" if failed.any() else ""
+    made.suptitle(f"over {key}{rest}{crosses}", fontsize=10.0)
+    return made
+
+
+def _is_wide(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0.0 and known.max() / known.min() > _DECADES)
+
+
+def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
+    there = np.isfinite(heights)
+    places, heights = places[there], heights[there]
+    if not places.size:
+        return
+    distinct = np.unique(places)
+    edges = distinct if len(distinct) <= _BINS else np.quantile(distinct, np.linspace(0.0, 1.0, _BINS + 1))
+    group = (
+        np.searchsorted(edges, places, side="right") - 1 if len(distinct) > _BINS else np.searchsorted(edges, places)
+    )
+    at = np.unique(group)
+    line = [(float(np.median(places[group == each])), float(np.median(heights[group == each]))) for each in at]
+    panel.plot(*np.array(line).T, color=GREY, linewidth=1.2)

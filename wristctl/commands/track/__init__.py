@@ -1,0 +1,1 @@
+"""`track`: the wrist's angle in a recorded video."""

@@ -1,0 +1,1 @@
+"""`train`: networks from tip position to bending angle."""

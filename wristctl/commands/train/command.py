@@ -1,0 +1,261 @@
+"""Networks from tip position to bending angle."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wristctl.commands.gen_data.command import drawn, samples_of
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.commands.train.results import (
+    best_row,
+    error_table,
+    grid_tables,
+    keep_curves,
+    keep_network,
+    ranking_tables,
+    timing_table,
+    trial_table,
+    trials_frame,
+)
+from wristctl.config.learning import NetworkSettings, TrainSettings
+from wristctl.config.study import Study
+from wristctl.errors import Argument, UserError
+from wristctl.records.files import check_plain
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from wristctl.learning.dataset import Samples, Split
+    from wristctl.learning.network import Network
+    from wristctl.learning.selection import Choice
+    from wristctl.learning.training_result import Job, TrainingResult
+
+
+CHECKPOINTS = "checkpoints"
+
+
+def checkpoints_of(session: Session) -> Path | None:
+    """Where the run keeps its trainings' checkpoints, with those of the run to resume; None without a run."""
+    stopped, run = session.inputs.runs().get("resume"), session.findings.run
+    if run is None:
+        if stopped is not None:
+            raise UserError("a training is resumed in a run directory", "train.resume", Argument("out", metavar="DIR"))
+        return None
+    if stopped is not None and (stopped.path / CHECKPOINTS).is_dir():
+        shutil.copytree(stopped.path / CHECKPOINTS, run.path / CHECKPOINTS, copy_function=_copy_plain)
+    return run.path / CHECKPOINTS
+
+
+def _copy_plain(source: str, target: str) -> None:
+    check_plain(Path(source))
+    shutil.copyfile(source, target)
+
+
+def train_networks(
+    session: Session,
+    samples: Samples,
+    split: Split,
+    wanted: dict[str, NetworkSettings],
+    checkpoints: Path | None,
+) -> dict[str, list[TrainingResult]]:
+    """Every network from every seed; a seed begins all networks alike."""
+    import numpy as np
+
+    from wristctl.learning.training_result import Job
+
+    seeds = [
+        np.random.SeedSequence(session.findings.stream(f"training {trial}"))
+        for trial in range(session.study.train.seeds)
+    ]
+    jobs = [
+        Job(f"{name or 'network'}-{trial}", settings, split, seed, trial)
+        for name, settings in wanted.items()
+        for trial, seed in enumerate(seeds)
+    ]
+    found: dict[str, list[TrainingResult]] = {}
+    for trial in _train_all(session, "training", samples, jobs, checkpoints):
+        found.setdefault(trial.job.name.rpartition("-")[0], []).append(trial)
+    return found
+
+
+def chosen_by_folds(session: Session, samples: Samples, split: Split, checkpoints: Path | None) -> Choice:
+    """The network of the grid that cross-validation chooses. Raises KeyboardInterrupt where it was cut short."""
+    import numpy as np
+
+    from wristctl.learning.selection import candidates, choose, fold_jobs, grid_points
+
+    settings = session.study.train
+    seed = np.random.SeedSequence(session.findings.stream("folds"))
+    jobs = fold_jobs(grid_points(settings), split, settings.grid.folds, seed, split.recording)
+    trials = _train_all(session, "cross-validation", samples, jobs, checkpoints)
+    if len(trials) < len(jobs) or any(trial.interrupted for trial in trials):
+        raise KeyboardInterrupt
+    return choose(candidates(trials, settings.grid.folds))
+
+
+def _train_all(
+    session: Session, what: str, samples: Samples, jobs: list[Job], checkpoints: Path | None
+) -> list[TrainingResult]:
+    """The jobs' trials, with progress and checkpoints."""
+    import numpy as np
+    import torch
+
+    from wristctl.learning.training_processes import train_all
+    from wristctl.learning.training_result import Epoch
+    from wristctl.processes import cores
+
+    settings = session.study.train
+    device = settings.device
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    workers = settings.workers or cores()
+    session.findings.numerics(dtype="float64", torch_threads=1, device=device)
+    epochs = [0] * len(jobs)
+    with session.progress(what, sum(job.settings.epochs for job in jobs), "epochs") as done:
+
+        def report(number: int, epoch: Epoch) -> None:
+            epochs[number] = epoch.epoch
+            done(sum(epochs), rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
+
+        return train_all(samples, jobs, workers, device, checkpoints, report)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Trained(StudyResult):
+    """Networks from tip position [m] to bending angle [rad], and the one of them that is kept."""
+
+    kind = "train"
+
+    network: Network
+    """The one with the least validation loss."""
+    trials: dict[str, list[TrainingResult]]
+    """Every training, by the name of its network."""
+    samples: Samples
+    split: Split
+    choice: Choice | None
+    """What a search over the grid chose, and why; None without one."""
+    measures: pd.DataFrame
+
+    def frame(self) -> pd.DataFrame:
+        """One row per network and seed: its errors on the test samples and elsewhere, losses and epochs."""
+        return self.measures
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """What a run would train; a split that leaves no samples to judge by is an error here."""
+    import numpy as np
+
+    from wristctl.learning.dataset import split_samples
+    from wristctl.learning.selection import grid_points
+
+    settings, samples, held_out, whose = study.train, inputs.read("data", samples_of), None, None
+    count, source = study.gen_data.samples, "samples of its own"
+    if samples is not None:
+        run = inputs.runs().get("data")
+        count, source, held_out = len(samples.theta), run.id if run else "those given", samples.held_out
+        whose = recordings(samples, settings)
+    split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
+    lines = [
+        f"{settings.seeds} x {row.epochs} epochs of a {'-'.join(map(str, row.hidden))} {row.activation} network"
+        + (f" ({name})" if name else "")
+        for name, row in networks(settings).items()
+    ]
+    if settings.search:
+        points, folds = len(grid_points(settings)), settings.grid.folds
+        lines = [f"{points} networks x {folds} folds, then {settings.seeds} x the chosen one"]
+    return "\n".join(
+        [
+            *lines,
+            f"on {source}: {len(split.train)} samples to train on, {len(split.validation)} to choose by, "
+            f"{len(split.test)} to judge by",
+            *([] if split.recording is None else [_shares(split, split.recording)]),
+        ]
+    )
+
+
+def recordings(samples: Samples, settings: TrainSettings) -> NDArray[np.int64] | None:
+    """The recording of each sample where these are what is split, else None."""
+    return samples.recording if settings.split == "recording" else None
+
+
+def _shares(split: Split, whose: NDArray[np.int64]) -> str:
+    import numpy as np
+
+    counts = [len(np.unique(whose[rows])) for rows in (split.train, split.validation, split.test)]
+    return f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"
+
+
+def networks(settings: TrainSettings) -> dict[str, NetworkSettings]:
+    """The networks to train by name: the rows, or the section's own without a name."""
+    if not settings.rows:
+        return {"": _network(settings)}
+    return {row.name: _network(row) for row in settings.rows}
+
+
+def _network(settings: NetworkSettings) -> NetworkSettings:
+    fields = {name: getattr(settings, name) for name in NetworkSettings.model_fields}
+    return NetworkSettings.model_construct(**fields)
+
+
+def train(session: Session) -> Trained:
+    """Train networks from tip position to bending angle."""
+    import numpy as np
+
+    from wristctl.learning.dataset import split_samples
+    from wristctl.learning.evaluation import places
+    from wristctl.learning.training_result import best_of
+
+    settings, findings = session.study.train, session.findings
+    samples = session.inputs.read("data", samples_of)
+    if samples is None:
+        samples = drawn(session.study, findings.stream("samples"), Inputs())
+        findings.arrays("data/samples.npz", samples.arrays())
+    rng = np.random.default_rng(findings.stream("split"))
+    whose = recordings(samples, settings)
+    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out, whose)
+    checkpoints = checkpoints_of(session)
+
+    began, choice, tables = time.perf_counter(), None, []
+    wanted = networks(settings)
+    if settings.search:
+        choice = chosen_by_folds(session, samples, split, checkpoints)
+        wanted = {"": choice.chosen.settings}
+        tables += grid_tables(findings, choice)
+    trials = train_networks(session, samples, split, wanted, checkpoints)
+    seconds = time.perf_counter() - began
+
+    name, own = best_row(trials)
+    kept = best_of(own)
+    keep_network(session, kept.network, name, choice.reason if choice else "")
+    if any(trial.interrupted for each in trials.values() for trial in each):
+        keep_curves(findings, own)
+        raise KeyboardInterrupt  # at once: to judge a network on very many samples takes longer than anybody waits
+    where = places(samples, split)
+    tables.append(trial_table(findings, own, kept))
+    measures = trials_frame(trials, where)
+    tables += ranking_tables(findings, settings, trials, measures)
+    tables.append(error_table(findings, kept, samples, split, where))
+    tables.append(timing_table(findings, kept, samples, split, seconds))
+    if checkpoints:
+        shutil.rmtree(checkpoints, ignore_errors=True)
+    return Trained(session.study, findings, tables, kept.network, trials, samples, split, choice, measures)
+
+
+TRAIN = Procedure(
+    "train",
+    plan,
+    train,
+    (
+        EarlierRun("data", kind="gen-data", optional=True),
+        EarlierRun("resume", kind="train", optional=True, unfinished=True),
+    ),
+)

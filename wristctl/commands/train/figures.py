@@ -1,0 +1,147 @@
+"""Figures of data sets and trainings. Positions are drawn as on an upright wrist: x goes up, y to the right."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import ArrayLike
+
+from wristctl.arrays import Array
+from wristctl.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    darkened,
+    figure,
+    legend,
+    logarithmic,
+    title,
+)
+
+ANGLES, ERRORS = "PuOr", "cividis"
+"""Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright."""
+
+MOST_PATHS = 5000
+"""More dots than this are drawn as pixels, or an SVG would hold a path for each."""
+
+
+def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
+    """Tip positions of a data set, coloured by bending angle; a table with x, y [m] and theta [rad].
+
+    It may be a part of the data set, which has `count` samples.
+    """
+    shown = f"{len(samples)} of {count}" if count not in (None, len(samples)) else f"{len(samples)}"
+    made, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
+    bend = float(np.degrees(samples["theta"].abs().max()))
+    dots = axes.scatter(
+        1e3 * samples["y"],
+        1e3 * samples["x"],
+        c=np.degrees(samples["theta"]),
+        s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
+        cmap=darkened(ANGLES),
+        vmin=-bend,
+        vmax=bend,
+        linewidths=0.0,
+        rasterized=len(samples) > MOST_PATHS,
+    )
+    made.colorbar(dots, ax=axes, label="bending angle [deg]")
+    return made
+
+
+def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
+    """Errors over the epochs, the kept trial bold; a table with trial, epoch, train_loss, validation_loss [rad^2]."""
+    made, ((axes,),) = figure()
+    lines = (("train_loss", BLUE, "training"), ("validation_loss", VERMILLION, "validation"))
+    for trial, rows in curves.groupby("trial"):
+        bold = trial == kept
+        for column, colour, label in lines:
+            rmse = np.degrees(np.sqrt(rows[column]))
+            style = {"label": label, "zorder": 3} if bold else {"linewidth": 0.8, "alpha": 0.35}
+            axes.plot(rows["epoch"], rmse, color=colour, **style)
+    if curves["trial"].nunique() > 1:
+        title(axes, f"trial {kept} was kept; faint: trials that were not")
+    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]", yscale="log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    legend(axes, loc="upper right")
+    return made
+
+
+def predicted_angles(predictions: pd.DataFrame) -> Figure:
+    """The network's angle over the true one, and its error; a table with theta and theta_network [rad]."""
+    true, network = (np.degrees(predictions[name]) for name in ("theta", "theta_network"))
+    made, axes = figure(1, 2, height=3.2)
+    left, right = axes[0]
+    ends = [true.min(), true.max()]
+    left.plot(ends, ends, color=BLACK, linewidth=0.8, label="equal")
+    dots: Any = {"color": BLUE, "marker": ".", "markersize": 4, "linestyle": "", "rasterized": len(true) > MOST_PATHS}
+    left.plot(true, network, label="test samples", **dots)
+    left.set(xlabel="true angle [deg]", ylabel="network's angle [deg]")
+    left.set_box_aspect(1)
+    legend(left, loc="upper left")
+    right.axhline(0.0, color=BLACK, linewidth=0.8)
+    right.plot(true, network - true, **dots)
+    right.set(xlabel="true angle [deg]", ylabel="error of the network [deg]")
+    right.set_box_aspect(1)
+    return made
+
+
+def error_over_workspace(tip: Array, error: Array) -> Figure:
+    """Absolute error of a network on a grid of tips (A, L, 2) [m]; errors (A, L) [rad]."""
+    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[..., 0], 1e3 * tip[..., 1]
+    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, at the circle")
+    image = axes.pcolormesh(y, x, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
+    worst = np.unravel_index(degrees.argmax(), degrees.shape)
+    axes.plot(y[worst], x[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
+    made.colorbar(image, ax=axes, label="absolute error [deg]")
+    return made
+
+
+def errors_at_samples(tip: Array, error: Array) -> Figure:
+    """Absolute error of a network at tips (N, 2) [m] that fill no grid; errors (N,) [rad]."""
+    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[:, 0], 1e3 * tip[:, 1]
+    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, on the test samples")
+    order = np.argsort(degrees)
+    options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(x) > MOST_PATHS}
+    dots = axes.scatter(y[order], x[order], c=degrees[order], **options)
+    made.colorbar(dots, ax=axes, label="absolute error [deg]")
+    return made
+
+
+def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
+    """Cross-validated RMSE over multiply-adds: a table with activation, hidden, multiply_adds, rmse_deg, error_deg."""
+    made, ((axes,),) = figure(height=4.2)
+    colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
+    for colour, (activation, rows) in zip(colours, grid.groupby("activation", sort=False), strict=False):
+        rows = rows.sort_values("multiply_adds")
+        axes.errorbar(
+            rows["multiply_adds"], rows["rmse_deg"], rows["error_deg"], color=colour, marker="o", markersize=4,
+            linewidth=0.8, capsize=2.0, label=str(activation),
+        )  # fmt: skip
+    at = grid.iloc[chosen]
+    axes.plot(at["multiply_adds"], at["rmse_deg"], "o", color=BLACK, fillstyle="none", markersize=12, label="chosen")
+    logarithmic(axes.xaxis)
+    logarithmic(axes.yaxis)
+    axes.set(xlabel="multiply-adds of one angle", ylabel="cross-validated RMSE [deg]")
+    title(axes, "mean over the folds with its standard error")
+    legend(axes, loc="best")
+    return made
+
+
+def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, Axes]:
+    """A figure as tall as a map of these positions [mm] needs at equal scales."""
+    low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
+    width, height = high - low
+    made, ((axes,),) = figure(height=float(np.clip(5.6 * height / width + 1.1, 2.4, 7.0)))
+    edge = 0.04 * width
+    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
+    axes.set(xlabel="y [mm]", ylabel="x [mm]")
+    title(axes, heading)
+    return made, axes

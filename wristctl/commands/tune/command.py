@@ -1,0 +1,307 @@
+"""Gains by search, the same budget and objective for every controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs_of_loops import (
+    check_family_reach,
+    check_inverses,
+    check_reach,
+    family_of,
+    identified,
+    inverses_of,
+    judged_loops,
+    network_for,
+)
+from wristctl.commands.loop_warnings import (
+    asked_by,
+    refuse_out_of_reach,
+    warn_if_coarse,
+    warn_if_it_buckles,
+    warn_out_of_reach,
+)
+from wristctl.commands.printed_table import Table
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Done, Session
+from wristctl.commands.sweep.command import sweepable
+from wristctl.config.controllers import TuneSettings
+from wristctl.config.families import Family
+from wristctl.config.loop import Reference
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError, under
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from wristctl.simulation.size import Size
+    from wristctl.tuning.objective import Judge
+    from wristctl.tuning.search import Search, Tried
+    from wristctl.wrist.kinematics import Inverse
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Tuned(StudyResult):
+    """What the search of each controller found."""
+
+    kind = "tune"
+
+    searches: dict[str, Search]
+    """by controller"""
+    lost: dict[str, dict[str, int]]
+    """by controller, on how many of the cases that its best gains were chosen by they fail, swing, chatter or do not
+    converge; empty where they never do"""
+
+    @property
+    def marks(self) -> list[str]:
+        """Of which controllers the best gains fail, swing, chatter or do not converge in some case."""
+        return [f"{name}: {', '.join(known)}" for name, known in self.lost.items() if known]
+
+    @property
+    def gains(self) -> dict[str, dict[str, float]]:
+        """The best gains, by controller and name, in the units of the controller's table."""
+        return {name: search.gains for name, search in self.searches.items()}
+
+    def frame(self) -> pd.DataFrame:
+        """Every candidate of every search: controller, iteration, candidate, objective, and the gains it has."""
+        import pandas as pd
+
+        from wristctl.tuning.search import history
+
+        tables = {name: history(search) for name, search in self.searches.items()}
+        return pd.concat(tables, names=["controller"]).reset_index("controller").reset_index(drop=True)
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check the controllers' names and say what the search costs."""
+    from wristctl.commands.truth_table import truth_told
+
+    with under("tune"):
+        known = identified(study, "tune", inputs)
+        told = truth_told(known.wrist, judged_loops(study, study.tune))
+        planned = planned_search(study.tune, study.families, known.wrist, inputs)
+    check_family_reach(known, study.tune.worlds.family)
+    return planned + told
+
+
+def planned_search(
+    settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters, inputs: Inputs
+) -> str:
+    """What a search costs. UserError, naming the key, for a controller or a scenario that it cannot have.
+
+    That is an unknown controller, one without gains, a scenario on an unknown loop, an unknown family, or a network
+    that none of the inputs is.
+    """
+    from wristctl.control.table import controller
+    from wristctl.simulation.size import check_size
+    from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
+
+    for number, name in enumerate(settings.controllers):
+        try:
+            check_tunable(controller(name))
+        except UserError as error:
+            raise error.at(f"controllers.{number}") from error
+    try:
+        check_optimiser(settings)
+    except UserError as error:
+        raise error.at(str(error.where).removeprefix("tune.")) from error
+    if settings.worlds.family:
+        family_of(families, settings.worlds.family, "worlds.family")
+    else:
+        check_loops(settings)
+        check_reach([each.reference for each in settings.scenarios], wrist, "scenarios.{}.reference")
+    asked = _size(settings, families)
+    check_size(asked)
+    check_inverses(inverses_of(_references(settings, families)), inputs)
+    one = asked.rollouts // len(settings.controllers)
+    return f"{one} rollouts of {asked.horizon:g} s for each of {', '.join(settings.controllers)}"
+
+
+def size(study: Study) -> Size:
+    """What all its searches run."""
+    return _size(study.tune, study.families)
+
+
+def _size(settings: TuneSettings, families: Mapping[str, Family]) -> Size:
+    from wristctl.simulation.draws import is_random
+    from wristctl.simulation.size import Size
+
+    searched = settings.candidates * settings.iterations * settings.restarts * len(settings.controllers)
+    if settings.worlds.family:
+        family = families[settings.worlds.family]
+        return Size([family.loop], family.horizon, searched * settings.worlds.draws * len(family.references))
+    loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
+    each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
+    return Size(loops, settings.horizon, searched * each)
+
+
+def tune(session: Session) -> Tuned:
+    """Search for gains by rollouts, a whole swarm as one batch."""
+    import numpy as np
+
+    from wristctl.commands.truth_table import truth_tables
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import marks_of
+    from wristctl.tuning.search import tuning_cases
+
+    study = identified(session.study, "tune", session.inputs)
+    loops = judged_loops(study, study.tune).values()
+    warn_if_it_buckles(session.findings, study.wrist, loops)
+    warn_if_coarse(loops)
+    warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
+    network = network_for(session.inputs, study.wrist, loops)
+    found = search_all(session, study, network)
+    searched, chosen = tuning_cases(study, network)
+    cases = chosen or searched
+    lost = {
+        name: marks_of(controller(name), np.array(list(each.gains.values())), cases, study.wrist)
+        for name, each in found.items()
+    }
+    fates = {
+        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in known.items())
+        for name, known in lost.items()
+    }
+    rows = [
+        (name, result.objective, fates[name], result.finalists[0].origin, result.evaluations, _told(result.gains))
+        for name, result in sorted(found.items(), key=lambda each: each[1].objective)
+    ]
+    columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
+    tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
+    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
+    return Tuned(session.study, session.findings, tables, found, lost)
+
+
+def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
+    """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import Judge
+    from wristctl.tuning.search import search, tuning_cases
+
+    settings = study.tune
+    _note_streams(session, study)
+    searched, chosen = tuning_cases(study, network)
+    judge = Judge(searched, study.wrist, settings.objective)
+    choose = Judge(chosen, study.wrist, settings.objective) if chosen else None
+    found: dict[str, Search] = {}
+    try:
+        for name in settings.controllers:
+            total = settings.iterations * settings.restarts
+            with session.progress(f"tuning {name}", total=total, unit="iterations") as done:
+
+                def so_far(result: Search, name: str = name, done: Done = done) -> None:
+                    found[name] = result
+                    done(len(result.tried.values), best=result.objective)
+
+                law, known = controller(name), _known(session, name)
+                found[name] = search(study, law, session.findings.stream, (judge, choose), so_far, known)
+    finally:
+        _keep(session.findings, found, choose or judge)
+    return found
+
+
+def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
+    family = settings.worlds.family
+    return list(families[family].references) if family else [each.reference for each in settings.scenarios]
+
+
+def _note_streams(session: Session, study: Study) -> None:
+    from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.drawn_worlds import streams_of
+    from wristctl.simulation.draws import Draws
+
+    settings = study.tune
+    if settings.worlds.family:
+        name = settings.worlds.family
+        for split in ("tune", "validation"):
+            session.findings.note_streams(streams_of(study.families[name], name, split))
+        return
+    for purpose in ("tuning", "validation"):
+        draws = Draws(study.seed, purpose)
+        for scenario in settings.scenarios:
+            name = scenario_of(scenario.reference, "ulnar")
+            session.findings.note_streams(draws.names([settings.loops[scenario.loop]], [name]))
+
+
+def _known(session: Session, name: str) -> Tried | None:
+    """What the run to resume has tried of a controller."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.search import tried_of
+
+    stopped = session.inputs.runs().get("resume")
+    if stopped is None or not (stopped.path / f"data/history-{name}.csv").exists():
+        return None
+    return tried_of(stopped.data(f"history-{name}"), list(controller(name).gains))
+
+
+def _told(gains: Mapping[str, float]) -> str:
+    return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
+
+
+def _keep(findings: Findings, found: dict[str, Search], judge: Judge) -> None:
+    """Keep what was found, also of a search that was cut short."""
+    from wristctl.commands.tune.figures import convergence, gain_history
+    from wristctl.control.table import controller, write_gains
+    from wristctl.tuning.search import finalists, history
+
+    if not found:
+        return
+    if file := findings.file("data/gains.json"):
+        write_gains(file, {name: result.gains for name, result in found.items()})
+    for name, result in found.items():
+        gains = controller(name).gains
+        units = {k: g.unit or "1" for k, g in gains.items()}
+        counted = dict.fromkeys(("restart", "iteration", "candidate", "objective"), "1")
+        findings.table(f"data/history-{name}.csv", history(result), units=counted | units)
+        if result.finalists:
+            judged = dict.fromkeys(("origin", "objective", "validated"), "1")
+            findings.table(f"data/finalists-{name}.csv", finalists(result), units=judged | units)
+        findings.metric(f"{name}_objective", result.objective, unit="", better="lower", n=result.evaluations)
+        for gain, value in result.gains.items():
+            findings.metric(f"{name}_{gain}", value, unit=gains[gain].unit, better="", meaning=gains[gain].meaning)
+        findings.figure(f"gains-{name}", gain_history, result, gains, caption=f"Gains of {name} over the search")
+        caption = f"What one gain of {name} by itself does to the objective"
+        findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
+    findings.headline(*(f"{name}_objective" for name in sorted(found, key=lambda name: found[name].objective)))
+    findings.figure("convergence", convergence, list(found.values()), caption="Best objective against the budget")
+
+
+TUNE = sweepable(
+    Procedure(
+        "tune",
+        plan,
+        tune,
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
+        ),
+        doubts=refuse_out_of_reach,
+        size=size,
+    )
+)
+
+
+_APART = 1.5
+"""Factor by which gains are less or more."""
+
+
+def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
+    """The tornado of the gains found, judged as they were chosen."""
+    import numpy as np
+
+    from wristctl.commands.tune.figures import gain_sensitivity
+    from wristctl.control.table import controller
+
+    law = controller(name)
+    base = np.array(law.values(gains))
+    tried = np.tile(base, (1 + 2 * len(base), 1))
+    for at in range(len(base)):
+        tried[1 + 2 * at, at] /= _APART
+        tried[2 + 2 * at, at] *= _APART
+    return gain_sensitivity(name, list(law.gains), _APART, judge(law, tried))

@@ -1,0 +1,59 @@
+"""Units of work within a run: given to the session's workers, kept in the run, taken over from one that was stopped."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from wristctl.commands.session import Session
+
+if TYPE_CHECKING:
+    from wristctl.work.fan_out import UnitsDone
+    from wristctl.work.worker import Golden, Unit
+
+
+log = logging.getLogger(__name__)
+
+
+def performed(
+    session: Session, command: str, what: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
+) -> UnitsDone:
+    """Compute a command's units with the session's workers, into the run where there is one, and show how far they are.
+
+    Sizes are `counted` in these. The hashes of laws from elsewhere are part of the units' specifications.
+    """
+    from wristctl.commands.adoption import adoption, sources_in
+    from wristctl.work.executors import Workers
+    from wristctl.work.fan_out import perform_units
+    from wristctl.work.worker import UNITS, Computed, Furnish, code_digest
+
+    run, stopped = session.findings.run, session.inputs.runs().get("resume")
+    folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
+    first = folder is None or not folder.exists()
+    if first and stopped is not None and stopped.manifest.code.tree_sha256 != code_digest():
+        log.warning("%s was made by other code: none of its units can be taken over, all are computed anew", stopped.id)
+    if folder is not None:
+        folder.mkdir(exist_ok=True)
+    furnish = None
+    if sources := sources_in(session.study):
+        units = [replace(each, spec={**each.spec, "sources": sources}) for each in units]
+        furnish = Furnish("wristctl.commands.adoption:adopt", adoption(session.study, command))
+    count = 0
+    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
+
+        def told(unit: Unit, computed: Computed | None) -> None:
+            nonlocal count
+            count += unit.size
+            done(count)
+            if computed is not None:
+                spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
+                session.findings.event("unit", name=unit.name, key=unit.key, **{counted: unit.size}, **spent)
+
+        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
+    if run is not None and stopped is not None:
+        run.took_over(stopped.id, len(found.taken_over), int(found.tried_again is not None))
+    for each in found.poisoned:
+        session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
+    return found

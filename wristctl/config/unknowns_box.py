@@ -1,0 +1,120 @@
+"""What the paper leaves open, as a box: of each leaf a range or named alternatives, and why."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Self
+
+from pydantic import ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from wristctl.config.families import Drawn, drawn_value
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.section import Section, choice, quantity
+from wristctl.config.wrist import WristParameters
+
+MEASURED = ("ideal", "differenced", "observer")
+"""How angle and rate come to the law: as they are, the rate as a difference of angles, or both from the observer."""
+
+_ROOTS = ("wrist", "loop", "reference")
+STRATA = ("loop.plant_segments", "loop.control_period", "measured")
+"""Unknowns that rollouts of one batch share: every combination of them is drawn as often."""
+
+
+class Unstated(Section):
+    """One thing that is not given: values of a leaf, or alternatives that set several leaves; and why so."""
+
+    draw: Drawn | None = None
+    one_of: dict[str, dict[str, Any]] | None = choice(None, "alternatives by name, each with its leaves")
+    unless: dict[str, Any] | None = choice(None, "beside a draw: leaves that do without it")
+    odds: float = choice(0.0, "share of the settings without it", ge=0, lt=1)
+    why: str = choice("", "why this range")
+
+    @model_validator(mode="after")
+    def _is_one_of_both(self) -> Self:
+        if (self.draw is None) == (not self.one_of):
+            raise ValueError("give draw: or one_of:")
+        if bool(self.unless) != (self.odds > 0.0) or (self.unless and self.draw is None):
+            raise ValueError("unless: stands beside draw: and has odds:")
+        return self
+
+    def at(self, share: float) -> tuple[Any, Mapping[str, Any] | None]:
+        """What it is at a share of [0, 1), and the leaves that an alternative sets."""
+        if self.draw is None:
+            assert self.one_of
+            name = list(self.one_of)[min(int(share * len(self.one_of)), len(self.one_of) - 1)]
+            return name, self.one_of[name]
+        if share >= 1.0 - self.odds:
+            return math.inf, self.unless
+        return drawn_value(self.draw, share / (1.0 - self.odds)), None
+
+
+class PaperSetting(NamedTuple):
+    """One point of the box: all that a simulation of the paper has to assume."""
+
+    wrist: WristParameters
+    loop: Loop
+    reference: Reference
+    horizon: float
+    measured: str
+    values: Mapping[str, Any]
+    """Of each unknown, by its name."""
+
+
+class Box(Section):
+    """The unknowns, how many settings are drawn, and over which horizon they run."""
+
+    unknowns: dict[str, Unstated] = choice({}, "what the paper leaves open; experiments/unknowns.yaml has all")
+    draws: int = choice(1008, "settings drawn, each for every controller", ge=8, le=1_000_000)
+    continuous: tuple[int, ...] = choice((100, 25), "settings in nearly continuous time: of one segment, of four")
+    horizon: float = quantity(6.0, "s", "longest horizon", "assumed", gt=0)
+
+    def setting(self, wrist: WristParameters, shares: Mapping[str, float]) -> PaperSetting:
+        """The setting at these shares of each unknown."""
+        data: dict[str, dict[str, Any]] = {"wrist": wrist.model_dump(), "loop": {}, "reference": {}, "": {}}
+        values = {}
+        for name, unknown in self.unknowns.items():
+            values[name], leaves = unknown.at(shares[name])
+            for leaf, value in ({name: values[name]} if leaves is None else leaves).items():
+                root, _, rest = leaf.partition(".")
+                _put(data[root] if root in _ROOTS else data[""], rest if root in _ROOTS else leaf, value)
+        measured, horizon = data[""].pop("measured", "ideal"), data[""].pop("horizon", self.horizon)
+        if data[""]:
+            leaf = next(iter(data[""]))
+            raise PydanticCustomError(
+                "draw", "cannot draw {key}: {why}", {"key": leaf, "why": f"there is no leaf {leaf}"}
+            )
+        loop = Loop.model_validate(data["loop"])
+        if measured == "observer":
+            loop = _observed(loop)
+        wrist = WristParameters.model_validate(data["wrist"])
+        return PaperSetting(wrist, loop, Reference.model_validate(data["reference"]), horizon, measured, values)
+
+    @model_validator(mode="after")
+    def _all_settings_can_be(self) -> Self:
+        for key in self.unknowns:
+            for share in (0.0, 1.0 - 1e-12):
+                try:
+                    found = self.setting(WristParameters(), dict.fromkeys(self.unknowns, 0.5) | {key: share})
+                except ValidationError as error:
+                    why = error.errors()[0]
+                    leaf = ".".join(map(str, why["loc"]))
+                    said = f"there is no leaf {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
+                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": said}) from error
+                if found.measured not in MEASURED or found.horizon > self.horizon:
+                    said = f"measured is one of {', '.join(MEASURED)}, and horizon at most {self.horizon:g} s"
+                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": said})
+        return self
+
+
+def _observed(loop: Loop) -> Loop:
+    """The observer behind a camera without noise, delay or lost frames."""
+    perfect = {"level": "camera", "delay_frames": 0.0, "noise_deg": 0.0, "dropped": 0.0}
+    sensor = loop.sensor.model_copy(update=perfect)
+    return loop.model_copy(update={"sensor": sensor})
+
+
+def _put(data: dict[str, Any], key: str, value: Any) -> None:
+    *sections, leaf = key.split(".")
+    for section in sections:
+        data = data.setdefault(section, {})
+    data[leaf] = value

@@ -1,0 +1,129 @@
+"""What the page's animation plays: the wrist's segment angles over time, as logged."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING, Any
+
+from wristctl.config.wrist import WristParameters
+from wristctl.records.run import Run
+
+if TYPE_CHECKING:
+    import numpy as np
+
+FRAMES = 25.0
+"""Pictures a second; the page interpolates between them."""
+_PLACES = 1e4
+"""Angles are whole numbers of 0.1 mrad: an eighth of a pixel at the tip."""
+
+
+def animation(run: Run) -> dict[str, Any] | None:
+    """Wrist, time step and one course per closed loop of the run, grouped by what it had to follow; None without any.
+
+    A course holds its group, its name, its colour, and per picture the angle of each segment [0.1 mrad] and the wanted
+    angle; pictures end where it diverged. It draws arcs, so that loops of another plant are left out.
+    """
+    if (run.path / "data/trajectories.npz").is_file():
+        courses, time = _compared(run)
+    elif (run.path / "data/trajectory.csv").is_file():
+        courses, time = _single(run)
+    elif run.kind == "hw-run" and (run.path / "data/trials.csv").is_file():
+        courses, time = _trials(run)
+    else:
+        return None
+    if not courses:
+        return None
+    step = max(1, round(1.0 / FRAMES / float(time[1] - time[0])))
+    wrist = run.config.wrist
+    return {
+        "wrist": _wrist(wrist),
+        "step": float(time[step] - time[0]),
+        "duration": float(time[-1] - time[0]),
+        "courses": [_course(*course, step) for course in courses],
+    }
+
+
+def _wrist(wrist: WristParameters) -> dict[str, float]:
+    return {
+        "length": wrist.length,
+        "discs": wrist.discs,
+        "offset": wrist.tendon_offset,
+        "radius": wrist.tendon_radius,
+        "hand": wrist.hand_offset,
+    }
+
+
+Named = tuple[str, str, str, Any, Any]
+
+
+def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
+    table, series = run.data("comparison"), run.array("trajectories")
+    bent = series.get("segment_theta", series["theta"][..., None])
+    many = table["inverse"].nunique() > 1
+    names = [
+        (
+            f"{row.loop}, {row.reference}" + (f", {row.inverse} inverse" if many else ""),
+            f"{row.controller}/{row.gains}",
+            str(row.controller),
+        )
+        for row in table.itertuples()
+    ]
+    arcs = {name for name, loop in run.config.compare.loops.items() if loop.plant.model == "pcc"}
+    drawn = [k for k, loop in enumerate(table["loop"]) if loop in arcs]
+    return [(*names[k], bent[k], series["theta_desired"][k]) for k in drawn], series["time"][0]
+
+
+def _single(run: Run) -> tuple[list[Named], np.ndarray]:
+    import numpy as np
+
+    with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
+        names, *rows = csv.reader(file)
+    numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    table = dict(zip(names, numbers.T, strict=True))
+    own = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
+    settings = getattr(run.config, run.kind.replace("-", "_"))
+    if settings.loop.plant.model != "pcc":
+        return [], table["time"]
+    gains = settings.gains if isinstance(settings.gains, str) else "own gains"
+    name = ("", f"{settings.controller}/{gains}", settings.controller)
+    return [(*name, np.stack([table[each] for each in own], axis=1), table["theta_desired"])], table["time"]
+
+
+def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
+    """Each whole trial on the control grid: the true segments where known, else the estimate as one segment."""
+    import numpy as np
+
+    trials, log = run.data("trials"), run.data("log")
+    arcs = run.config.hw_run.bench.plant.model == "pcc"
+    truth = run.data("truth") if arcs and (run.path / "data/truth.csv").is_file() else None
+    time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
+    courses = []
+    for row in trials[trials["outcome"] == "ok"].to_dict("records"):
+        course = log[log["trial"] == row["trial"]]
+        known = course if truth is None else truth[truth["trial"] == row["trial"]]
+        own = [name for name in known.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
+        bent = np.stack([np.interp(time, known["time"], known[name]) for name in own], axis=-1)
+        wanted = np.interp(time, course["time"], course["theta_desired"])
+        group = row["direction"] + (f", pushed with {row['push']:g} N" if row["push"] else "")
+        name = f"{row['controller']}/{row['gains']}"
+        again = f", repetition {row['repetition']}" if row["repetition"] else ""
+        courses.append((group, name + again, row["controller"], bent, wanted))
+    return courses, time
+
+
+def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np.ndarray, step: int) -> dict[str, Any]:
+    import numpy as np
+
+    from wristctl.plotting.style import colour
+
+    shown = bent[::step, ~np.isnan(bent[0])]
+    whole = np.isfinite(shown).all(axis=1) & (np.abs(shown.sum(axis=1)) < np.pi)
+    shown = shown[: len(shown) if whole.all() else int(np.argmin(whole))]
+    return {
+        "group": group,
+        "name": name,
+        "colour": colour(controller),
+        "diverged": not whole.all(),
+        "theta": np.round(_PLACES * shown).astype(int).tolist(),
+        "wanted": np.round(_PLACES * wanted[::step]).astype(int).tolist(),
+    }

@@ -1,0 +1,286 @@
+"""report.html: one run on one page that needs nothing but a browser."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import math
+import re
+import shlex
+from collections.abc import Sequence
+from functools import cache
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wristctl.errors import Call, UserError
+from wristctl.escape import printable, printable_lines
+from wristctl.plotting.animation import animation
+from wristctl.records.difference import difference
+from wristctl.records.lineage import Ancestor, ancestry
+from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of, read_overview
+from wristctl.records.run import Run
+from wristctl.version import __version__
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+_DIGITS = re.compile(r"\.\d{3,}")
+_PATH = re.compile(r'(?<= d=")[^"]*')
+LARGEST = 300_000
+"""Characters of an SVG beyond which its PNG is smaller and quicker to show."""
+
+
+def inline_figure(svg: Path) -> str:
+    """The figure's address as a data URL, with no more digits than a screen shows; of a large one its PNG's."""
+    text = svg.read_text(encoding="utf-8", errors="replace")
+    text = _PATH.sub(lambda path: _DIGITS.sub(lambda digits: digits[0][:3], path[0]).replace("\n", " "), text)
+    picture = svg.with_suffix(".png")
+    if len(text) > LARGEST and picture.is_file() and not picture.is_symlink():
+        return f"data:image/png;base64,{base64.b64encode(picture.read_bytes()).decode()}"
+    return f"data:image/svg+xml;base64,{base64.b64encode(text.encode()).decode()}"
+
+
+_WIDTH, _HEIGHT, _GAP, _ROW = 192, 44, 44, 60
+_WORDS = {"gen-data": "data", "train": "network", "tune": "gains", "compare": "comparison", "hw-run": "trial"}
+
+
+def lineage_picture(tree: Ancestor) -> str:
+    """SVG markup: each run once, as far left as what it was made from allows; empty where there is nothing behind."""
+    if not tree.inputs:
+        return ""
+    nodes: dict[str, Ancestor] = {}
+    edges: dict[tuple[str, str], str] = {}
+    _collect(tree, nodes, edges)
+    columns = {name: _depth(node) for name, node in nodes.items()}
+    rows: dict[str, int] = {}
+    for name in sorted(nodes, key=lambda name: (columns[name], name)):
+        rows[name] = sum(columns[other] == columns[name] for other in rows)
+    width = (max(columns.values()) + 1) * (_WIDTH + _GAP) - _GAP + 4
+    height = (max(rows.values()) + 1) * _ROW
+    place = {name: (2 + columns[name] * (_WIDTH + _GAP), 6 + rows[name] * _ROW) for name in nodes}
+    parts = [_arrow(place[start], place[end]) for start, end in edges]
+    parts += [_box(node, *place[name], own=name == tree.id) for name, node in nodes.items()]
+    return (
+        f'<svg class="lineage" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" '
+        f'aria-label="lineage">{"".join(parts)}</svg>'
+    )
+
+
+def _collect(node: Ancestor, nodes: dict[str, Ancestor], edges: dict[tuple[str, str], str]) -> None:
+    nodes[node.id] = node
+    for each in node.inputs:
+        edges[each.id, node.id] = each.role
+        _collect(each, nodes, edges)
+
+
+def _depth(node: Ancestor) -> int:
+    return 1 + max(map(_depth, node.inputs)) if node.inputs else 0
+
+
+def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
+    x, y, to_x, to_y = start[0] + _WIDTH, start[1] + _HEIGHT // 2, end[0], end[1] + _HEIGHT // 2
+    middle = to_x - _GAP // 2
+    line = f"M{x} {y}C{middle} {y} {middle} {to_y} {to_x - 6} {to_y}"
+    return f'<path class="edge" d="{line}"/><path class="head" d="M{to_x} {to_y}l-8 -4v8z"/>'
+
+
+def _box(node: Ancestor, x: int, y: int, own: bool) -> str:
+    kind = escape(_WORDS.get(node.kind, node.kind))
+    name = printable(node.id)
+    short = escape(name if len(name) <= 26 else f"{name[:16]} … {name[-6:]}")
+    mark = ' class="own"' * own + ' class="odd"' * (not own and node.state != "ok")
+    state = "" if node.state == "ok" else f" ({escape(node.state)})"
+    return (
+        f"<g{mark}><title>{escape(name)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
+        f"<text x='{x + 10}' y='{y + 18}'>{kind}{state}</text>"
+        f"<text class='id' x='{x + 10}' y='{y + 34}'>{short}</text></g>"
+    )
+
+
+_CARDS = 6
+"""Headline numbers shown where the command names none."""
+
+Figures = list[tuple[str, str, str]]
+"""Name, caption and data URL."""
+
+
+def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
+    """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed.
+
+    `beside` is a folder of figures that were drawn later.
+    """
+    overview, drawn = read_overview(run.path), figures(run, beside)
+    there = {name for name, *_ in drawn}
+    return render(
+        "run.html",
+        heading=run.id,
+        manifest=manifest,
+        command=command_of(manifest.kind),
+        verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
+        answer=overview.answer,
+        headline=_headline(run.metrics, overview.cards),
+        metrics=_metrics(run),
+        tables=tables(run),
+        figures=[each for each in drawn if each[0] != overview.figure],
+        first=[each for each in drawn if each[0] == overview.figure],
+        undrawn=[caption or name for name, caption in overview.captions.items() if name not in there],
+        animation=animation(run),
+        lineage=lineage_picture(ancestry(run, state=manifest.state)),
+        provenance=_provenance(manifest),
+        files=[(each.path, each.bytes, each.sha256, not each.volatile) for each in manifest.outputs],
+        config=run.file(CONFIG).read_text(encoding="utf-8", errors="replace"),
+    )
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from one of the templates; everything is escaped but what they mark as markup."""
+    return _templates().get_template(template).render(version=__version__, **content)
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, FileSystemLoader
+
+    folder = Path(__file__).parent / "templates"
+    made = Environment(
+        loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+    )
+    made.filters["cell"] = _cell
+    scripts = [made.get_template(each.name).render().encode() for each in sorted(folder.glob("*.js"))]
+    hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
+    made.globals["allowed"] = " ".join(f"'sha256-{each}'" for each in hashes)  # no other script runs in a page
+    return made
+
+
+def figures(run: Run, beside: Path | None = None) -> Figures:
+    """Name, caption and data URL of each figure of a run, in reading order where the run has one, then by name."""
+    captions = read_overview(run.path).captions
+    order = {name: at for at, name in enumerate(captions)}
+    folders = [run.path / "figures", *([beside] if beside else [])]
+    files = [file for folder in folders for file in folder.glob("*.svg") if not file.is_symlink()]
+    files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
+    return [(file.stem, captions.get(file.stem) or file.stem.replace("-", " "), inline_figure(file)) for file in files]
+
+
+def _shown(value: Any) -> Any:
+    """What stands in a page, which somebody may look at in a terminal: texts without what that obeys."""
+    return printable_lines(value) if type(value) is str else value
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}" if math.isfinite(value) else "-"
+    return str(value)
+
+
+def _headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
+    """The metrics that the command chose; where it chose none, the first that may be better or worse."""
+    known = {name: each for name, each in metrics.items() if each["value"] is not None}
+    chosen = [name for name in cards if name in known]
+    chosen = chosen or [name for name, each in known.items() if each.get("better")] or list(known)
+    return [(name, known[name]) for name in chosen[:_CARDS]]
+
+
+def _metrics(run: Run) -> list[tuple[Any, ...]]:
+    kept = ("value", "unit", "better", "n", "meaning")
+    return [(name, *(each.get(key) for key in kept)) for name, each in run.metrics.items()]
+
+
+def tables(run: Run) -> list[dict[str, Any]]:
+    """The tables that a command printed or kept: title, columns and rows each."""
+    if not (run.path / TABLES).exists():
+        return []
+    file = run.file(TABLES)
+    try:
+        found = json.loads(file.read_bytes())
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, list) or not all(map(_is_table, found)):
+        again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
+        raise UserError("no tables as wristctl writes them", str(file), again)
+    return found
+
+
+def _is_table(found: object) -> bool:
+    """Whether a page can show it: a title, names of columns and rows of cells."""
+    if not isinstance(found, dict) or not isinstance(found.get("title"), str):
+        return False
+    columns, rows = found.get("columns"), found.get("rows")
+    if not isinstance(columns, list) or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        return False
+    return not any(isinstance(cell, list | dict) for row in (columns, *rows) for cell in row)
+
+
+def _provenance(manifest: Manifest) -> list[tuple[str, str]]:
+    code, machine = manifest.code, manifest.environment
+    commit = f", commit {code.commit[:12]}{' with uncommitted changes' if code.dirty else ''}" if code.commit else ""
+    packages = ", ".join(f"{name} {version}" for name, version in machine.packages.items())
+    return [
+        ("command", shlex.join(manifest.argv)),
+        ("code", f"wristctl {code.version}{commit}, tree {code.tree_sha256[:12]}"),
+        *((f"input {each.role}", f"{each.run}, result {each.result_sha256[:12]}") for each in manifest.inputs),
+        ("configuration", manifest.config_sha256),
+        ("fingerprint", manifest.fingerprint),
+        ("result", manifest.result_sha256 or ""),
+        ("machine", f"{machine.cpu}, {machine.cores} cores, {machine.os}"),
+        ("python", machine.python),
+        ("packages", packages),
+        ("numerics", ", ".join(f"{name} {value}" for name, value in manifest.numerics.items()) or "-"),
+        ("memory, processor time", f"{manifest.timing.max_rss_mb or 0:.0f} MB, {manifest.timing.cpu_s or 0:.1f} s"),
+    ]
+
+
+_TITLES = {
+    "config": "Configuration",
+    "metrics": "Metrics",
+    "code": "Code",
+    "environment": "Environment",
+    "inputs": "Inputs",
+}
+
+
+def several_page(runs: list[Run]) -> str:
+    """The page of several runs, each of them against the first."""
+    rows = [(run.id, run.kind, run.state, run.manifest.timing.started[:19], run.manifest.timing.wall_s) for run in runs]
+    return render(
+        "several.html",
+        heading=" | ".join(run.manifest.label or run.id for run in runs),
+        runs=runs,
+        rows=rows,
+        differences=_differences(runs),
+        pictures=_pictures(runs),
+    )
+
+
+def _differences(runs: list[Run]) -> list[dict[str, Any]]:
+    """A table for each part that differs: a row per leaf or metric, a column per run."""
+    first, *others = runs
+    found = [vars(difference(first, other)) for other in others]
+    tables = []
+    for part, title in _TITLES.items():
+        names = list(dict.fromkeys(change.name for each in found for change in each[part]))
+        rows = []
+        for name in names:
+            changes = [next((change for change in each[part] if change.name == name), None) for each in found]
+            before = next(change.before for change in changes if change)
+            values = [before, *(change.after if change else before for change in changes)]
+            rows.append((name, *(value if part == "metrics" else str(value) for value in values)))
+        if rows:
+            tables.append({"title": title, "columns": ["what", *(run.id for run in runs)], "rows": rows})
+    return tables
+
+
+def _pictures(runs: list[Run]) -> list[tuple[str, Figures]]:
+    """The figures by name, each with one picture per run that has it."""
+    found: dict[str, Figures] = {}
+    for run in runs:
+        for _, caption, picture in figures(run):
+            found.setdefault(caption, []).append((run.id, run.id, picture))
+    return list(found.items())

@@ -1,0 +1,213 @@
+"""One look for all figures: plain axes, units on every axis, colours that colour-blind readers tell apart.
+
+Figures are made without pyplot, so drawing leaves no state behind and needs no display.
+"""
+
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.ticker import LogFormatterSciNotation
+from numpy.typing import NDArray
+
+BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
+ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+"""Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
+INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
+"""From Tol's muted scheme, for what Okabe and Ito's eight do not reach."""
+
+WIDTH = 7.0
+"""Width of a figure [in]; text is 9 to 10 points."""
+
+_CONTROLLERS = {
+    "smc": BLUE,
+    "pid": VERMILLION,
+    "mrac": ORANGE,
+    "gvsc": SKY,
+    "nc": PURPLE,
+    "smc-tracking": INDIGO,
+    "super-twisting": WINE,
+    "computed-torque": GREEN,
+    "feedforward": GREY,
+    "ct-dob": "#1b7837",
+    "mpc": "#8c510a",
+    "adrc": "#c51b7d",
+    "lqi": "#35978f",
+    "nn-mrac": "#bf812d",
+    "pd-ff": "#9970ab",
+    "pid-ff": "#5aae61",
+    "pid-dob": "#4575b4",
+    "smc-dob": "#762a83",
+}
+_OTHERS = (OLIVE, FOREST, ROSE)
+WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
+"""Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own."""
+THIN: dict[str, Any] = {"color": BLACK, "linewidth": 0.7}
+"""Line style of what differs a little from a line beside it: seen, not so; acting, not commanded."""
+DOTTED: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
+SIMULATED: dict[str, Any] = {"linewidth": 1.0, "linestyle": ":"}
+DISTORTED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
+STRAIGHT: dict[str, Any] = {"color": BLUE, "linewidth": 1.0}
+_DASHES: dict[str, Any] = {
+    "tuned": "-",
+    "default": "-",
+    "stepper": (0, (9, 1)),
+    "exchanged": (0, (5, 1.5)),
+    "printed": (0, (1.2, 1.2)),
+    "initial": (0, (5, 1.5, 1.2, 1.5)),
+}
+_OTHER_DASHES = (0, (8, 1.5, 1.2, 1.5, 1.2, 1.5))
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.4}
+
+
+_PAPER: ContextVar[float | None] = ContextVar("_PAPER", default=None)
+"""Width [in] that figures are drawn for now; None: their own."""
+_SMALLEST, _PRINTED = 0.72, 6.0
+"""How much smaller letters are in a column, and the width [in] below which that is one."""
+
+
+@contextmanager
+def for_paper(width: float | None) -> Iterator[None]:
+    """Within the block figures are laid out for this width [in], with letters as a journal prints them."""
+    token = _PAPER.set(width)
+    try:
+        yield
+    finally:
+        _PAPER.reset(token)
+
+
+def columns_within(wanted: int, each: float) -> int:
+    """How many of the wanted panels stand side by side, where each needs this width [in] beside 1.5 for names."""
+    return max(1, min(wanted, int(((_PAPER.get() or WIDTH) - 1.5) / each)))
+
+
+def fit(made: Figure) -> None:
+    """Give a figure that was laid out for a narrow column letters and marks of that size."""
+    width = _PAPER.get()
+    if width is None or width >= _PRINTED:
+        return
+    for text in made.findobj(Text):
+        text.set_fontsize(_SMALLEST * float(text.get_fontsize()))
+    for axes in made.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            for which in ("major", "minor"):
+                size = axis.get_tick_params(which).get("labelsize", 9.0)
+                axis.set_tick_params(which=which, labelsize=_SMALLEST * float(size))
+    for drawn in made.findobj(Line2D):
+        drawn.set_linewidth(_SMALLEST * drawn.get_linewidth())
+        drawn.set_markersize(_SMALLEST * drawn.get_markersize())
+
+
+def figure(
+    rows: int = 1, cols: int = 1, *, width: float = WIDTH, height: float | None = None, **subplots: Any
+) -> tuple[Figure, NDArray[np.object_]]:
+    """A figure of width x height [in] and its axes, always as an array (rows, cols).
+
+    `subplots` goes to Figure.subplots: sharex, sharey, width_ratios, height_ratios. Without a height every
+    row gets 0.55 of its axes' width, at least 1.8 in.
+    """
+    paper = _PAPER.get()
+    tall = rows * max(1.8, 0.55 * width / cols) if height is None else height
+    if paper is not None:
+        tall, width = tall * max(0.85, min(1.0, paper / width)), paper
+    made = Figure(figsize=(width, tall), layout="constrained")
+    axes = made.subplots(rows, cols, squeeze=False, **subplots)
+    for each in axes.flat:
+        dress(each)
+    return made, axes
+
+
+def dress(axes: Axes) -> None:
+    """Open frame and pale grid, set on the axes itself: ticks are made when drawn, outside any rc context."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(which="both", labelsize=9.0)
+    axes.grid(True, color=LIGHT, linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def undress(axes: Axes) -> None:
+    """No grid, frame or tick marks: for drawings and images."""
+    axes.grid(False)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(which="both", length=0.0)
+
+
+class PowersOfTen(LogFormatterSciNotation):
+    """Powers of ten such as 10⁻³ as plain text: to parse them as formulas takes longer than to draw all the rest."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula: str = super().__call__(x, pos)
+        plain = formula.replace(r"$\mathdefault{", "").replace(r"\times", "\u00d7").replace("}$", "").rstrip("}")
+        base, _, power = plain.removesuffix("\u00d710^{0").partition("^{")
+        return base + power.translate(_RAISED)
+
+
+def logarithmic(axis: Axis) -> None:
+    """Give an axis a logarithmic scale in powers of ten."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
+    axis.set_major_formatter(PowersOfTen())
+    axis.set_minor_formatter(PowersOfTen())
+
+
+def title(axes: Axes, text: str) -> None:
+    """A title at the left edge, no larger than the labels."""
+    axes.set_title(text, loc="left", fontsize=10.0)
+
+
+def with_unit(name: str, unit: str) -> str:
+    """A quantity's label; what has no unit is a name alone."""
+    return name if unit in ("", "1") else f"{name} [{unit}]"
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """A frameless legend inside the axes."""
+    axes.legend(**_LEGEND | options)
+
+
+def legend_below(figure: Figure, columns: int = 3) -> None:
+    """One legend for all axes of a figure, below them, each label once."""
+    found = [axes.get_legend_handles_labels() for axes in figure.axes]
+    handles = {label: handle for pair in found for handle, label in zip(*pair, strict=True)}
+    legend_under(figure, list(handles.values()), columns, list(handles))
+
+
+def legend_under(figure: Figure, handles: Sequence[Any], columns: int, labels: Sequence[str] | None = None) -> None:
+    """A legend of these below a figure's axes, in as many columns as there is room for."""
+    if not handles:
+        return
+    names = list(labels) if labels else [str(each.get_label()) for each in handles]
+    letter = 0.075 * (_SMALLEST if _PAPER.get() is not None and figure.get_figwidth() < _PRINTED else 1.0)
+    room = int(figure.get_figwidth() / (letter * (max(map(len, names)) + 8)))
+    place = {"loc": "outside lower center", "ncols": max(1, min(columns, len(handles), room))}
+    figure.legend(list(handles), names, **_LEGEND | place)
+
+
+def colour(controller: str) -> str:
+    """The controller's colour, the same in every figure; one without its own gets a colour by its name."""
+    return _CONTROLLERS.get(controller) or _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
+
+
+def line(label: str) -> dict[str, Any]:
+    """Line style of "controller/gains": colour by controller, dashes by gains."""
+    controller, _, gains = label.partition("/")
+    return {"color": colour(controller), "linestyle": _DASHES.get(gains or "default", _OTHER_DASHES)}
+
+
+def darkened(name: str) -> Colormap:
+    """A diverging map whose middle is not lost on white paper."""
+    colours = mpl.colormaps[name](np.linspace(0.0, 1.0, 256))
+    middle = 1.0 - 0.45 * np.exp(-((np.linspace(-1.0, 1.0, 256) / 0.35) ** 2))
+    colours[:, :3] *= middle[:, None]
+    return ListedColormap(colours)

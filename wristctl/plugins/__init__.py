@@ -1,0 +1,1 @@
+"""Code from elsewhere: found, trusted, loaded and hashed."""

@@ -1,0 +1,142 @@
+"""Code that a study names by its place, path/to/file.py:NAME, or by an entry point: where it is from, and loaded."""
+
+import os
+import sys
+import traceback
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from wristctl.config.foreign import Foreign, is_reference, split
+from wristctl.errors import UserError, meant
+from wristctl.interrupt import from_outside
+from wristctl.plugins.import_hook import digest_now, imported, root_of
+from wristctl.plugins.trust import run_around, trusted
+
+_PACKAGE = os.path.join(Path(__file__).parents[1], "")
+
+
+def placed(value: Any, document: Path | None) -> Any:
+    """The data of a study with its references made whole: relative ones count from the document, or else from here.
+
+    Raises UserError where the document is part of a run and names code that is not.
+    """
+    if isinstance(value, dict):
+        return {key: placed(each, document) for key, each in value.items()}
+    if isinstance(value, tuple):
+        return tuple(placed(each, document) for each in value)
+    if not isinstance(value, str) or not is_reference(value):
+        return value
+    file, attribute = split(value)
+    whole = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
+    if document:
+        check_within(whole, document)
+    return f"{whole}:{attribute}"
+
+
+def check_within(named: Path, document: Path) -> None:
+    """Raises UserError where a document that is part of a run names code, or another document, outside the run."""
+    home = run_around(document)
+    if home and not named.resolve().is_relative_to(home.resolve()):
+        fix = "name it in a study file of your own"
+        raise UserError("the configuration of a run names code outside the run", str(named), fix)
+
+
+def check_trust(leaves: Iterable[Any], document: Path | None = None) -> None:
+    """Ask whether the code that the leaves of a document name may be loaded, and load none of it. Raises UserError."""
+    for each in placed(tuple(leaves), document):
+        for name in each if isinstance(each, tuple) else (each,):
+            if isinstance(name, str) and is_reference(name):
+                file, _ = split(name)
+                trusted(file, root_of(file))
+
+
+_loaded: dict[Path, tuple[ModuleType, dict[Path, str]]] = {}
+
+
+def load(reference: str) -> tuple[Any, Foreign]:
+    """The object that a reference names, and where it is from. A source that was changed is read again.
+
+    Raises UserError where there is no such file or name, where it cannot be imported, and where it lies in a run and
+    nobody has said that it may be loaded.
+    """
+    given, attribute = split(reference)
+    file = Path(os.path.abspath(given.expanduser()))
+    if not file.is_file():
+        raise UserError(f"no file {file.name}", str(file), "check the path: it counts from the file that names it")
+    known = _loaded.get(file)
+    if known is None or any(digest_now(each) != digest for each, digest in known[1].items()):
+        known = _loaded[file] = imported(file)
+    module, files = known
+    if not hasattr(module, attribute):
+        own = {name: each for name, each in vars(module).items() if not name.startswith("_")}
+        names = [name for name, each in own.items() if not callable(each) and not isinstance(each, ModuleType)]
+        raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
+    return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
+
+
+@contextmanager
+def contained(what: str, where: str) -> Iterator[None]:
+    """Within the block, which runs code from elsewhere, all that it raises is the user's error: SystemExit too.
+
+    Only Ctrl-C passes. `what` failed, at `where` unless the error knows its place.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, UserError) or from_outside(error):
+            raise
+        told = f"{what} failed: {type(error).__name__}: {error}".rstrip(": ")
+        raise UserError(told, raised_at(error) or where, "mend it there; --debug shows more") from error
+
+
+def raised_at(error: BaseException) -> str:
+    """FILE:LINE where code from elsewhere has raised an error: the innermost place that is not the package's."""
+    places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
+    return next((each for each in places[::-1] if not each.startswith((_PACKAGE, "<"))), "")
+
+
+def installed(module: ModuleType, attribute: str) -> Foreign:
+    """Where an object of an installed package is from: its module, with all that is loaded of the package."""
+    package = module.__name__.partition(".")[0]
+    own = [each for name, each in list(sys.modules.items()) if name == package or name.startswith(f"{package}.")]
+    names = [str(getattr(each, "__file__", None)) for each in own]
+    files = [Path(each) for each in names if each.endswith(".py")]
+    file = Path(str(module.__file__))
+    root = file.parents[module.__name__.count(".") + (file.name == "__init__.py")]
+    return Foreign(file, attribute, {each: digest_now(each) for each in sorted(files)}, root)
+
+
+@cache
+def _of(group: str) -> Mapping[str, Sequence[Any]]:
+    """Each name's entry points, which should be one."""
+    from importlib.metadata import entry_points
+
+    found: dict[str, list[Any]] = {}
+    for each in entry_points(group=group):
+        if each.value not in [known.value for known in found.setdefault(each.name, [])]:
+            found[each.name].append(each)
+    return found
+
+
+def entry_point_names(group: str) -> Sequence[str]:
+    """The names of a group."""
+    return tuple(_of(group))
+
+
+def entry_point(group: str, name: str) -> tuple[Any, Foreign]:
+    """The object behind the one entry point of this name, and where it is from.
+
+    Raises UserError where several packages have one of this name, and where it cannot be loaded.
+    """
+    found = _of(group)[name]
+    if len(found) > 1:
+        where = ", ".join(f"{each.dist.name if each.dist else '?'} ({each.value})" for each in found)
+        raise UserError(f"{len(found)} installed packages have a '{name}' in {group}", where, "uninstall all but one")
+    (only,) = found
+    with contained(f"loading the entry point '{name}'", f"{group}: {only.value}"):
+        made = only.load()
+    return made, installed(sys.modules[only.module], only.attr)

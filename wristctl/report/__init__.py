@@ -1,1 +1,0 @@
-"""Figures and tables of results; knows results, not where they are stored."""

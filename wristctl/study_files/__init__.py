@@ -1,0 +1,1 @@
+"""Study files: strict YAML, overrides, sweeps, errors with their place, and the study written out in full."""

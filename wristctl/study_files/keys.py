@@ -1,0 +1,76 @@
+"""Which keys a study file may hold, and what stands behind each."""
+
+from collections.abc import Sequence
+from types import NoneType, UnionType
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from wristctl.config.section import OneOf, Section
+from wristctl.config.study import Study
+from wristctl.study_files.strict_yaml import KeyPath
+
+
+def keys_of(kind: Any) -> dict[str, FieldInfo]:
+    """The fields of a section by the keys they have in a file; empty where `kind` is no section."""
+    if not (isinstance(kind, type) and issubclass(kind, Section)):
+        return {}
+    return {field.alias or name: field for name, field in kind.model_fields.items()}
+
+
+def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
+    """The annotation at a key path (None where the schema has none), and the last field passed on the way."""
+    kind: Any = Study
+    field: FieldInfo | None = None
+    for key in path:
+        if known := keys_of(kind):
+            field = known.get(str(key))
+            kind = _given(field.annotation) if field else None
+        else:
+            items = [item for item in get_args(kind) if item is not ...]
+            kind = items[-1] if items else None
+    return kind, field
+
+
+def _given(annotation: Any) -> Any:
+    """The annotation of a leaf that is given: `X | None` is X."""
+    others = [each for each in get_args(annotation) if each is not NoneType]
+    return others[0] if isinstance(annotation, UnionType) and len(others) == 1 else annotation
+
+
+SUBJECTS = {"analyse": "simulate"}
+"""Commands that work on what another command's section describes: its keys are theirs too."""
+
+
+def section_keys(command: str | None) -> dict[str, FieldInfo]:
+    """The keys of a command's own section and of the one that it works on; empty where it has none."""
+    sections = [SUBJECTS[command], command] if command in SUBJECTS else [command] if command else []
+    return {key: field for section in sections for key, field in keys_of(field_at((section,))[0]).items()}
+
+
+def home_of(command: str, key: str) -> str:
+    """The section in which a command finds one of its keys."""
+    return command if key in keys_of(field_at((command,))[0]) else SUBJECTS.get(command, command)
+
+
+def unit_of(field: FieldInfo) -> str:
+    """The unit a leaf was declared with, empty where it has none."""
+    return _declared(field, "unit")
+
+
+def choices_of(field: FieldInfo) -> Sequence[str]:
+    """The names that a leaf may have, where they are few and known: those of a table, or of a Literal."""
+    tables = [each.table for each in field.metadata if isinstance(each, OneOf)]
+    if tables:
+        return tuple(name for name in tables[0] if tables[0].belongs(name))
+    return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+
+
+def source_of(field: FieldInfo) -> str:
+    """Where a leaf's default comes from, empty where that is not said."""
+    return _declared(field, "source")
+
+
+def _declared(field: FieldInfo, what: str) -> str:
+    extra = field.json_schema_extra
+    return str(extra.get(what, "")) if isinstance(extra, dict) else ""

@@ -1,0 +1,206 @@
+"""Sweeps: a leaf of a study at many values, as a list, a range or a distribution."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from itertools import product
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
+
+from wristctl.config.families import Range
+from wristctl.config.section import OpenSection, Section
+from wristctl.config.study import Study
+from wristctl.errors import Argument, UserError, meant
+from wristctl.study_files.keys import home_of, keys_of, section_keys, unit_of
+from wristctl.study_files.strict_yaml import parse_yaml
+
+MOST_POINTS = 1_000_000
+_EXAMPLE = "KEY=1,2,3 or KEY=0.05..0.12:20, KEY=8e3..4e4 log:20, KEY=~0..3:100, KEY=~normal(0.6, 0.05):100"
+_COUNTED = re.compile(r"(~?)\s*(.+?)\s*:\s*([0-9]+)")
+_NORMAL = re.compile(r"normal\(\s*([-+0-9.e]+)\s*,\s*([-+0-9.e]+)\s*\)", re.IGNORECASE)
+
+
+class SweepAxis(NamedTuple):
+    """A leaf and what it is set to in turn."""
+
+    key: str
+    """With its section, as simulate.loop.control_period."""
+    values: tuple[Any, ...]
+    drawn: bool
+    """At random: such axes are drawn together, point by point; all others are multiplied."""
+    text: str
+    """As it was given."""
+
+    @property
+    def where(self) -> Argument:
+        """The option."""
+        return Argument("sweep", self.text)
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """The key's parts."""
+        return tuple(self.key.split("."))
+
+
+def axes_of(study: Study, command: str) -> list[SweepAxis]:
+    """The axes of the study's `sweep`. UserError for one that cannot be read, and for more points than MOST_POINTS."""
+    found, counted = list[SweepAxis](), list[tuple[str, int, bool]]()
+    for text in study.sweep:
+        key, equals, given = text.partition("=")
+        if not equals or not key.strip() or not given.strip():
+            raise UserError("a sweep is KEY=VALUES", Argument("sweep", text), _EXAMPLE)
+        parts = key.strip().split(".")
+        if parts[0] in section_keys(command):
+            parts.insert(0, home_of(command, parts[0]))
+        name = ".".join(parts)
+        if name in [each.key for each in found]:
+            raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
+        counted.append((text, *_count(text, given)))
+        if _points([(many, drawn) for _, many, drawn in counted], text) > MOST_POINTS:
+            many = _points([(many, drawn) for _, many, drawn in counted], text)
+            what = f"a sweep of {many:.3g} points is more than {MOST_POINTS:g}"
+            raise UserError(what, Argument("sweep", text), "fewer values, or drawn ones with ~ in place of all")
+        found.append(SweepAxis(name, _values(text, given, name, study.seed), counted[-1][2], text))
+    return found
+
+
+def points_of(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
+    """The values of all axes at every point: drawn ones together, all others multiplied, the last the fastest."""
+    grids = [each for each in axes if not each.drawn]
+    drawn = [each for each in axes if each.drawn]
+    together = list(zip(*(each.values for each in drawn), strict=True)) if drawn else [()]
+    found = []
+    for grid in product(*(each.values for each in grids)):
+        for at in together:
+            values = {each.key: value for each, value in zip([*grids, *drawn], [*grid, *at], strict=True)}
+            found.append(tuple(values[each.key] for each in axes))
+    return found
+
+
+def study_at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any]) -> Study:
+    """The study at a point. UserError, naming the leaf, for one that it does not have and a value that cannot be."""
+    for axis, value in zip(axes, values, strict=True):
+        try:
+            study = _changed(study, axis.path, value, axis)
+        except (ValidationError, PydanticCustomError) as error:
+            why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
+            raise UserError(f"{axis.key} cannot be {value!r}: {why}", axis.where, "other values") from error
+    return study
+
+
+def unit_at(begin: Section, path: Sequence[str]) -> str:
+    """The unit of the leaf on this path from a section; 1 where it has none."""
+    section: Any = begin
+    field = None
+    for part in path:
+        if not isinstance(section, Section):
+            return "1"
+        field = keys_of(type(section)).get(part)
+        if field is None:
+            added = section.added() if isinstance(section, OpenSection) else {}
+            return (added[part].unit if part in added else "") or "1"
+        section = getattr(section, _names(type(section))[part])
+    return (unit_of(field) if field else "") or "1"
+
+
+def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -> Any:
+    """The section with a leaf at another value; only what lies on the way to it is made anew, and checked."""
+    head, *rest = path
+    if isinstance(section, Section):
+        fields = _names(type(section))
+        extra = section.model_extra or {}
+        if head not in fields and head not in extra and not (hasattr(section, "added") and head in section.added()):
+            raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, fields))
+        name = fields.get(head, head)
+        own = getattr(section, name, None)
+        new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
+        if not rest and isinstance(own, Section):
+            raise UserError(f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(own)))}")
+        if rest and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
+            return section.model_copy(update={name: new})
+        # all that it has, since what is left out would be a default, copied deeply
+        made = type(section).model_validate({**section.__dict__, **extra, name: new}, by_name=True)
+        object.__setattr__(made, "__pydantic_fields_set__", section.model_fields_set | {name})
+        return made
+    if isinstance(section, Mapping) and (head in section or rest):
+        if head not in section:
+            raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, map(str, section)))
+        new = _changed(section[head], tuple(rest), value, axis) if rest else _alike(section[head], value)
+        return {**section, head: new}
+    if isinstance(section, tuple) and head.isdigit() and int(head) < len(section):
+        own = section[int(head)]
+        new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
+        return (*section[: int(head)], new, *section[int(head) + 1 :])
+    raise UserError(f"there is no leaf {axis.key}", axis.where, "one that `--dry-run` shows")
+
+
+@cache
+def _names(kind: type[Section]) -> dict[str, str]:
+    """The names of a section's fields by the keys that they have in a file."""
+    return {field.alias or name: name for name, field in kind.model_fields.items()}
+
+
+def _alike(known: Any, value: Any) -> Any:
+    """A whole number where the leaf holds one, and a number with a point where it holds such."""
+    if isinstance(known, float) and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if isinstance(known, int) and not isinstance(known, bool) and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value
+
+
+def _count(text: str, given: str) -> tuple[int, bool]:
+    """How many values, and whether they are drawn."""
+    found = _COUNTED.fullmatch(given.strip())
+    if found is None:
+        return len(_listed(text, given)), False
+    many = int(found[3])
+    if many < 1:
+        raise UserError("a sweep of no values", Argument("sweep", text), _EXAMPLE)
+    return many, bool(found[1])
+
+
+def _points(counts: Sequence[tuple[int, bool]], text: str) -> int:
+    drawn = {many for many, drawn in counts if drawn}
+    if len(drawn) > 1:
+        what = f"drawn leaves go together, and {' and '.join(map(str, sorted(drawn)))} values do not"
+        raise UserError(what, Argument("sweep", text), "the same number of each")
+    return math.prod([many for many, drawn in counts if not drawn]) * (drawn.pop() if drawn else 1)
+
+
+def _values(text: str, given: str, key: str, seed: int) -> tuple[Any, ...]:
+    found = _COUNTED.fullmatch(given.strip())
+    if found is None:
+        return _listed(text, given)
+    drawn, source, many = bool(found[1]), found[2], int(found[3])
+    shares: Any
+    import numpy as np
+
+    from wristctl.seeds import stream
+
+    rng = np.random.default_rng(stream(seed, f"sweep {key}"))
+    if drawn and (normal := _NORMAL.fullmatch(source)):
+        return tuple(map(float, rng.normal(float(normal[1]), abs(float(normal[2])), many)))
+    shares = rng.random(many) if drawn else np.linspace(0.0, 1.0, many)
+    try:
+        between = Range.read(source)
+    except PydanticCustomError as error:
+        raise UserError(
+            f"{source!r} is neither a range nor a distribution", Argument("sweep", text), _EXAMPLE
+        ) from error
+    return tuple(between.at(float(share)) for share in shares)
+
+
+def _listed(text: str, given: str) -> tuple[Any, ...]:
+    if ".." in given:
+        raise UserError("a range says how many values it has", Argument("sweep", text), _EXAMPLE)
+    try:
+        found = tuple(parse_yaml(each.strip(), "").data for each in given.split(","))
+    except UserError as error:
+        raise error.at(Argument("sweep", text)) from error
+    if any(each is None for each in found):
+        raise UserError("a value is missing", Argument("sweep", text), _EXAMPLE)
+    return found

@@ -1,0 +1,99 @@
+"""What must be so before motors move, and how they are stopped."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from wristctl.board.board_errors import BoardError
+from wristctl.board.driver import Board
+from wristctl.board.messages import Command, Configure, Flag, Hello, Limits, State, Status
+from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
+from wristctl.interrupt import undisturbed
+from wristctl.trial.spools import spools_of
+from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.testbeds import Testbed
+from wristctl.trial.tracking import Tracking
+
+_PATIENCE = 0.5
+"""Seconds within which motors at any speed have ramped down."""
+
+
+class Halt(NamedTuple):
+    """How the motors were stopped."""
+
+    verified: bool
+    """Whether the board's own status says that nothing moves."""
+    how: str
+    status: Status | None
+    seconds: float
+    """From the decision to stop until they stood."""
+
+
+def halt(board: Board, watchdog: float) -> Halt:
+    """Stop the motors, first by a ramp, else by an emergency stop; never raises for a board that does not answer."""
+    began = board.transport.now()
+    said = []
+    for command in (Command.STOP, Command.ESTOP):
+        try:
+            try:
+                board.send(command)
+            except BoardError as error:  # in a fault it has stopped already: its status is what counts
+                said.append(str(error.what))
+            status = _standing(board, began + _PATIENCE)
+        except BoardError as error:
+            said.append(str(error.what))
+            continue
+        if status is not None:
+            how = f"{command.name}, board {status.state.name}"
+            return Halt(True, how, status, board.transport.now() - began)
+    why = said[-1] if said else "still moving"
+    fallback = f"{why}; the board stops by itself {1e3 * watchdog:.0f} ms after the last command, else cut motor power"
+    return Halt(False, fallback, None, board.transport.now() - began)
+
+
+def _standing(board: Board, deadline: float) -> Status | None:
+    """The status once nothing moves, None if it still does at the deadline."""
+    while True:
+        status = board.read()
+        if Flag.MOVING not in status.flags:
+            return status
+        if board.transport.now() > deadline:
+            return None
+        board.transport.wait(0.005)
+
+
+@contextmanager
+def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tuple[Board, Hello, Tracking]]:
+    """The connected board, how it greeted, and the camera; at the end the drives are released and the testbed closed.
+
+    Where that comes by an error the motors are stopped before, and verified to stand. Raises SafetyStop, BoardError and
+    CameraError.
+    """
+    board = Board(testbed.transport)
+    try:
+        hello = board.connect()
+        try:
+            patience = Patience(board)
+            testbed.face(settings.plane, patience.pulse)
+            tracking = testbed.tracking()
+            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            testbed.confirm(patience.pulse)
+            yield board, hello, tracking
+        except BaseException:
+            with undisturbed():
+                board.close(emergency=not halt(board, settings.safety.watchdog).verified)
+            raise
+        board.close()
+    finally:
+        testbed.close()
+
+
+def prepare(board: Board, settings: RigSettings) -> None:
+    """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on."""
+    limits, spools = settings.safety, spools_of(settings.actuator)
+    if board.read().state == State.FAULT:
+        board.clear()
+    furthest = round(limits.travel / spools.step)
+    ramps = Configure(limits.watchdog, int(limits.hold), round(spools.acceleration))
+    board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4))
+    board.enable()

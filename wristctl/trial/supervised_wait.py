@@ -1,0 +1,121 @@
+"""Waiting beside a wrist at rest: nothing moves meanwhile, and what goes wrong ends the wait at once."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.board.driver import Board
+from wristctl.board.messages import State, Status
+from wristctl.trial.camera_pace import CameraPace
+from wristctl.trial.safety import Monitor, SafetyStop
+from wristctl.trial.spools import Paths
+from wristctl.trial.tracking import Tracking
+
+Meanwhile = Callable[[], None]
+"""A moment of waiting: comes back soon, to be called again, and raises what ends the wait."""
+
+_PULSE = 0.02
+"""Seconds between two looks at a board that waits, and signs of life to it."""
+_LOOK = 0.05
+"""Seconds between two looks at a wrist that stands."""
+_READING = 2.0
+"""Seconds within which the marker must be read."""
+
+
+class Reading(NamedTuple):
+    """The marker of a wrist that stands."""
+
+    theta: float
+    """Its angle [rad]."""
+    size: float
+    """Over the base's; nan where it is not measured."""
+
+
+class Patience:
+    """Waits beside a board that is to stay as it stands when this is made: its link is kept alive, its status judged.
+
+    Whoever waits hears of a fault, a restart or a step within 0.1 s: Faulted, Restarted, NoAnswer, PortLost or
+    SafetyStop. `judge` is shown every status too, and may raise.
+    """
+
+    def __init__(self, board: Board, judge: Callable[[Status], None] = lambda status: None) -> None:
+        self._board, self._judge = board, judge
+        self._stood = board.read()
+        self.pace = CameraPace()
+        """Of the pictures looked at here."""
+
+    def pulse(self, longest: float = _PULSE) -> None:
+        """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
+        status = self._board.read()
+        self._see(status)
+        self._judge(status)
+        self._board.ping()
+        self._board.transport.wait(min(longest, _PULSE))
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self._board.transport.now() + seconds
+        while (left := end - self._board.transport.now()) > 0.0:
+            self.pulse(left)
+
+    def angle(self, tracking: Tracking, frames: int) -> float:
+        """Median marker angle [rad] of the next usable frames. Raises SafetyStop where none come."""
+        return self.reading(tracking, frames).theta
+
+    def reading(self, tracking: Tracking, frames: int) -> Reading:
+        """Medians of the next usable frames. Raises SafetyStop where none come."""
+        found: list[tuple[float, float]] = []
+        tracking.look()
+        began = self._board.transport.now()
+        while len(found) < frames:
+            self.pulse()
+            for seen in tracking.look():
+                self.pace.add(seen)
+                if seen.time >= began and math.isfinite(seen.theta):
+                    found.append((seen.theta, seen.size))
+            if self._board.transport.now() - began > _READING:
+                why, fix = self.pace.missing(self._board.transport.now(), _READING)
+                raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
+        theta, size = np.median(found, axis=0)
+        return Reading(float(theta), float(size))
+
+    def _see(self, status: Status) -> None:
+        stood = self._stood
+        if status.state != stood.state:
+            if status.state == State.FAULT:
+                raise self._board.faulted(status)
+            self._board.see_restart()
+            raise SafetyStop(f"the board is {status.state.name}, not {stood.state.name}", fix="home again")
+        if status.state == State.ENABLED and status.position != stood.position:
+            steps = [now - before for now, before in zip(status.position, stood.position, strict=True)]
+            what = f"the motors moved by {steps} steps while they were to stand"
+            raise SafetyStop(what, fix="report it, with the log: this is a bug")
+
+
+class InSight:
+    """Judges a standing wrist by its marker, for as long as that is seen without a gap.
+
+    After a gap a hand has covered the marker, or moved it: until it is read anew, what it shows is no evidence.
+    """
+
+    def __init__(
+        self, tracking: Tracking, monitor: Monitor, paths: Paths, now: Callable[[], float], signs: np.ndarray
+    ) -> None:
+        self._tracking, self._monitor, self._paths, self._now, self._signs = tracking, monitor, paths, now, signs
+        self._seen = self._looked = now()
+
+    def __call__(self, status: Status) -> None:
+        """Raises SafetyStop where the wrist is bent, or its tendons are pulled, beyond the limits."""
+        now = self._now()
+        if now - self._looked < _LOOK:
+            return
+        self._looked, looked = now, self._tracking.look()
+        if now - self._seen > self._monitor.stale:
+            return
+        reeled = self._signs * np.array(status.position, float)
+        for seen in looked:
+            if math.isfinite(seen.theta):
+                self._seen = seen.time
+                self._monitor.standing(seen.theta, reeled, self._paths.taut(seen.theta)[0])
