@@ -19,7 +19,7 @@ from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import RECORDED, Span, run_blocks
 from wristctl.simulation.motion import Angles, Motion
-from wristctl.simulation.observer import Schedule
+from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
@@ -152,7 +152,7 @@ class LoopTicks:
     def _shift_frame(self, tick: int, lane: int) -> bool:
         """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
         watch = self._batch.state.watch
-        if watch is None:
+        if not isinstance(watch, Watch):
             return False
         taken = int(watch.turn[0, 0, 0])
         if self._frames().captures[taken] != tick:
@@ -185,7 +185,8 @@ class LoopTicks:
     def _frames(self) -> Schedule:
         """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
         never = np.zeros((1, 0, 1), np.int64), *np.zeros((2, 1, 1), np.int64)
-        schedule = self._batch.world.schedule or Schedule(*never)
+        schedule = self._batch.world.schedule
+        schedule = schedule if isinstance(schedule, Schedule) else Schedule(*never)
         return Schedule(*(each[0, ..., 0] for each in schedule))
 
     def _parts(self, tick: int) -> Iterator[StatePart]:
@@ -197,7 +198,7 @@ class LoopTicks:
     def _count_to(self, tick: int) -> None:
         """Set the camera's counters to what they are before a tick."""
         watch, frames = self._batch.state.watch, self._frames()
-        if watch is not None:
+        if isinstance(watch, Watch):
             taken, arrived = (int(np.searchsorted(each, tick)) for each in (frames.captures, frames.arrivals))
             watch.turn[:, 0], watch.turn[:, 1] = taken, arrived
             watch.observer.at[:] = frames.dated[arrived - 1]

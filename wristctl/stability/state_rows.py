@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.simulation.actuator import LAGGED, TENDON
+from wristctl.simulation.actuator import IdealDrive, SpoolDrive
 from wristctl.simulation.batch import Batch
-from wristctl.wrist.elastic import OF_A_TENDON, PATH
+from wristctl.simulation.observer import Watch
+from wristctl.wrist.elastic import OF_A_TENDON, PATH, PulledTendons, RealTendons
 
 _ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
 """Typical sizes [rad, rad/s, N, m], by which small changes are measured."""
@@ -39,22 +40,24 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
 
     What was delivered and the frames under way come as they are counted back from the tick.
     """
-    state, level, k = batch.state, batch.setup.level, len(batch.setup.coordinates)
+    state, drive, k = batch.state, batch.world.drive, len(batch.setup.coordinates)
     yield StatePart("memory", state.memory, np.arange(memory), np.ones(memory))
     yield StatePart("angle", state.coordinates, np.arange(k), np.full(k, _ANGLE))
     yield StatePart("rate", state.coordinates, np.arange(k, 2 * k), np.full(k, _RATE))
-    size = _LENGTH if level == TENDON else _PULL
-    if level in (LAGGED, TENDON):
+    size = _LENGTH if isinstance(drive, SpoolDrive) else _PULL
+    if not isinstance(drive, IdealDrive):
         yield StatePart("motor", state.motors, np.array([0, 2]), np.full(2, size))
-    if state.tendons is not None:
-        own = len(OF_A_TENDON)
-        count = (state.tendons.shape[1] - PATH - k) // own
-        yield StatePart("path", state.tendons, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
+    if isinstance(state.tendons, RealTendons):
+        rows, own = state.tendons.state, len(OF_A_TENDON)
+        count = (rows.shape[1] - PATH - k) // own
+        yield StatePart("path", rows, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
         bristles = PATH + own * np.arange(count)
-        yield StatePart("bristle", state.tendons, bristles, np.ones(count))
-        yield StatePart("tendon creep", state.tendons, bristles + 1, np.full(count, _LENGTH))
-        yield StatePart("spring creep", state.tendons, PATH + own * count + np.arange(k), np.full(k, _ANGLE))
-    if state.watch is not None:
+        yield StatePart("bristle", rows, bristles, np.ones(count))
+        yield StatePart("tendon creep", rows, bristles + 1, np.full(count, _LENGTH))
+    if isinstance(state.tendons, (PulledTendons, RealTendons)):
+        rows = state.tendons.state
+        yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))
+    if isinstance(state.watch, Watch):
         observer, taken = state.watch.observer, int(state.watch.turn[0, 0, 0])
         sizes = np.array([_ANGLE, _RATE, _ANGLE])
         yield StatePart("estimate", observer.now, np.arange(3), sizes)

@@ -11,6 +11,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import predict
@@ -55,6 +56,6 @@ class BlindModel:
 
 @kernel
 def _predict(observer: Any, drive: Any, model: Any, plus: float, minus: float, h: float) -> None:
-    known = load_segments(rows_of(model))
-    zero = 0.0 * known.length
-    predict(observer, drive, known, 0, plus + zero, minus + zero, h)
+    believed = load_segments(rows_of(model))
+    zero = zero_like(believed.length)
+    predict(observer, drive, believed, 0, plus + zero, minus + zero, h)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import dot, planar, turn
+from wristctl.lanes.lane import dot, planar, turn, zero_like
 from wristctl.lanes.rows import planes_like
 from wristctl.wrist.chain import spring
 
@@ -29,7 +29,7 @@ def residual_jacobians(
     velocity, force = planes_like(z), planes_like(z)
     field, sweep, own_field, own_sweep = planes_like(z), planes_like(z), planes_like(z), planes_like(z)
     weight = planar(segment.gravity_x, segment.gravity_y)
-    spin = 0.0 * segment.length
+    spin = zero_like(segment.length)
     spin_rate = spin
     p, v, a = planar(spin, spin), planar(spin, spin), planar(spin, spin)
     for k in range(n):
