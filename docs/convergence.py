@@ -205,9 +205,8 @@ def page(found: list[Drawn], rows: dict[str, tuple[int, int, list[Changed]]], li
     limit cycle. Steps given by hand stay, and are marked alike. `tune` verifies in this way only gains that would be
     its best: it never ends with what the step makes good, and may pass over what the step makes bad."""
     limit = """A 30 deg minimum jerk in 1 s, ideal measurement; above the limit a held tick turns the tip too far and
-    the wrist stays (`wristctl/comparison/held_tick.py`). One integration step a tick put the limit too low: an earlier
-    version of these pages said that 60 N at 1 kHz do not move four segments. Within some newtons of it the RMSE is
-    chaotic."""
+    the wrist stays (`wristctl/comparison/held_tick.py`). Within some newtons of it the RMSE is chaotic. One step a tick
+    puts the limit elsewhere, and we believed it: [what we corrected](corrected.md)."""
     lines += [
         "",
         *textwrap.wrap(" ".join(how.split()), 120),

@@ -6,11 +6,13 @@ The plants of the table, and one from elsewhere.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.registry import CPUDispatcher
 
 from tests.bench.conftest import TAUT, HostOn, host_on
 from wristctl.config.bench import BenchSettings, WeakenedPlant
@@ -19,6 +21,7 @@ from wristctl.config.plant import Actuator, Disturbances, Plant, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.lanes.compiled import sources
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -131,8 +134,25 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
     assert np.isfinite(theta).all() and (theta[-1] == theta[-100]).all()
 
 
-def test_every_plant_is_registered_under_its_own_name(model: PlantModel) -> None:
-    assert PLANTS[model.name] is model and Path(sys.modules[model.parameters.__module__].__file__ or "") == model.source
+def _reached(functions: Iterable[CPUDispatcher]) -> set[Path]:
+    """Files of these compiled functions and of all that they call, as numba finds them: by name where they stand."""
+    seen, waiting = set[CPUDispatcher](), list(functions)
+    while waiting:
+        function = waiting.pop()
+        if function not in seen:
+            seen.add(function)
+            code, names = function.py_func.__code__, function.py_func.__globals__
+            called = [names.get(name) for name in code.co_names]
+            waiting += [value for value in called if isinstance(value, CPUDispatcher)]
+    return {Path(function.py_func.__code__.co_filename) for function in seen}
+
+
+def test_every_plant_is_registered_and_its_kernels_go_by_all_that_they_call(model: PlantModel) -> None:
+    assert PLANTS[model.name] is model
+    assert Path(sys.modules[model.parameters.__module__].__file__ or "") in model.sources
+    files = {file for source in model.sources for file in sources(source)}
+    called = _reached(value for value in vars(model).values() if isinstance(value, CPUDispatcher))
+    assert called <= files and len(called) > 1
 
 
 def test_on_the_bench_it_comes_to_rest_and_the_other_side_is_its_mirror_image(

@@ -4,7 +4,8 @@ The hand is a point mass, so turning the tip about it is held back by the damper
 turns the tip by 2 c F (q / D + h / (2 M)) / (P3 / P1) times what the law's own limit of rate, P3 / P1, would: from
 about 1 on the sign turns every tick, the mean torque is none, and the wrist stays. q = 1 - mean(j)^2 / mean(j^2) over
 the segments' lever arms j to the hand, M the inertia of one segment, h the period. Ours, found and tried by rollouts
-(docs/best_case.md); it needs a tick that lasts longer than the fast modes, 0.1 ms.
+(docs/best_case.md), whose limits are 3 to 10 % higher (docs/convergence.md), the more so the longer the period; it needs
+a tick that lasts longer than the fast modes, 0.1 ms, and knows nothing of the size of the move.
 """
 
 from __future__ import annotations

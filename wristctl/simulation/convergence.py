@@ -1,9 +1,10 @@
 """Whether a rollout's integration step is short enough, and how short it has to be where it is not.
 
-A rollout is in doubt in two cases. RODAS3 carries an embedded solution of second order; where a loop is smooth the sum
-of its differences over all steps is far above the error of the angle, so that a small sum clears a rollout. It is large
-where a torque jumps from limit to limit at every tick, where a wrist is light or a period long. What it cannot see are
-the kinks of friction, backlash and end stops: with these a loop whose tensions keep swinging is in doubt as well.
+A rollout is in doubt in two cases. RODAS3 carries an embedded solution of second order: the sum of the differences over
+all steps, without their share in modes that die out within a step, is above the error of the angle where forces change
+smoothly, so that a small sum clears a rollout. It cannot see what happens between: a torque that jumps from limit to
+limit at every tick, and the kinks of friction, backlash and end stops. There a loop whose tensions keep swinging is in
+doubt as well.
 
 A rollout in doubt runs again with 2, 4, 8, ... times as many steps, until its numbers stay what they are.
 """
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
+from wristctl.simulation.oscillation import FASTEST
 from wristctl.simulation.outcome import Outcome
 
 FINER = (2, 4, 8, 16, 32, 64)
@@ -28,11 +30,12 @@ HALF = 0.5
 """Share of that by which it may still change when the step is halved."""
 AT_THE_END = 10.0
 """How many times as much the mean error at the end may: of a wrist that swings there the horizon cuts off a part."""
-DOUBT, KINKS = 3.0, 8.0
+DOUBT, KINKS = 4.0, 8.0
 """Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
 times as much where forces have kinks, which the estimate takes for errors."""
 SWINGS = 2.0
-"""How often tensions go through their whole range and back, from which a loop with kinks is in doubt [1/s]."""
+"""How often tensions go through their whole range and back, from which a loop with kinks is in doubt [1/s]; loops
+without are where they chatter (FASTEST)."""
 
 Rollouts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -44,18 +47,18 @@ def tolerance(angles: Array) -> Array:
     return sizes
 
 
-def _swinging(outcome: Outcome) -> Mask:
-    """Rollouts whose tensions keep swinging, (count,)."""
+def _swinging(outcome: Outcome, kinked: Mask) -> Mask:
+    """Rollouts whose tensions swing so often that the steps' estimated errors miss what matters, (count,)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         swings = outcome.metrics["chattering"] / (2.0 * outcome.metrics["peak_tension"])
-    keep: Mask = swings > SWINGS
-    return keep
+    often: Mask = swings > np.where(kinked, SWINGS, FASTEST)
+    return often
 
 
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
     most: Array = DOUBT * np.where(kinked, KINKS, 1.0) * tolerance(outcome.metrics["rmse"])
-    return (outcome.step_error > most) | (kinked & _swinging(outcome))
+    return (outcome.step_error > most) | _swinging(outcome, kinked)
 
 
 def agree(one: Outcome, other: Outcome) -> Mask:
@@ -101,13 +104,13 @@ def settled(
         before, fine = outcome.rows(given), run(given, 2)
         outcome.drift[given] = np.where(agree(before, fine), 0.0, _difference(before, fine))
     before, earlier = outcome.rows(left), outcome.rows(left)
-    stayed, chaotic = np.zeros(len(left), bool), kinked[left] & _swinging(before)
+    stayed, chaotic = np.zeros(len(left), bool), kinked[left] & _swinging(before, kinked[left])
     for times in FINER:
         if not len(left) or stop.is_set():
             return outcome
         fine = run(left, times)
         same = agree(before, fine)
-        chaotic &= _swinging(fine) & ~same
+        chaotic &= _swinging(fine, kinked[left]) & ~same
         given_up = chaotic if times > FINER[0] else np.zeros(len(left), bool)
         if times == FINER[-1]:
             given_up = ~(same & stayed)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba.core.registry import CPUDispatcher
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
 
 from wristctl.arrays import Array
@@ -67,9 +68,11 @@ class PlantModel:
             implements(function, self.parameters)(getattr(self, function.__name__))
 
     @property
-    def source(self) -> Path:
-        """The file that defines it."""
-        return Path(str(sys.modules[self.parameters.__module__].__file__))
+    def sources(self) -> tuple[Path, ...]:
+        """The files that define its parameters and each of its compiled functions, sorted."""
+        functions = [value for value in vars(self).values() if isinstance(value, CPUDispatcher)]
+        modules = {self.parameters.__module__, *(function.py_func.__module__ for function in functions)}
+        return tuple(sorted(Path(str(sys.modules[module].__file__)) for module in modules))
 
     def rest(self, wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
         """`equilibrium`, and a UserError where the plant cannot tell it."""
@@ -200,8 +203,8 @@ def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
 
 @cache
 def kernel_of(function: Any, model: PlantModel) -> Any:
-    """A function of Python as a kernel that moves plants of this model; its cache goes by that one's source too."""
-    return kernel(function, model.source)
+    """A function of Python as a kernel that moves plants of this model; its cache goes by that one's sources too."""
+    return kernel(function, *model.sources)
 
 
 class Pose(NamedTuple):
