@@ -13,8 +13,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, now_of, signals_of, wrist_of
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.wrist.allocation import allocate, reach
+from wristctl.wrist.elastic import NoTendons
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments, segments
 
@@ -64,7 +66,7 @@ def _run(
         torque = law(now_of(now), wrist_of(model), rows_of(gains), kept)
         row[0], row[1], row[2] = angle, rate, torque
         plus, minus = allocate(angle, known, torque, bound[0], bound[1])
-        step(wrist, theta, omega, (plus, minus), None, period + 0.0 * angle)
+        step(wrist, theta, omega, (plus, minus), NoTendons(), period + zero_like(angle))
 
 
 def _closed_loop(

@@ -123,9 +123,9 @@ def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_ar
 
 
 def _decorated(node: ast.FunctionDef) -> bool:
-    return any(
-        isinstance(each, ast.Name) and each.id in ("compiled", "spelled_out", "kernel") for each in node.decorator_list
-    )
+    used = (each.func if isinstance(each, ast.Call) else each for each in node.decorator_list)
+    compiling = ("compiled", "spelled_out", "kernel", "by_type", "implements")
+    return any(isinstance(each, ast.Name) and each.id in compiling for each in used)
 
 
 def _is_kernel(argument: ast.expr, call: ast.Call) -> TypeGuard[ast.Name]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip, maximum, minimum
-from wristctl.lanes.lane import dot, exp2i, floor, planar, polynomial, rounded, sqrt, turn, where
+from wristctl.lanes.lane import dot, exp2i, floor, planar, polynomial, rounded, sqrt, turn, where, zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.lanes.types import LANES
 
@@ -50,6 +50,13 @@ def _arithmetic(given: Any, out: Any) -> None:
     result[17] = minimum(a, b)
     result[18] = maximum(a, 3)
     result[19] = _cubic(1e-3 * a)
+
+
+@kernel
+def _zeros(given: Any, out: Any) -> None:
+    row, result = rows_of(given), rows_of(out)
+    result[0] = zero_like(row[0])
+    result[1] = row[1] + zero_like(row[0])
 
 
 @kernel
@@ -115,6 +122,16 @@ def test_arithmetic_is_that_of_doubles_and_a_product_beside_a_sum_is_rounded_onc
     np.testing.assert_array_equal(found, np.array([expected(*map(float, row)) for row in given]))
     plain = given[:, 0] * given[:, 1] + given[:, 2]
     assert count == 1 or (found[:, 5] != plain).any() or (found[:, 9] != plain).any()
+
+
+@COUNTS
+def test_zero_is_0_beside_whatever_number(count: int) -> None:
+    given = drawn(count, 3)
+    given[::3, 0], given[1::3, 0], given[2::3, 0] = np.nan, -np.inf, -1.0
+    given[-1, 0] = -np.inf
+    found = run(_zeros, given, 2)
+    assert found[:, 0].tobytes() == np.zeros(count).tobytes()
+    np.testing.assert_array_equal(found[:, 1], given[:, 1])
 
 
 @settings(max_examples=60)

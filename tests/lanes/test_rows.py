@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from wristctl.lanes.compiled import kernel
+from wristctl.lanes.compiled import by_type, implements, kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.parts import block_of, replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_named, rows_of, square_like
 from wristctl.lanes.types import LANES
@@ -22,8 +23,12 @@ class Motor(NamedTuple):
     torque: Any
 
 
+class NoCamera(NamedTuple):
+    """A part that is absent."""
+
+
 class Parts(NamedTuple):
-    """Arrays by block, an array of one block, a number, nothing, and a NamedTuple of its own."""
+    """Arrays by block, an array of one block, a number, an absent part, and a NamedTuple of its own."""
 
     state: Any
     shared: Any
@@ -71,6 +76,27 @@ def _add(parts: Any, block: int) -> None:
     rows_of(own.motor.speed)[0] = rows_of(own.state)[0]
 
 
+@by_type
+def _heard(part: Any, x: Any) -> Any:
+    """What a part makes of a number."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_heard, NoCamera)
+def _nothing(part: Any, x: Any) -> Any:
+    return zero_like(x)
+
+
+@implements(_heard, Motor)
+def _fast(part: Any, x: Any) -> Any:
+    return part.speed * x
+
+
+@kernel
+def _hear(part: Any, given: Any, out: Any) -> None:
+    rows_of(out)[0] = _heard(part, rows_of(given)[0])
+
+
 def numbers(rows: int, wide: tuple[int, ...]) -> Any:
     return np.random.default_rng(0).normal(size=(rows, *wide))
 
@@ -94,11 +120,22 @@ def test_tuples_are_read_by_their_own_order_and_changed_by_name(wide: tuple[int,
 @WIDE
 def test_a_block_takes_its_own_part_and_one_block_is_every_blocks(wide: tuple[int, ...]) -> None:
     motor = Motor(np.zeros((3, 1, *wide)), 7)
-    parts = Parts(np.ones((3, 1, *wide)), np.full((1, 1, *wide), 4.0), 0.5, None, motor)
+    parts = Parts(np.ones((3, 1, *wide)), np.full((1, 1, *wide), 4.0), 0.5, NoCamera(), motor)
     for block in (0, 2):
         _add(parts, block)
     assert [float(each.flat[0]) for each in parts.state] == [3.0, 1.0, 3.0]
     assert [float(each.flat[0]) for each in motor.speed] == [3.0, 0.0, 3.0]
+
+
+@WIDE
+def test_a_body_follows_from_the_type_of_the_part_and_a_part_without_one_is_refused(wide: tuple[int, ...]) -> None:
+    given, out = numbers(1, wide), np.empty((1, *wide))
+    _hear(Motor(2.0, 1.0), given, out)
+    np.testing.assert_array_equal(out, 2.0 * given)
+    _hear(NoCamera(), given, out)
+    np.testing.assert_array_equal(out, 0.0 * given)
+    with pytest.raises(TypingError, match="_heard"):
+        _hear(Parts(1.0, 1.0, 1.0, 1.0, 1.0), given, out)
 
 
 def test_rows_are_views_of_contiguous_doubles_and_of_nothing_else() -> None:

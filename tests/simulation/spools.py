@@ -10,10 +10,11 @@ from scipy.optimize import brentq, fsolve
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import nonideal_of, unmoved, worn
+from wristctl.simulation.nonideal import nonideal_of, spools_after_slip, unmoved
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.elastic import Tendons, pulls_along, read_nonideal, spool_pull
+from wristctl.wrist.elastic import RealTendons, pulls_along, read_nonideal, spool_pull
 from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import kernel_of, parameters_of, travel
@@ -65,14 +66,14 @@ def _spooled(
     cut: Any,
 ) -> None:
     segment, n = parameters_of(model, rows_of(parameters)), len(cut)
-    zero = 0.0 * segment.length
-    tendons = Tendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory))
+    zero = zero_like(segment.length)
+    tendons = RealTendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory))
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive, before = 1.0 + zero, (reeled[0, 0] + zero, reeled[0, 1] + zero)
     for k in range(reeled.shape[0]):
         path, turned = travel(segment, q), (reeled[k, 0] + zero, reeled[k, 1] + zero)
         speeds = (turned[0] - before[0]) / h, (turned[1] - before[1]) / h
-        given = worn(tendons, turned, speeds, k * h + zero, path)
+        given = spools_after_slip(tendons, turned, speeds, k * h + zero, path)
         before = turned
         row = rows_of(out[k])
         row[4] = spool_pull(tendons, given[0], 0, path[0])

@@ -13,7 +13,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import Drive, actuate, at_rest, drive_of
+from wristctl.simulation.actuator import Drive, IdealDrive, LaggedDrive, SpoolDrive, actuate, at_rest, drive_of
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -32,7 +32,7 @@ def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float
         result[0], result[1] = actuate(drive, motors, known, command[2], command[0], command[1], h)
 
 
-def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
+def delivered(drive: Drive, commands: np.ndarray) -> np.ndarray:
     """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
     out = np.zeros((len(commands), 2))
     _drive(
@@ -41,10 +41,10 @@ def delivered(drive: Drive | None, commands: np.ndarray) -> np.ndarray:
     return out
 
 
-def driven(actuator: Actuator) -> Drive:
-    found = drive_of(actuator)
-    assert found is not None
-    return found
+def driven(actuator: Actuator) -> LaggedDrive | SpoolDrive:
+    drive = drive_of(actuator)
+    assert not isinstance(drive, IdealDrive)
+    return drive
 
 
 def run(

@@ -20,8 +20,9 @@ from wristctl.control.response import Controlled, respond
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import Drive, actuate, read_motor, winding_of
+from wristctl.simulation.actuator import actuate, drive_in_lanes, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
@@ -118,26 +119,24 @@ def column(done: Batch, name: str) -> np.ndarray:
 @kernel
 def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: Any, out: Any) -> None:
     """What `run_blocks` does of one lane without a plant: frames and their dates are given."""
-    known, drive = load_segments(rows_of(world.model)), Drive(setup.level, read_motor(rows_of(world.motor)))
+    believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
     bound, motor, target = rows_of(world.limits), rows_of(state.motors), rows_of(scratch.target)
     low, high = TENDONS_PER_SIDE * bound[0], TENDONS_PER_SIDE * bound[1]
-    zero, view = 0.0 * low, now_of(scratch.now)
+    zero, view = zero_like(low), now_of(scratch.now)
     for tick in range(out.shape[0]):
         for value in range(3):
             target[value] = course.references[0, value, tick] + zero
-        seen = sense(world.schedule, state.watch, drive, known, tick, zero, zero, setup.period)
-        wanted, _, _, plus, minus = respond(control, known, seen, (low, high), 0.0, setup.period)
+        estimate = sense(state.watch, world.schedule, drive, believed, tick, zero, zero, setup.period)
+        wanted, _, _, plus, minus = respond(control, believed, estimate, (low, high), 0.0, setup.period)
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
-        counted_plus, counted_minus = actuate(drive, motor, known, view.theta_ref, plus, minus, setup.period)
-        go_on(state.watch, drive, known, tick, counted_plus, counted_minus, setup.period)
+        counted_plus, counted_minus = actuate(drive, motor, believed, view.theta_ref, plus, minus, setup.period)
+        go_on(state.watch, drive, believed, tick, counted_plus, counted_minus, setup.period)
 
 
 def only(values: Any) -> Any:
     """The only block of named arrays of blocks."""
-    if values is None:
-        return None
     return type(values)(*(map(only, values))) if hasattr(values, "_fields") else values[0]
 
 

@@ -14,10 +14,11 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of, square_like
 from wristctl.wrist.dynamics import equation_of_motion
-from wristctl.wrist.elastic import travel
+from wristctl.wrist.elastic import NoTendons, travel
 from wristctl.wrist.hinges import HINGES, Hinges
 from wristctl.wrist.integrator import step
 from wristctl.wrist.pcc import PCC
@@ -46,7 +47,7 @@ def _steps(parameters: Any, state: Any, h: float, count: int, cut: Any) -> None:
     plant, rows, n = _read(rows_of(parameters)), rows_of(state), len(cut)
     q, rate, pulls = part(rows, 0, cut), part(rows, n, cut), beyond(rows, 2 * n)
     for _ in range(count):
-        step(plant, q, rate, (pulls[0], pulls[1]), None, h + 0.0 * pulls[0])
+        step(plant, q, rate, (pulls[0], pulls[1]), NoTendons(), h + zero_like(pulls[0]))
 
 
 def terms(values: Array, q: Array, rate: Array, pulls: Array) -> tuple[Array, Array, Array]:

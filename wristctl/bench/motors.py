@@ -15,9 +15,10 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import electrical_turn, worn_tendon
-from wristctl.wrist.elastic import Tendons, read_nonideal, spool_pull
+from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
+from wristctl.wrist.elastic import RealTendons, read_nonideal, spool_pull
 from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.plant import disturbed, parameters_of, travel
 
@@ -170,8 +171,8 @@ def follow(
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
-    zero = 0.0 * reeled[0]
-    tendons = Tendons(hanging.stiffness + zero, read_nonideal(rows_of(hanging.nonideal)), rows_of(hanging.tendons))
+    zero = zero_like(reeled[0])
+    tendons = RealTendons(hanging.stiffness + zero, read_nonideal(rows_of(hanging.nonideal)), rows_of(hanging.tendons))
     ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
     at = 0
     for k in range(acting.shape[0]):
@@ -182,18 +183,18 @@ def follow(
         _turn(spools, motor, hanging.stiffness)
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
-        given = (
-            worn_tendon(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),
-            worn_tendon(tendons, 1, reeled[behind] - levers[behind] * bent[0], zero, time, path[1], 1.0),
-            worn_tendon(tendons, 2, reeled[ahead_too] - levers[ahead_too] * bent[0], zero, time, path[0], 1.0),
-            worn_tendon(tendons, 3, reeled[behind_too] - levers[behind_too] * bent[0], zero, time, path[1], 1.0),
+        on_spools = (
+            tendon_after_slip(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),
+            tendon_after_slip(tendons, 1, reeled[behind] - levers[behind] * bent[0], zero, time, path[1], 1.0),
+            tendon_after_slip(tendons, 2, reeled[ahead_too] - levers[ahead_too] * bent[0], zero, time, path[0], 1.0),
+            tendon_after_slip(tendons, 3, reeled[behind_too] - levers[behind_too] * bent[0], zero, time, path[1], 1.0),
         )
-        pull[ahead] = spool_pull(tendons, given[0], 0, path[0])
-        pull[behind] = spool_pull(tendons, given[1], 1, path[1])
-        pull[ahead_too] = spool_pull(tendons, given[2], 2, path[0])
-        pull[behind_too] = spool_pull(tendons, given[3], 3, path[1])
+        pull[ahead] = spool_pull(tendons, on_spools[0], 0, path[0])
+        pull[behind] = spool_pull(tendons, on_spools[1], 1, path[1])
+        pull[ahead_too] = spool_pull(tendons, on_spools[2], 2, path[0])
+        pull[behind_too] = spool_pull(tendons, on_spools[3], 3, path[1])
         _bend_across(spools, across, hanging.stiffness)
-        advance_or_stop(plant, q, rate, given, tendons, PERIOD + zero, 1.0 + zero)
+        advance_or_stop(plant, q, rate, on_spools, tendons, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]
         for axis in range(AXES):

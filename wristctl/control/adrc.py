@@ -5,7 +5,7 @@ from typing import Any
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.functions import clip, expm1_of_negative
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 
 _STARTED, _ANGLE, _RATE, _LOAD = range(4)
 
@@ -34,7 +34,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     wanted = now.acceleration_ref - wc * (2.0 * (rate - now.rate_ref) + wc * (angle - now.theta_ref)) - load
     torque = wanted / effect
     push = effect * clip(torque, now.torque_low, now.torque_high) + load
-    memory[_STARTED] = 1.0 + 0.0 * h
+    memory[_STARTED] = 1.0 + zero_like(h)
     memory[_ANGLE] = angle + h * (rate + 0.5 * h * push)
     memory[_RATE] = rate + h * push
     memory[_LOAD] = load

@@ -9,7 +9,7 @@ from typing import Any
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, expm1_of_negative
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 
 VALUES = 3
 """Memory that it needs: the load that it has found, the momentum that it expects, and whether it has begun."""
@@ -24,7 +24,7 @@ def disturbance(now: Any, wrist: Any, bandwidth: Any, memory: Any, at: int) -> A
     period's load.
     """
     inertia, _, _ = one_segment_terms(wrist, now.theta)
-    gained = where(memory[at + 2] > 0.0, inertia * now.rate - memory[at + 1], 0.0 * now.rate)
+    gained = where(memory[at + 2] > 0.0, inertia * now.rate - memory[at + 1], 0.0)
     return memory[at] - expm1_of_negative(-bandwidth * now.period) * gained / now.period
 
 
@@ -39,4 +39,4 @@ def remember(now: Any, wrist: Any, load: Any, torque: Any, memory: Any, at: int)
     delivered = clip(torque, now.torque_low, now.torque_high)
     memory[at] = load
     memory[at + 1] = inertia * now.rate + now.period * (delivered + load - resisting)
-    memory[at + 2] = 1.0 + 0.0 * load
+    memory[at + 2] = 1.0 + zero_like(load)

@@ -4,11 +4,12 @@ from typing import Any
 
 from wristctl.control.law import Conditions, Controller
 from wristctl.control.model import one_segment
+from wristctl.lanes.lane import zero_like
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """The torque that holds the one-segment wrist at rest at the reference: K theta_ref + G(theta_ref)."""
-    _, load = one_segment(wrist, now.theta_ref, 0.0 * now.theta_ref)
+    _, load = one_segment(wrist, now.theta_ref, zero_like(now.theta_ref))
     return load
 
 

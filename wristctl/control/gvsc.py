@@ -12,7 +12,7 @@ import numpy as np
 from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
-from wristctl.lanes.lane import dot, planar, turn
+from wristctl.lanes.lane import dot, planar, turn, zero_like
 
 
 def _gauss(count: int) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
@@ -45,7 +45,7 @@ def strain_model(wrist: Any, theta: Any) -> Any:
     -g . L int mu i w t du on beta, w = u^2 - u, t the tangent; beta solves K/3 beta + torque = 0 by Newton's method.
     The inertia is that of the motion along theta with beta following.
     """
-    zero = 0.0 * theta
+    zero = zero_like(theta)
     gravity = planar(wrist.gravity_x + zero, wrist.gravity_y + zero)
     beta = zero
     slope = zero

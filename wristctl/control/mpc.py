@@ -32,7 +32,7 @@ def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) ->
     theta_ref'' - 2 zeta w e' - w^2 e. `box` is the least and the largest v; `kept` (2 HORIZON,) the plan of the period
     before and its multipliers, of which this begins.
     """
-    w, zeta = weights[0], maximum(weights[1], _LEAST_DAMPING + 0.0 * weights[1])
+    w, zeta = weights[0], maximum(_LEAST_DAMPING, weights[1])
     low, high = box
     h = now.period
     w2 = w * w

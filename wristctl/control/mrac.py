@@ -5,7 +5,7 @@ from typing import Any
 from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.functions import clip
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 
 LOWEST = (-0.8, -0.9, -0.8, -1.0, -1.0)
 HIGHEST = (3.0, 5.0, 2.0, 2.0, 1.0)
@@ -27,7 +27,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     of that form. Adaptation holds while a tendon saturates.
     """
     frequency, slope, feedback, rate_of_adaptation, leak = gains.w, gains.lambda_, gains.Kd, gains.gamma, gains.leak
-    h, zero = now.period, 0.0 * now.period
+    h, zero = now.period, zero_like(now.period)
     started = memory[STARTED] > zero
     lag = where(started, memory[MODEL_ANGLE], now.theta) - now.theta_ref
     lag_rate = where(started, memory[MODEL_RATE], now.rate) - now.rate_ref

@@ -7,7 +7,7 @@ import numpy as np
 from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import tanh
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 
 UNITS = 12
 """Hidden units; the first layer is random and fixed (functional link), only the second learns."""
@@ -28,7 +28,7 @@ _FIRST, _OFFSETS = _first_layer()
 
 @compiled
 def _unit(j: Any, inputs: Any) -> Any:
-    total = _OFFSETS[j] + 0.0 * inputs[0]
+    total = _OFFSETS[j] + zero_like(inputs[0])
     for k in range(INPUTS):
         total = total + _FIRST[INPUTS * j + k] * inputs[k]
     return tanh(total)

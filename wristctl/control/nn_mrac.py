@@ -13,7 +13,7 @@ import numpy as np
 
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.functions import clip, tanh
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 
 UNITS, INPUTS = 8, 4
 _SCALES = np.array([0.5, 0.5, 0.1, 1.0])
@@ -38,7 +38,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     All weights learn by -eta (e_m + de_m/dt / w) times the output's gradient, as long as no tendon saturates; memory
     holds their difference from the initial ones.
     """
-    h, zero = now.period, 0.0 * now.period
+    h, zero = now.period, zero_like(now.period)
     w = gains.w
     begun = memory[_MODEL] > zero
     angle_m = where(begun, memory[_MODEL + 1], now.theta)

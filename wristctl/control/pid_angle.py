@@ -7,6 +7,7 @@ from wristctl.control.law import Controller
 from wristctl.control.model import one_segment
 from wristctl.control.pid import PID
 from wristctl.lanes.functions import maximum
+from wristctl.lanes.lane import zero_like
 
 _FURTHEST = 3.141592653589793
 
@@ -20,8 +21,8 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     error = now.theta - now.theta_ref
     integral = integrated(now, memory[0])
     angle = -(kp * error + ki * integral + kd * (now.rate - now.rate_ref))
-    angle = -maximum(-maximum(angle, -_FURTHEST + 0.0 * angle), -_FURTHEST + 0.0 * angle)
-    _, torque = one_segment(wrist, angle, 0.0 * angle)
+    angle = -maximum(-_FURTHEST, -maximum(-_FURTHEST, angle))
+    _, torque = one_segment(wrist, angle, zero_like(angle))
     memory[0] = held(now, torque, memory[0], integral)
     return torque
 

@@ -8,6 +8,7 @@ from wristctl.control.disturbance_observer import VALUES, disturbance, remember
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.pd_ff import fed_forward_pd
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import zero_like
 
 GAINS = pid_ff.GAINS | {"wo": Gain("rad/s", "bandwidth of the disturbance observer", 1e-1, 1e5)}
 
@@ -25,7 +26,7 @@ def rung(now: Any, wrist: Any, gains: Any, memory: Any, more: Any) -> Any:
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     """M theta_ref'' + load(theta_ref, rate_ref) - Kp e - Ki int(e) - Kd de/dt - d."""
-    return rung(now, wrist, gains, memory, 0.0 * now.theta)
+    return rung(now, wrist, gains, memory, zero_like(now.theta))
 
 
 PID_DOB = Controller(

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.allocation import allocate, reach
 
@@ -46,31 +47,31 @@ def _continued(control: Any, first: int, since: float) -> None:
 
 
 @compiled
-def perceive(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
+def perceive(control: Any, believed: Any, estimate: Any, bounds: Any, since: float, period: float) -> Any:
     """Put what a law sees into its signals; the least and the largest torque [N m] in reach. Arguments as `respond`."""
     low, high = bounds
     signals = rows_of(control.signals)
-    torque_low, torque_high = reach(seen.theta, known, low, high)
-    signals[_THETA] = seen.theta
-    signals[_RATE] = seen.rate
-    signals[_LOAD] = seen.load
+    torque_low, torque_high = reach(estimate.theta, believed, low, high)
+    signals[_THETA] = estimate.theta
+    signals[_RATE] = estimate.rate
+    signals[_LOAD] = estimate.load
     _continued(control, _THETA_REF, since)
     signals[_LOW] = torque_low
     signals[_HIGH] = torque_high
-    signals[_PERIOD] = period + 0.0 * low
+    signals[_PERIOD] = period + zero_like(low)
     return torque_low, torque_high
 
 
 @compiled
-def respond(control: Any, known: Any, seen: Any, bounds: Any, since: float, period: float) -> Any:
+def respond(control: Any, believed: Any, estimate: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
-    `seen` is an Estimate; the reference is what it was `since` seconds ago, continued by its own derivatives; `bounds`
-    are the least and the largest pull of a side. `known` is the controller's wrist as Segments.
+    `believed` is the controller's wrist as Segments, `estimate` an Estimate; `bounds` are the least and largest pull
+    of a side. The reference is what it was `since` seconds ago, continued by its own derivatives.
     """
     low, high = bounds
-    torque_low, torque_high = perceive(control, known, seen, bounds, since, period)
+    torque_low, torque_high = perceive(control, believed, estimate, bounds, since, period)
     gains, memory = rows_of(control.gains), rows_of(control.memory)
     wanted = control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
-    plus, minus = allocate(seen.theta, known, wanted, low, high)
+    plus, minus = allocate(estimate.theta, believed, wanted, low, high)
     return wanted, torque_low, torque_high, plus, minus

@@ -12,10 +12,11 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import by_type, implements
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import nonideal_of, unmoved, wears, worn_tendon
-from wristctl.wrist.elastic import Nonideal, Tendons, read_nonideal
+from wristctl.simulation.nonideal import nonideal_of, tendon_after_slip, unmoved, wears
+from wristctl.wrist.elastic import Nonideal, RealTendons, read_nonideal
 from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, kernel_of, parameters_of, tip_angle, travel
@@ -42,33 +43,49 @@ class SupposedWrist(NamedTuple):
 
 class Reeled(NamedTuple):
     """What the spools have reeled in (T, 4) [m], held over each step of h [s], and how many steps a wrist has to settle
-    on the first of them; `clock` is the time at first [s], None where nothing slips, breaks or has backlash."""
+    on the first of them; `faults` are Faultless or Faulty."""
 
     lengths: Any
     h: float
     settle: int
-    clock: Any
+    faults: Any
 
 
-@compiled
-def _worn(clock: Any, tendons: Any, plant: Any, q: Any, given: Any, time: Any) -> Any:
-    """What four tendons have reeled in of what their spools have; the very same where nothing wears them."""
-    if clock is None:
-        return given
+class Faultless(NamedTuple):
+    """No tendon slips, breaks or has backlash."""
+
+
+class Faulty(NamedTuple):
+    """Some tendons may slip, break or have backlash."""
+
+
+@by_type
+def _after_slip(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
+    """Lengths [m] that four tendons have reeled in of those on their spools."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_after_slip, Faultless)
+def _all(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
+    return on_spools
+
+
+@implements(_after_slip, Faulty)
+def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
     path = travel(plant, q)
-    zero = 0.0 * time
+    zero = zero_like(time)
     return (
-        worn_tendon(tendons, 0, given[0], zero, time, path[0], 0.0),
-        worn_tendon(tendons, 1, given[1], zero, time, path[1], 1.0),
-        worn_tendon(tendons, 2, given[2], zero, time, path[0], 1.0),
-        worn_tendon(tendons, 3, given[3], zero, time, path[1], 1.0),
+        tendon_after_slip(tendons, 0, on_spools[0], zero, time, path[0], 0.0),
+        tendon_after_slip(tendons, 1, on_spools[1], zero, time, path[1], 1.0),
+        tendon_after_slip(tendons, 2, on_spools[2], zero, time, path[0], 1.0),
+        tendon_after_slip(tendons, 3, on_spools[3], zero, time, path[1], 1.0),
     )
 
 
 def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
     plant, own = parameters_of(model, rows_of(values)), rows_of(tendon)
-    zero = 0.0 * own[0]
-    tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
+    zero = zero_like(own[0])
+    tendons = RealTendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive = 1.0 + zero
@@ -78,14 +95,14 @@ def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, sta
         if k >= 0:
             total, _ = tip_angle(plant, q, rate)
             rows_of(angle)[k] = total
-        given = (
+        on_spools = (
             reeled[now, 0] + own[taut],
             reeled[now, 2] + own[taut + 2],
             reeled[now, 1] + own[taut + 1],
             reeled[now, 3] + own[taut + 3],
         )
-        reached = _worn(spools.clock, tendons, plant, q, given, k * spools.h + zero)
-        alive, _ = advance_or_stop(plant, q, rate, reached, tendons, spools.h + zero, alive)
+        lengths = _after_slip(spools.faults, tendons, plant, q, on_spools, k * spools.h + zero)
+        alive, _ = advance_or_stop(plant, q, rate, lengths, tendons, spools.h + zero, alive)
 
 
 def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int, model: PlantModel = PCC) -> Array:
@@ -97,11 +114,11 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     """
     values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
     nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h) for each in candidates]
-    clock = 0.0 if any(map(wears, nonideal)) else None
+    faults = Faulty() if any(map(wears, nonideal)) else Faultless()
     own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
     tendons, k = to_blocks(np.array(own)), model.coordinates(n)
     found = np.empty((len(values), len(reeled), *values.shape[2:]))
-    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), clock)
+    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), faults)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
     for value, tendon, angle in zip(values, tendons, found, strict=True):
         wide = angle.shape[1:]

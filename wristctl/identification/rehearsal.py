@@ -21,7 +21,7 @@ from wristctl.errors import UserError
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import TENDON, Drive, Motor, actuate, at_rest, counted_motor
+from wristctl.simulation.actuator import Motor, SpoolDrive, actuate, at_rest, counted_motor
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import facing, plant_of
@@ -90,7 +90,7 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
     sides = [2.0 * done.column(name, 0) for name in ("tension_plus", "tension_minus")]
     commands = np.stack([*sides, followed.theta_ref], axis=1)
-    drive = Drive(TENDON, motor)
+    drive = SpoolDrive(motor)
     out = np.empty((len(commands), 2))
     _reel_in(drive, at_rest(drive, wrist, PCC, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
     return out

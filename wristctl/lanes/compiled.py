@@ -21,6 +21,7 @@ from typing import Any, NoReturn, TypeVar, cast
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
+from numba.extending import overload
 
 from wristctl.lanes.kernel_folder import kernels_folder
 
@@ -161,6 +162,35 @@ def spelled_out(function: F) -> F:
     For what is called once and holds almost all of its caller: that is then compiled one time less.
     """
     return _inner(function, inline="always")
+
+
+_BODIES: dict[tuple[Any, Any], Any] = {}
+"""Bodies of functions by the function that declares them and the NamedTuple class of the first argument."""
+
+
+def by_type(function: F) -> F:
+    """Declare a function of compiled code whose body follows from the type of its first argument.
+
+    `implements` gives the body for a NamedTuple class. So a part that is absent is a class without fields, and no more
+    is compiled than what a loop has.
+    """
+
+    @overload(function, strict=False, jit_options=_OPTIONS)
+    def body(part: Any, *others: Any) -> Any:
+        return _BODIES.get((function, getattr(part, "instance_class", None)))
+
+    return function
+
+
+def implements(declared: Any, *kinds: Any) -> Callable[[F], F]:
+    """Make a function the body of a declared one (`by_type`) for these NamedTuple classes of its first argument."""
+
+    def keep(function: F) -> F:
+        for kind in kinds:
+            _BODIES[declared, kind] = getattr(function, "py_func", function)
+        return function
+
+    return keep
 
 
 def kernel(function: F, *others: Path) -> F:

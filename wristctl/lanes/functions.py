@@ -43,14 +43,14 @@ def _reduced(y: Any) -> Any:
 @compiled
 def expm1_of_negative(y: Any) -> Any:
     """exp(y) - 1 for y <= 0 to 1.5 ulp, by Taylor's series within ln(2)/2 of a power of 2; below -44 as at -44."""
-    less, scale = _reduced(maximum(y, -44.0 + 0.0 * y))
+    less, scale = _reduced(maximum(-44.0, y))
     return scale * less + (scale - 1.0)
 
 
 @compiled
 def exp(y: Any) -> Any:
     """exp(y) to 1 ulp; beyond +-44 as there."""
-    less, scale = _reduced(clip(y, -44.0 + 0.0 * y, 44.0 + 0.0 * y))
+    less, scale = _reduced(minimum(44.0, maximum(-44.0, y)))
     return scale * (1.0 + less)
 
 

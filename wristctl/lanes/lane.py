@@ -67,6 +67,11 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
+def zero_like(x: Any) -> Any:
+    """0 in each lane of x, whatever x is: a lane from the start, as a sum over lanes needs it."""
+    raise NotImplementedError("compiled code only")
+
+
 def sqrt(x: Any) -> Any:
     """Square root."""
     raise NotImplementedError("compiled code only")
@@ -95,6 +100,7 @@ def _exp2i(builder: Any, k: Any) -> Any:
 
 
 define(where, (MaskType, LaneType, LaneType), LaneType, lambda b, c, x, y: b.select(c, x, y))
+define(zero_like, (LaneType,), LaneType, lambda b, x: ir.Constant(x.type, [0.0] * x.type.count))
 define(sqrt, (LaneType,), LaneType, _instruction("sqrt"))
 define(floor, (LaneType,), LaneType, _instruction("floor"))
 define(abs, (LaneType,), LaneType, _instruction("fabs"))
@@ -105,6 +111,11 @@ define(rounded, (LaneType,), LaneType, lambda b, x: b.fadd(x, ir.Constant(x.type
 @overload(rounded, strict=False)
 def _rounded_number(x: Any) -> Any:
     return (lambda x: x) if isinstance(x, types.Float) else None
+
+
+@overload(zero_like, strict=False)
+def _zero_like_number(x: Any) -> Any:
+    return (lambda x: 0.0) if isinstance(x, types.Float) else None
 
 
 def polynomial(coefficients: tuple[float, ...]) -> Any:

@@ -59,7 +59,7 @@ def _own(array: Any, block: Any) -> Any:
 def block_of(typingctx: Any, parts: Any, block: numba.types.Integer) -> Any:
     """One block's part of a NamedTuple of arrays [block, ...]: an array of one block is every block's.
 
-    Numbers, functions and None stay as they are, NamedTuples within are taken apart likewise.
+    Numbers and functions stay as they are, NamedTuples within are taken apart likewise.
     """
     if not isinstance(parts, numba.types.BaseNamedTuple):
         return None

@@ -16,15 +16,14 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
-from wristctl.lanes.lane import floor, rounded, sqrt, where
+from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.rows import rows_of
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
-
-LAGGED, TENDON = 1, 2
 
 
 class Motor(NamedTuple):
@@ -37,12 +36,23 @@ class Motor(NamedTuple):
     acceleration: Any
 
 
-class Drive(NamedTuple):
-    """Both sides' motors and tendons: how much of them is simulated (LAGGED or TENDON), and their values."""
+class IdealDrive(NamedTuple):
+    """Pulls are as commanded; nothing of a motor is simulated."""
 
-    level: int
-    motor: Motor
 
+class LaggedDrive(NamedTuple):
+    """Motors whose pulls lag behind their commands."""
+
+    motor: Any
+
+
+class SpoolDrive(NamedTuple):
+    """Motors that reel elastic tendons onto spools."""
+
+    motor: Any
+
+
+Drive = IdealDrive | LaggedDrive | SpoolDrive
 
 read_motor = tuple_of(Motor)
 """A Motor of lanes from rows of lanes, in compiled code."""
@@ -59,11 +69,6 @@ read_winding = tuple_of(Winding)
 """A Winding of lanes from rows of lanes, in compiled code."""
 
 
-def level_of(actuator: Actuator) -> int | None:
-    """LAGGED, TENDON, or None where tensions are as commanded, and nothing of a motor is compiled in."""
-    return {"ideal": None, "lagged": LAGGED, "tendon": TENDON}[actuator.level]
-
-
 def motor_of(actuator: Actuator) -> Motor:
     """The values of an actuator section."""
     step = actuator.step_length
@@ -76,10 +81,37 @@ def motor_of(actuator: Actuator) -> Motor:
     )
 
 
-def drive_of(actuator: Actuator) -> Drive | None:
-    """The drive of an actuator section; None where it is ideal."""
-    level = level_of(actuator)
-    return None if level is None else Drive(level, motor_of(actuator))
+def drive_with(level: str, motor: Any) -> Drive:
+    """The drive of a level with this Motor, or with its rows of a batch; an ideal drive has none."""
+    if level == "ideal":
+        return IdealDrive()
+    return LaggedDrive(motor) if level == "lagged" else SpoolDrive(motor)
+
+
+def drive_of(actuator: Actuator) -> Drive:
+    """The drive of an actuator section."""
+    return drive_with(actuator.level, motor_of(actuator))
+
+
+@by_type
+def drive_in_lanes(drive: Any) -> Any:
+    """A drive of lanes from a drive whose motor is one block's array."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(drive_in_lanes, IdealDrive)
+def _ideal_in_lanes(drive: Any) -> Any:
+    return drive
+
+
+@implements(drive_in_lanes, LaggedDrive)
+def _lagged_in_lanes(drive: Any) -> Any:
+    return LaggedDrive(read_motor(rows_of(drive.motor)))
+
+
+@implements(drive_in_lanes, SpoolDrive)
+def _spools_in_lanes(drive: Any) -> Any:
+    return SpoolDrive(read_motor(rows_of(drive.motor)))
 
 
 def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
@@ -101,13 +133,13 @@ def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float =
     return Winding(scale, pull / (does.stiffness * (1.0 - creep)) - scale * (pull / counts.stiffness))
 
 
-def at_rest(drive: Drive | None, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
+def at_rest(drive: Drive, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
     """Counts of both sides at pretension with the plant at q: pull or reeled length, then speed; (4,).
 
     `wrist` is the one that is wound, `drive` as its host counts, `scale` that of the winding.
     """
     pull = TENDONS_PER_SIDE * wrist.pretension
-    if drive is None or drive.level != TENDON:
+    if not isinstance(drive, SpoolDrive):
         return np.array([pull, 0.0, pull, 0.0])
     plus, minus = pull / drive.motor.stiffness + wrist.length / scale - model.taut(wrist, q) / scale
     return np.array([plus, 0.0, minus, 0.0])
@@ -148,46 +180,79 @@ def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
     return pull / stiffness + length - path
 
 
-@compiled
-def actuate(drive: Any, state: Any, known: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    """What the host counts of both sides a period after commanded pulls [N]: pulls, or lengths [m] (tendon)."""
-    if drive is None:
-        return plus, minus
-    if drive.level == LAGGED:
-        return _lag(drive.motor, state, 0, plus, h), _lag(drive.motor, state, 2, minus, h)
-    motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, known)
-    reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, known.length, path_plus), h)
-    reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, known.length, path_minus), h)
+@by_type
+def actuate(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+    """What the host counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
+
+    `believed` is the controller's wrist as Segments.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+@implements(actuate, IdealDrive)
+def _as_commanded(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+    return plus, minus
+
+
+@implements(actuate, LaggedDrive)
+def _lagged(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+    return _lag(drive.motor, state, 0, plus, h), _lag(drive.motor, state, 2, minus, h)
+
+
+@implements(actuate, SpoolDrive)
+def _reeled(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+    motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, believed)
+    reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, believed.length, path_plus), h)
+    reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, believed.length, path_minus), h)
     return reeled_plus, reeled_minus
 
 
-@compiled
+@by_type
 def wound(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
-    """What the motors of both sides deliver for what their host counts."""
-    if drive is None:
-        return plus, minus
+    """Pulls [N] or lengths [m] that the motors of both sides deliver for what their host counts."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(wound, IdealDrive)
+def _as_counted(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
+    return plus, minus
+
+
+@implements(wound, LaggedDrive, SpoolDrive)
+def _scaled(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
     return winding.scale * plus + winding.offset, winding.scale * minus + winding.offset
 
 
-@compiled
-def frictionless_pulls(drive: Any, known: Any, theta: Any, plus: Any, minus: Any) -> Any:
+@by_type
+def frictionless_pulls(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
     """Pulls [N] of both sides on segments at theta from what their motors deliver, of tendons that slide freely."""
-    if drive is None:
-        return plus, minus
-    if drive.level != TENDON:
-        return plus, minus
-    zero = 0.0 * plus
-    path_plus, path_minus, _ = travel(known, theta)
+    raise NotImplementedError("compiled code only")
+
+
+@implements(frictionless_pulls, IdealDrive, LaggedDrive)
+def _delivered_pulls(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
+    return plus, minus
+
+
+@implements(frictionless_pulls, SpoolDrive)
+def _stretched(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
+    path_plus, path_minus, _ = travel(believed, theta)
     stiffness = drive.motor.stiffness
-    return stiffness * maximum(plus - path_plus, zero), stiffness * maximum(minus - path_minus, zero)
+    return stiffness * maximum(0.0, plus - path_plus), stiffness * maximum(0.0, minus - path_minus)
 
 
-@compiled
+@by_type
 def tendon_stiffness(drive: Any, segment: Any, theta: Any) -> Any:
     """Stiffness [N m/rad] that elastic tendons on held spools add to one segment at theta; 0 without them."""
-    if drive is None:
-        return 0.0 * theta
-    if drive.level != TENDON:
-        return 0.0 * theta
+    raise NotImplementedError("compiled code only")
+
+
+@implements(tendon_stiffness, IdealDrive, LaggedDrive)
+def _none(drive: Any, segment: Any, theta: Any) -> Any:
+    return zero_like(theta)
+
+
+@implements(tendon_stiffness, SpoolDrive)
+def _on_spools(drive: Any, segment: Any, theta: Any) -> Any:
     arm_plus, arm_minus = moment_arms(theta, segment)
     return drive.motor.stiffness * (arm_plus * arm_plus + arm_minus * arm_minus)

@@ -12,16 +12,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import Drive, Winding, at_rest, counted_motor, level_of, motor_of, winding_of
+from wristctl.simulation.actuator import Winding, at_rest, counted_motor, drive_with, motor_of, winding_of
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
-from wristctl.simulation.kernel import LoopCourse, LoopState, LoopValues, Scratch, Setup
+from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
-from wristctl.simulation.observer import Observer, Schedule, Watch
+from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
 from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
+from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons, Tendons
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -78,7 +79,7 @@ def batch(
     check_stops(worlds, references[:, 0])
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
-    k, level = model.coordinates(n), level_of(loop.actuator)
+    k, level = model.coordinates(n), loop.actuator.level
     ticks, samples = max(1, round(sample_period(period) / period)), references.shape[2]
     followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
     wide = followed.shape[1:]
@@ -93,7 +94,6 @@ def batch(
         for each, own in zip(worlds, actuators, strict=True)
     ]
     ideal = all(map(is_ideal, nonideals))
-    elastic = not ideal or loop.actuator.level == "tendon"
 
     def of_worlds(row: Callable[[int], Array]) -> Array:
         """A row of each world's as blocks; of one world as one block for all."""
@@ -107,14 +107,22 @@ def batch(
         return np.array([wrist.pretension, most, bending_limit(actual[each], loop.plant.end_stop_deg)])
 
     def at_the_motors(each: int) -> Array:
-        drive = None if level is None else Drive(level, counted[each])
-        return at_rest(drive, actual[each], model, rest[each], windings[each].scale)
+        return at_rest(drive_with(level, counted[each]), actual[each], model, rest[each], windings[each].scale)
 
     def resting(each: int) -> Array:
+        """State of a world's tendons and springs at rest."""
         own, lengths = at_the_motors(each)[[0, 2]], model.taut(actual[each], rest[each])
-        given, short = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
+        reeled, short = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
         path = np.append(short, np.abs(rest[each]).sum())
-        return unmoved(given, path, given - short, rest[each])
+        return unmoved(reeled, path, reeled - short, rest[each])
+
+    def tendons() -> Tendons:
+        stiffness = of_worlds(lambda each: np.array([motor_of(actuators[each]).stiffness]))
+        if ideal:
+            return ElasticTendons(stiffness) if level == "tendon" else NoTendons()
+        nonideal = of_worlds(lambda each: np.array(nonideals[each]))
+        state = spread(np.array([resting(each) for each in range(len(worlds))])[world], count)
+        return RealTendons(stiffness, nonideal, state) if level == "tendon" else PulledTendons(nonideal, state)
 
     ends = zip(motions, references[:, 0, -1], strict=True)
     goals = np.array([own.goals_at(end) for own, end in ends])[lanes.motion]
@@ -123,9 +131,7 @@ def batch(
         plant=of_worlds(lambda each: model.values(actual[each], n)),
         model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
         limits=of_worlds(limits),
-        motor=of_worlds(lambda each: np.array(counted[each])),
-        tendons=of_worlds(lambda each: np.array([motor_of(actuators[each]).stiffness])) if elastic else None,
-        nonideal=None if ideal else of_worlds(lambda each: np.array(nonideals[each])),
+        drive=drive_with(level, of_worlds(lambda each: np.array(counted[each]))),
         winding=of_worlds(lambda each: np.array(windings[each])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
@@ -140,13 +146,13 @@ def batch(
         memory=spread(np.zeros(max(1, controller.memory)), count),
         coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[world], count),
         motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[world], count),
-        tendons=None if ideal else spread(np.array([resting(each) for each in range(len(worlds))])[world], count),
+        tendons=tendons(),
         sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
-    course = LoopCourse(references, _stacked(cases, samples))
-    setup = Setup(controller.compiled(count), model, (0,) * k, level, period, loop.steps, ticks, controller.preview)
+    course = LoopCourse(references, _disturbances(cases, samples))
+    setup = Setup(controller.compiled(count), model, (0,) * k, period, loop.steps, ticks, controller.preview)
     return Batch(setup, course, values, state, blocks, samples, wide)
 
 
@@ -165,21 +171,21 @@ def sample_period(control_period: float) -> float:
     return max(control_period, round(1e-3 / control_period) * control_period)
 
 
-def _stacked(cases: Sequence[Array | None], samples: int) -> Array | None:
-    """Each case's disturbances, (cases, 2, T); None where nothing acts in any of them."""
+def _disturbances(cases: Sequence[Array | None], samples: int) -> Disturbed | Undisturbed:
+    """Disturbances of all cases, of which one where nothing acts is None."""
     if all(case is None for case in cases):
-        return None
+        return Undisturbed()
     nothing = np.tile((0.0, 1.0), (samples, 1))
-    return np.array([(nothing if case is None else case).T for case in cases])
+    return Disturbed(np.array([(nothing if case is None else case).T for case in cases]))
 
 
 def _watch(
     worlds: Sequence[World], lanes: Lanes, horizon: float, model: PlantModel, rest: Array
-) -> tuple[Watch | None, Schedule | None]:
-    """Cameras with their observers by block; none where sensors are ideal."""
+) -> tuple[Watch, Schedule] | tuple[NoCamera, NoCamera]:
+    """Cameras with their observers by block."""
     loop, count = worlds[0].loop, len(lanes.motion)
     if loop.sensor.level == "ideal":
-        return None, None
+        return NoCamera(), NoCamera()
     sensors = [each.sensor for each in worlds]
     believed, period = [each.loop.sensor for each in worlds], loop.control_period
     tables, camera = side_by_side(sensors, believed, period, horizon)

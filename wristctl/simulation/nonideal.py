@@ -7,7 +7,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import where
 from wristctl.wrist.elastic import (
@@ -17,7 +17,11 @@ from wristctl.wrist.elastic import (
     PLAY,
     SHARE,
     SLIPPED,
+    ElasticTendons,
     Nonideal,
+    NoTendons,
+    PulledTendons,
+    RealTendons,
     row_of,
     spool_pull,
     state_rows,
@@ -26,6 +30,8 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _FULL_STEPS_PER_TURN = 4
 """Electrical, of a two-phase motor."""
+_ONE_OF_A_SIDE_LESS = 1.0 - 1.0 / TENDONS_PER_SIDE
+"""Share of a side's tendons that is left where one of them breaks."""
 
 
 def electrical_turn(actuator: Actuator) -> float:
@@ -38,7 +44,6 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
     elastic = actuator.level == "tendon"
     torque, top_speed = (facts.torque, facts.top_speed) if isinstance(facts, TrueActuator) else (None, None)
     return Nonideal(
-        held=float(not elastic),
         friction=actuator.friction * elastic,
         sheath=actuator.sheath,
         bristle=1.0 / actuator.presliding,
@@ -71,19 +76,19 @@ def wears(own: Nonideal) -> bool:
     return own.backlash > 0.0 or any(map(math.isfinite, (own.broken_at, own.slips_at, own.torque)))
 
 
-def _time(given: float | None) -> float:
-    return math.inf if given is None else given
+def _time(time: float | None) -> float:
+    return math.inf if time is None else time
 
 
-def unmoved(given: Array, path: Array, crept: Array, q: Array) -> Array:
-    """The state of tendons that have reeled in `given` (t,) [m] and crept so far (t,) [m], at rest at q (k,).
+def unmoved(reeled: Array, path: Array, crept: Array, q: Array) -> Array:
+    """The state of tendons that have reeled in `reeled` (t,) [m] and crept so far (t,) [m], at rest at q (k,).
 
     `path` (3,) is both sides' travel there [m] and the bend [rad].
     """
-    state = np.zeros(state_rows(len(given), len(q)))
+    state = np.zeros(state_rows(len(reeled), len(q)))
     state[:PATH] = path
-    own = of_tendons(state, len(given))
-    own[:, 1], own[:, SHARE - PATH], own[:, PLAY - PATH] = crept, 1.0, given
+    tendon = of_tendons(state, len(reeled))
+    tendon[:, 1], tendon[:, SHARE - PATH], tendon[:, PLAY - PATH] = crept, 1.0, reeled
     state[len(state) - len(q) :] = q
     return state
 
@@ -95,37 +100,52 @@ def of_tendons(state: Array, count: int) -> Array:
 
 
 @compiled
-def worn_tendon(tendons: Any, t: int, given: Any, speed: Any, time: Any, x: Any, left: float) -> Any:
-    """What one of the tendons has reeled in, of what its motor delivers [m] at a speed [m/s].
+def _broken(tendons: Any, t: int, time: Any, left: float) -> None:
+    """Leave the share `left` of a tendon from the time on at which it breaks, for good; with 1 it does not break."""
+    state, share = tendons.state, row_of(t, SHARE)
+    state[share] = minimum(state[share], where(time >= tendons.nonideal.broken_at, left, 1.0))
+
+
+@compiled
+def tendon_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, left: float) -> Any:
+    """Length [m] that one of the RealTendons has reeled in, of the length that its motor delivers at a speed [m/s].
 
     It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks, so that
-    the share `left` of it is left; both of the last for good, and with `left` 1 not at all. Pulls [N] stay as they are,
-    but where it breaks.
+    the share `left` of it is left; both of the last for good.
     """
     nonideal, state = tendons.nonideal, tendons.state
-    share, play, lost, slip = row_of(t, SHARE), row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
-    zero = 0.0 * given
-    state[share] = minimum(state[share], where(time >= nonideal.broken_at, left + zero, 1.0 + zero))
+    play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
+    _broken(tendons, t, time, left)
     if t % 2 == 0:
-        state[slip] = maximum(state[slip], where(time >= nonideal.slips_at, nonideal.slip, zero))
-    holds = nonideal.torque * maximum(1.0 - abs(speed) / nonideal.top_speed, zero)
-    state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, zero)
-    wound = given - state[lost] - state[slip]
-    state[play] = clip(state[play], wound, wound + nonideal.backlash)
-    return where(nonideal.held > 0.0, state[share] * given, state[play])
+        state[slip] = maximum(state[slip], where(time >= nonideal.slips_at, nonideal.slip, 0.0))
+    holds = nonideal.torque * maximum(0.0, 1.0 - abs(speed) / nonideal.top_speed)
+    state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
+    on_spool = delivered - state[lost] - state[slip]
+    state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)
+    return state[play]
 
 
-@compiled
-def worn(tendons: Any, given: Any, speeds: Any, time: Any, path: Any) -> Any:
-    """What both sides' tendons have reeled in, of what their motors deliver (plus, minus) at these speeds [m/s]."""
-    if tendons is None:
-        return given
-    return _nonideal(tendons, tendons.nonideal, given, speeds, time, path)
+@by_type
+def spools_after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    """Pulls [N] or reeled lengths [m] of both sides, of those that their motors deliver (plus, minus).
+
+    `speeds` are the spools' [m/s].
+    """
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _nonideal(tendons: Any, nonideal: Any, given: Any, speeds: Any, time: Any, path: Any) -> Any:
-    if nonideal is None:
-        return given
-    plus = worn_tendon(tendons, 0, given[0], speeds[0], time, path[0], 1.0 - 1.0 / TENDONS_PER_SIDE)
-    return plus, worn_tendon(tendons, 1, given[1], speeds[1], time, path[1], 1.0)
+@implements(spools_after_slip, NoTendons, ElasticTendons)
+def _as_delivered(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    return delivered
+
+
+@implements(spools_after_slip, PulledTendons)
+def _pulls_that_are_left(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    _broken(tendons, 0, time, _ONE_OF_A_SIDE_LESS)
+    return tendons.state[row_of(0, SHARE)] * delivered[0], delivered[1]
+
+
+@implements(spools_after_slip, RealTendons)
+def _after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    plus = tendon_after_slip(tendons, 0, delivered[0], speeds[0], time, path[0], _ONE_OF_A_SIDE_LESS)
+    return plus, tendon_after_slip(tendons, 1, delivered[1], speeds[1], time, path[1], 1.0)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from wristctl.control.model import one_segment
 from wristctl.control.response import Estimate
-from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import where
+from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
 from wristctl.wrist.allocation import torque_of
@@ -60,6 +60,10 @@ class ArrivingFrame(NamedTuple):
     seen: Any
 
 
+class NoCamera(NamedTuple):
+    """Sensors are ideal: in place of a Watch and of its Schedule."""
+
+
 class Watch(NamedTuple):
     """One block's camera: what is added to each frame and whether it is seen (F, 2), pictures taken (F,), each lane's
     next frame to take and to arrive, `turn` (2, lanes); rows (3,) to work on, and the observer behind it."""
@@ -72,22 +76,21 @@ class Watch(NamedTuple):
 
 
 @compiled
-def propagate(drive: Any, known: Any, x: Any, plus: Any, minus: Any, h: Any) -> None:
+def propagate(drive: Any, believed: Any, x: Any, plus: Any, minus: Any, h: Any) -> None:
     """Advance x by one control period h [s], linearly implicit in damping and stiffness; where h is 0, x stays."""
     theta = part(x, 0, _ONE)
     angle, speed, load = x[0], x[1], x[2]
-    pull_plus, pull_minus = frictionless_pulls(drive, known, theta, plus, minus)
-    inertia, resisting = one_segment(known, angle, speed)
-    stiffness = known.stiffness + 0.0 * angle
-    stiffness = stiffness + tendon_stiffness(drive, known, angle)
-    push = torque_of(angle, known, pull_plus, pull_minus) + load - resisting - h * stiffness * speed
-    speed = speed + h * push / (inertia + h * known.damping + h * h * stiffness)
+    pull_plus, pull_minus = frictionless_pulls(drive, believed, theta, plus, minus)
+    inertia, resisting = one_segment(believed, angle, speed)
+    stiffness = believed.stiffness + tendon_stiffness(drive, believed, angle)
+    push = torque_of(angle, believed, pull_plus, pull_minus) + load - resisting - h * stiffness * speed
+    speed = speed + h * push / (inertia + h * believed.damping + h * h * stiffness)
     x[0] = angle + h * speed
     x[1] = speed
 
 
 @compiled
-def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, h: float) -> None:
+def sample(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angle: Any, h: float) -> None:
     """Take a frame of the true angle in lanes where one is due, and fuse those that arrive at this tick."""
     turn = watch.turn
     frames, lanes = schedule.captures.shape
@@ -111,21 +114,36 @@ def sample(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: 
             arriving[2, lane] = readings[arrived, 1, lane]
             turn[1, lane] = arrived + 1
     if last >= 0:
-        fuse(watch.observer, drive, known, (begin, first, last, tick), ArrivingFrame(rows[0], 0.0, rows[1], rows[2]), h)
+        fuse(
+            watch.observer,
+            drive,
+            believed,
+            (begin, first, last, tick),
+            ArrivingFrame(rows[0], 0.0, rows[1], rows[2]),
+            h,
+        )
 
 
-@compiled
-def sense(schedule: Any, watch: Any, drive: Any, known: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
-    """Estimate, as the law sees it: angle and rate as they are, or, behind a camera, all as the observer has it."""
-    if watch is None:
-        return Estimate(angle, rate, 0.0 * angle)
-    sample(schedule, watch, drive, known, tick, angle, h)
+@by_type
+def sense(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
+    """Estimate that the law sees: angle and rate as they are, or, behind a camera, as the observer has them."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(sense, NoCamera)
+def _as_it_is(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
+    return Estimate(angle, rate, zero_like(angle))
+
+
+@implements(sense, Watch)
+def _observed(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angle: Any, rate: Any, h: float) -> Any:
+    sample(watch, schedule, drive, believed, tick, angle, h)
     now = rows_of(watch.observer.now)
     return Estimate(now[0], now[1], now[2])
 
 
 @compiled
-def fuse(observer: Any, drive: Any, known: Any, ticks: Any, frame: Any, h: float) -> None:
+def fuse(observer: Any, drive: Any, believed: Any, ticks: Any, frame: Any, h: float) -> None:
     """Fuse a frame in the lanes in which one arrives, and predict from there to the present tick.
 
     `ticks` are, of these lanes, the first that was fused before, the first and the last that are captured now, and the
@@ -134,10 +152,10 @@ def fuse(observer: Any, drive: Any, known: Any, ticks: Any, frame: Any, h: float
     begin, first, last, tick = ticks
     size = observer.delivered.shape[0]
     gain, fused, now, at = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now), rows_of(observer.at)
-    zero = 0.0 * known.length
+    zero = zero_like(believed.length)
     for past in range(begin, last):
         sent = rows_of(observer.delivered[past % size])
-        propagate(drive, known, fused, sent[0], sent[1], where((at[0] <= past) & (frame.captured > past), h, zero))
+        propagate(drive, believed, fused, sent[0], sent[1], where((at[0] <= past) & (frame.captured > past), h, zero))
     arrives = frame.captured >= zero
     innovation = frame.seen * (frame.angle - fused[0] - frame.since * fused[1])
     for i in range(3):
@@ -146,21 +164,30 @@ def fuse(observer: Any, drive: Any, known: Any, ticks: Any, frame: Any, h: float
         now[i] = where(arrives, fresh, now[i])
     for past in range(first, tick):
         sent = rows_of(observer.delivered[past % size])
-        propagate(drive, known, now, sent[0], sent[1], where(arrives & (frame.captured <= past), h, zero))
+        propagate(drive, believed, now, sent[0], sent[1], where(arrives & (frame.captured <= past), h, zero))
     at[0] = where(arrives, frame.captured, at[0])
 
 
 @compiled
-def predict(observer: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+def predict(observer: Any, drive: Any, believed: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
     """Remember what is delivered over this tick and go on over it."""
     sent = rows_of(observer.delivered[tick % observer.delivered.shape[0]])
     sent[0] = plus
     sent[1] = minus
-    propagate(drive, known, rows_of(observer.now), plus, minus, h)
+    propagate(drive, believed, rows_of(observer.now), plus, minus, h)
 
 
-@compiled
-def go_on(watch: Any, drive: Any, known: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+@by_type
+def go_on(watch: Any, drive: Any, believed: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
     """`predict` behind a camera; nothing where there is none."""
-    if watch is not None:
-        predict(watch.observer, drive, known, tick, plus, minus, h)
+    raise NotImplementedError("compiled code only")
+
+
+@implements(go_on, NoCamera)
+def _nothing(watch: Any, drive: Any, believed: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+    pass
+
+
+@implements(go_on, Watch)
+def _predict(watch: Any, drive: Any, believed: Any, tick: int, plus: Any, minus: Any, h: float) -> None:
+    predict(watch.observer, drive, believed, tick, plus, minus, h)

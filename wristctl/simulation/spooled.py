@@ -15,11 +15,11 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.processes import cores, stoppable
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
-from wristctl.wrist.elastic import Nonideal, Tendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
+from wristctl.wrist.elastic import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
 from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import kernel_of, parameters_of, tip_angle
@@ -88,28 +88,28 @@ class _Lanes(NamedTuple):
 _ENDS = 9
 
 
-def _move(model: Any, lanes: Any, told: Any, timing: Any, out: Any, cut: Any) -> None:
+def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) -> None:
     segment, own = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
-    zero = 0.0 * own[_STIFFNESS]
-    tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(lanes.memory))
+    zero = zero_like(own[_STIFFNESS])
+    tendons = RealTendons(own[_STIFFNESS], read_nonideal(own), rows_of(lanes.memory))
     winch, memory, ends, n = own[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
     q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
     alive = 1.0 + zero
-    for k in range(told.shape[0]):
-        at, now = timing.first + k, rows_of(told[k])
+    for k in range(driven.shape[0]):
+        at, now = timing.first + k, rows_of(driven[k])
         path = memory[0], memory[1], memory[2]
-        given = (
+        reeled = (
             where(winch > 0.0, now[0] / tendons.stiffness + path[0], now[0]),
             where(winch > 0.0, now[1] / tendons.stiffness + path[1], now[1]),
         )
-        spool_plus, spool_minus = spool_pull(tendons, given[0], 0, path[0]), spool_pull(tendons, given[1], 1, path[1])
-        plus, minus = pulls_at_start(tendons, given, path)
+        spool_plus, spool_minus = spool_pull(tendons, reeled[0], 0, path[0]), spool_pull(tendons, reeled[1], 1, path[1])
+        plus, minus = pulls_at_start(tendons, reeled, path)
         if at == 0:
-            ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *given, spool_plus, spool_minus, plus, minus
+            ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *reeled, spool_plus, spool_minus, plus, minus
         if at % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
             row = rows_of(out[at // timing.every])
             row[0], _ = tip_angle(segment, q, rate)
-            row[1], row[2] = 0.5 * (given[0] + ends[3]), 0.5 * (given[1] + ends[4])
+            row[1], row[2] = 0.5 * (reeled[0] + ends[3]), 0.5 * (reeled[1] + ends[4])
             row[3], row[4] = 0.5 * (spool_plus + ends[5]), 0.5 * (spool_minus + ends[6])
             row[5], row[6] = 0.5 * (plus + ends[7]), 0.5 * (minus + ends[8])
             row[7], row[8] = memory[row_of(0, Z)], memory[row_of(1, Z)]
@@ -117,13 +117,13 @@ def _move(model: Any, lanes: Any, told: Any, timing: Any, out: Any, cut: Any) ->
         rates = zero
         for i in range(n):
             rates = rates + rate[i] * rate[i]
-        alive, _ = advance_or_stop(segment, q, rate, given, tendons, timing.h + zero, alive)
+        alive, _ = advance_or_stop(segment, q, rate, reeled, tendons, timing.h + zero, alive)
         for i in range(n):
             rates = rates + rate[i] * rate[i]
         end = memory[0], memory[1], memory[2]
-        ends[3], ends[4] = given
-        ends[5], ends[6] = spool_pull(tendons, given[0], 0, end[0]), spool_pull(tendons, given[1], 1, end[1])
-        ends[7], ends[8] = pulls_at_start(tendons, given, end)
+        ends[3], ends[4] = reeled
+        ends[5], ends[6] = spool_pull(tendons, reeled[0], 0, end[0]), spool_pull(tendons, reeled[1], 1, end[1])
+        ends[7], ends[8] = pulls_at_start(tendons, reeled, end)
         raw = (spool_plus + ends[5]) * (end[0] - path[0]) + (spool_minus + ends[6]) * (end[1] - path[1])
         left = (plus + ends[7]) * (end[0] - path[0]) + (minus + ends[8]) * (end[1] - path[1])
         ends[0], ends[1] = ends[0] + 0.5 * (raw - left), ends[1] + 0.5 * raw

@@ -10,6 +10,7 @@ from wristctl.arrays import Array, distinct
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import at_rest, drive_of
 from wristctl.simulation.observer import Observer, propagate
@@ -19,9 +20,9 @@ from wristctl.wrist.segments import load_segments, segments
 
 @kernel
 def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
-    known, x = load_segments(rows_of(model)), rows_of(state)
-    zero = 0.0 * x[0]
-    propagate(drive, known, x, plus + zero, minus + zero, h)
+    believed, x = load_segments(rows_of(model)), rows_of(state)
+    zero = zero_like(x[0])
+    propagate(drive, believed, x, plus + zero, minus + zero, h)
 
 
 _DOUBLINGS, _ALIKE = 20, 1e-14

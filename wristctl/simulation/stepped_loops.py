@@ -17,13 +17,14 @@ from wristctl.control.law import NOW, Controller, Gain
 from wristctl.control.response import Controlled, perceive
 from wristctl.lanes.blocks import to_rows
 from wristctl.lanes.compiled import kernel, spelled_out
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.parts import block_of
 from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.actuator import drive_in_lanes
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
-from wristctl.simulation.kernel import Span, drive_in, gather_lanes, run_blocks
+from wristctl.simulation.kernel import Span, gather_lanes, run_blocks
 from wristctl.simulation.observer import sense
 from wristctl.simulation.rollout import outcome_of, worlds_of
 from wristctl.simulation.sums import SUMS
@@ -130,30 +131,30 @@ def _look_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, 
 
 @spelled_out
 def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, found: Any) -> None:
-    cut, period = setup.coordinates, setup.period
-    n = len(cut)
+    coordinates, period = setup.coordinates, setup.period
+    n = len(coordinates)
     plant = parameters_of(setup.plant, rows_of(world.plant))
-    known, drive = load_segments(rows_of(world.model)), drive_in(setup.level, world.motor)
+    believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
-    q, rates = part(rows_of(state.coordinates), 0, cut), part(rows_of(state.coordinates), n, cut)
+    q, rates = part(rows_of(state.coordinates), 0, coordinates), part(rows_of(state.coordinates), n, coordinates)
     bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(found)
     gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
     angle, rate = tip_angle(plant, q, rates)
-    seen = sense(world.schedule, state.watch, drive, known, sample * setup.ticks, angle, rate, period)
-    perceive(control, known, seen, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
+    estimate = sense(state.watch, world.schedule, drive, believed, sample * setup.ticks, angle, rate, period)
+    perceive(control, believed, estimate, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
     for i in range(_TRUE):
         out[i] = signals[i]
     out[_TRUE] = angle
-    out[_WELL] = where(abs(angle) < bound[2], rows_of(state.sums)[_ALIVE], 0.0 * angle)
+    out[_WELL] = where(abs(angle) < bound[2], rows_of(state.sums)[_ALIVE], 0.0)
     out[_LIMIT] = bound[2]
 
 
 @kernel
 def _reach_along(model: Any, theta: Any, low: float, high: float, found: Any) -> None:
-    known, angles, out = load_segments(rows_of(model)), rows_of(theta), rows_of(found)
+    believed, angles, out = load_segments(rows_of(model)), rows_of(theta), rows_of(found)
     for k in range(theta.shape[0]):
-        zero = 0.0 * angles[k]
-        out[2 * k], out[2 * k + 1] = reach(angles[k], known, low + zero, high + zero)
+        zero = zero_like(angles[k])
+        out[2 * k], out[2 * k + 1] = reach(angles[k], believed, low + zero, high + zero)
 
 
 def largest_torque(wrist: WristParameters) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import rows_named, rows_of
 from wristctl.simulation.motion import Goals
 
@@ -36,8 +36,8 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
     error = theta - theta_ref
     squared = error * error
     size = abs(theta - goals.final)
-    moving = where(time <= goals.rest, 1.0, 0.0 * time)
-    late = where(time >= 0.9 * goals.horizon, 1.0, 0.0 * time)
+    moving = where(time <= goals.rest, 1.0, 0.0)
+    late = where(time >= 0.9 * goals.horizon, 1.0, 0.0)
     sums[_SQUARED] = sums[_SQUARED] + squared
     sums[_SQUARED_MOVE] = sums[_SQUARED_MOVE] + moving * squared
     sums[_ABSOLUTE] = sums[_ABSOLUTE] + abs(error)
@@ -49,15 +49,15 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
     sums[_SQUARED_EXIT] = where(outside, sums[_SQUARED], sums[_SQUARED_EXIT])
     sums[_EXIT_5] = where(size > 0.05 * move, time, sums[_EXIT_5])
     passed = where(goals.move < 0.0, goals.final - theta, theta - goals.final)
-    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= goals.begin, passed, 0.0 * passed))
+    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= goals.begin, passed, 0.0))
     sums[_PEAK] = maximum(sums[_PEAK], maximum(plus, minus))
     sums[_SQUARED_TENSION] = sums[_SQUARED_TENSION] + 0.5 * (plus * plus + minus * minus)
     change = abs(plus - sums[_PLUS]) + abs(minus - sums[_MINUS])
-    sums[_VARIATION] = sums[_VARIATION] + where(sums[_TICKS] > 0.0, change, 0.0 * change)
+    sums[_VARIATION] = sums[_VARIATION] + where(sums[_TICKS] > 0.0, change, 0.0)
     sums[_PLUS] = plus
     sums[_MINUS] = minus
     sums[_SATURATED] = sums[_SATURATED] + saturated
-    sums[_SLACK] = sums[_SLACK] + where((plus <= 0.0) | (minus <= 0.0), 1.0, 0.0 * plus)
+    sums[_SLACK] = sums[_SLACK] + where((plus <= 0.0) | (minus <= 0.0), 1.0, 0.0)
     sums[_TICKS] = sums[_TICKS] + 1.0
     sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
 
@@ -65,9 +65,9 @@ def gather(sums: Any, goals: Any, time: Any, theta: Any, theta_ref: Any, plus: A
 @compiled
 def watch_range(sums: Any, time: Any, theta: Any, reach: Any) -> None:
     """A lane that bends beyond `reach` [rad], or to no number, has failed; until when it had not."""
-    alive, zero = sums[_ALIVE], 0.0 * reach
+    alive = sums[_ALIVE]
     sums[_UNTIL] = where(alive > 0.0, time, sums[_UNTIL])
-    sums[_ALIVE] = where(abs(theta) < reach, alive, zero)
+    sums[_ALIVE] = where(abs(theta) < reach, alive, 0.0)
 
 
 @kernel
@@ -76,7 +76,7 @@ def _replay(series: Any, goals: Any, sums: Any, period: float) -> None:
     total = rows_of(sums)
     for tick in range(series.shape[0]):
         row = rows_of(series[tick])
-        gather(total, goal, tick * period + 0.0 * row[0], row[0], row[1], row[2], row[3], row[4])
+        gather(total, goal, tick * period + zero_like(row[0]), row[0], row[1], row[2], row[3], row[4])
 
 
 def sums_of(period: float, series: Array, goals: Goals) -> Array:

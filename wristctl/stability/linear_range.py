@@ -10,7 +10,7 @@ import numpy as np
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Surface
-from wristctl.simulation.actuator import TENDON, level_of, motor_of
+from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.disturbances import DISTURBANCES
 from wristctl.simulation.worlds import World
 from wristctl.stability.linearise import LinearLoop
@@ -85,20 +85,20 @@ def linearity_limits(
     gains: dict[str, float],
 ) -> list[LinearityLimit]:  # fmt: skip
     """What linearisation leaves out of a loop, and the swings from which, or up to which, it is felt: those first."""
-    world, level, found = World(loop, wrist), level_of(loop.actuator), list[LinearityLimit]()
+    world, level, found = World(loop, wrist), loop.actuator.level, list[LinearityLimit]()
     if loop.sensor.level == "camera":
         noise = math.radians(world.sensor.noise_deg)
         found.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
-    if level is not None:
+    if level != "ideal":
         motor = motor_of(loop.actuator)
-        step, scale = (motor.step, 1.0) if level == TENDON else (motor.stiffness * motor.step, motor.stiffness)
+        step, scale = (motor.step, 1.0) if level == "tendon" else (motor.stiffness * motor.step, motor.stiffness)
         told = LinearityLimit("a motor's microstep", False, _over(0.5 * step, swing.motor()), "no steps: any length")
         speed = scale * loop.actuator.step_length * world.actuator.step_rate
         found += [
             told,
             LinearityLimit("a motor's speed", True, _over(speed, swing.motor(1)), "as fast as it has to be"),
         ]
-    if level == TENDON:
+    if level == "tendon":
         play = loop.plant.actuator.backlash / world.plant.tendon_offset
         found += [LinearityLimit("backlash", False, play, "none")] if play else []
         acceleration = _SHARE * loop.actuator.step_length * world.actuator.step_acceleration

@@ -14,16 +14,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.simulation.actuator import LAGGED, TENDON
+from wristctl.simulation.actuator import IdealDrive, SpoolDrive
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import RECORDED, Span, run_blocks
 from wristctl.simulation.motion import Angles, Motion
-from wristctl.simulation.observer import Schedule
+from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
-from wristctl.wrist.elastic import OF_A_TENDON, PATH
+from wristctl.wrist.elastic import OF_A_TENDON, PATH, PulledTendons, RealTendons
 from wristctl.wrist.plant import kernel_of
 
 _ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
@@ -51,22 +51,24 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
 
     What was delivered and the frames under way come as they are counted back from the tick.
     """
-    state, level, k = batch.state, batch.setup.level, len(batch.setup.coordinates)
+    state, drive, k = batch.state, batch.world.drive, len(batch.setup.coordinates)
     yield StatePart("memory", state.memory, np.arange(memory), np.ones(memory))
     yield StatePart("angle", state.coordinates, np.arange(k), np.full(k, _ANGLE))
     yield StatePart("rate", state.coordinates, np.arange(k, 2 * k), np.full(k, _RATE))
-    size = _LENGTH if level == TENDON else _PULL
-    if level in (LAGGED, TENDON):
+    size = _LENGTH if isinstance(drive, SpoolDrive) else _PULL
+    if not isinstance(drive, IdealDrive):
         yield StatePart("motor", state.motors, np.array([0, 2]), np.full(2, size))
-    if state.tendons is not None:
-        own = len(OF_A_TENDON)
-        count = (state.tendons.shape[1] - PATH - k) // own
-        yield StatePart("path", state.tendons, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
+    if isinstance(state.tendons, RealTendons):
+        rows, own = state.tendons.state, len(OF_A_TENDON)
+        count = (rows.shape[1] - PATH - k) // own
+        yield StatePart("path", rows, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
         bristles = PATH + own * np.arange(count)
-        yield StatePart("bristle", state.tendons, bristles, np.ones(count))
-        yield StatePart("tendon creep", state.tendons, bristles + 1, np.full(count, _LENGTH))
-        yield StatePart("spring creep", state.tendons, PATH + own * count + np.arange(k), np.full(k, _ANGLE))
-    if state.watch is not None:
+        yield StatePart("bristle", rows, bristles, np.ones(count))
+        yield StatePart("tendon creep", rows, bristles + 1, np.full(count, _LENGTH))
+    if isinstance(state.tendons, (PulledTendons, RealTendons)):
+        rows = state.tendons.state
+        yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))
+    if isinstance(state.watch, Watch):
         observer, taken = state.watch.observer, int(state.watch.turn[0, 0, 0])
         sizes = np.array([_ANGLE, _RATE, _ANGLE])
         yield StatePart("estimate", observer.now, np.arange(3), sizes)
@@ -224,7 +226,7 @@ class LoopTicks:
     def _shift_frame(self, tick: int, lane: int) -> bool:
         """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
         watch = self._batch.state.watch
-        if watch is None:
+        if not isinstance(watch, Watch):
             return False
         taken = int(watch.turn[0, 0, 0])
         if self._frames().captures[taken] != tick:
@@ -257,7 +259,8 @@ class LoopTicks:
     def _frames(self) -> Schedule:
         """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
         never = np.zeros((1, 0, 1), np.int64), *np.zeros((2, 1, 1), np.int64)
-        schedule = self._batch.world.schedule or Schedule(*never)
+        schedule = self._batch.world.schedule
+        schedule = schedule if isinstance(schedule, Schedule) else Schedule(*never)
         return Schedule(*(each[0, ..., 0] for each in schedule))
 
     def _parts(self, tick: int) -> Iterator[StatePart]:
@@ -269,7 +272,7 @@ class LoopTicks:
     def _count_to(self, tick: int) -> None:
         """Set the camera's counters to what they are before a tick."""
         watch, frames = self._batch.state.watch, self._frames()
-        if watch is not None:
+        if isinstance(watch, Watch):
             taken, arrived = (int(np.searchsorted(each, tick)) for each in (frames.captures, frames.arrivals))
             watch.turn[:, 0], watch.turn[:, 1] = taken, arrived
             watch.observer.at[:] = frames.dated[arrived - 1]

@@ -21,7 +21,7 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip
-from wristctl.lanes.lane import where
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import reeling, spool_target
 from wristctl.wrist.directions import ACTIVE, tendons_of
@@ -120,7 +120,7 @@ def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates:
     gaps, known, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
     change = acceleration * period
     for axis in range(len(gap)):
-        closing = reeling(gaps[axis], acceleration + 0.0 * gaps[axis], period)
+        closing = reeling(gaps[axis], acceleration + zero_like(gaps[axis]), period)
         wanted = clip(known[axis] + where(gaps[axis] < 0.0, -closing, closing), -speed, speed)
         out[axis] = clip(wanted, last[axis] - change, last[axis] + change)
 
@@ -128,7 +128,7 @@ def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates:
 @kernel
 def _paths(model: Any, theta: float, found: Any) -> None:
     known, row = load_segments(rows_of(model)), rows_of(found)
-    angle = theta + 0.0 * known.length
+    angle = theta + zero_like(known.length)
     plus, minus = lengths(angle, known)
     row[0] = known.length - plus
     row[1] = known.length - minus

@@ -14,6 +14,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.control.response import Controlled, Estimate, look_ahead, respond
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import ArrivingFrame, fuse, predict
@@ -95,16 +96,16 @@ class Steering:
 
 @kernel
 def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float, found: Any) -> None:
-    known, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
+    believed, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
     course, tick, preview = to_follow
     for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
         control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
         if ahead > 0:
             look_ahead(control, ahead, 0.0)
-    seen = Estimate(x[0], x[1], x[2])
-    wanted, low, high, plus, minus = respond(control, known, seen, (bound[0], bound[1]), 0.0, period)
+    estimate = Estimate(x[0], x[1], x[2])
+    wanted, low, high, plus, minus = respond(control, believed, estimate, (bound[0], bound[1]), 0.0, period)
     row[0] = wanted
-    row[1] = torque_of(x[0], known, plus, minus)
+    row[1] = torque_of(x[0], believed, plus, minus)
     row[2] = plus
     row[3] = minus
     row[4] = low
@@ -113,16 +114,16 @@ def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float,
 
 @kernel
 def _fuse(observer: Any, drive: Any, model: Any, ticks: Any, since: float, theta: float, h: float) -> None:
-    known = load_segments(rows_of(model))
-    zero = 0.0 * known.length
-    fuse(observer, drive, known, ticks, ArrivingFrame(ticks[1] + zero, since, theta + zero, 1.0 + zero), h)
+    believed = load_segments(rows_of(model))
+    zero = zero_like(believed.length)
+    fuse(observer, drive, believed, ticks, ArrivingFrame(ticks[1] + zero, since, theta + zero, 1.0 + zero), h)
 
 
 @kernel
 def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
-    known = load_segments(rows_of(model))
-    zero = 0.0 * known.length
-    predict(observer, drive, known, tick, plus + zero, minus + zero, h)
+    believed = load_segments(rows_of(model))
+    zero = zero_like(believed.length)
+    predict(observer, drive, believed, tick, plus + zero, minus + zero, h)
 
 
 class HostFaults:

@@ -13,6 +13,7 @@ from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import predict
@@ -157,9 +158,9 @@ class BlindModel:
 
 @kernel
 def _predict(observer: Any, drive: Any, model: Any, plus: float, minus: float, h: float) -> None:
-    known = load_segments(rows_of(model))
-    zero = 0.0 * known.length
-    predict(observer, drive, known, 0, plus + zero, minus + zero, h)
+    believed = load_segments(rows_of(model))
+    zero = zero_like(believed.length)
+    predict(observer, drive, believed, 0, plus + zero, minus + zero, h)
 
 
 _HISTORY, _SWINGING = 0.2, 1.0

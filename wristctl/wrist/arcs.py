@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
-from wristctl.lanes.lane import planar
+from wristctl.lanes.lane import planar, zero_like
 
 ARC_LIMIT = 2.0 * math.pi
 """Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
@@ -26,7 +26,7 @@ def chords(theta: Any, length: Any, arc: Any) -> Any:
 
     z_k = exp(i Phi_{k-1}) c(theta_k) exp(i theta_k / 2) with the chord's length c = l sin(x)/x, x = theta_k / 2 (E2).
     """
-    tangent = planar(1.0 + 0.0 * length, 0.0)
+    tangent = planar(1.0 + zero_like(length), 0.0)
     for k in range(len(theta)):
         x = 0.5 * theta[k]
         e0, e1, e2, e3 = bessel(x)
@@ -48,8 +48,8 @@ def chords(theta: Any, length: Any, arc: Any) -> Any:
 @compiled
 def tip(theta: Any, length: Any) -> Any:
     """Centre of the last disc, as a planar vector from the base, and the last tangent exp(i Phi_n) (E1)."""
-    position = planar(0.0 * length, 0.0)
-    tangent = planar(1.0 + 0.0 * length, 0.0)
+    position = planar(zero_like(length), 0.0)
+    tangent = planar(1.0 + zero_like(length), 0.0)
     for k in range(len(theta)):
         x = 0.5 * theta[k]
         e0, e1, _, _ = bessel(x)

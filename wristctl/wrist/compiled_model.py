@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from wristctl.arrays import Array
 from wristctl.lanes.blocks import spread, to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import dot, planar
+from wristctl.lanes.lane import dot, planar, zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist import tendons
 from wristctl.wrist.arcs import Chords, chords, tip
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
+from wristctl.wrist.elastic import NoTendons
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import Segments, load_segments
@@ -44,7 +45,7 @@ def _terms(parameters: Any, states: Any, out: Any, segments: Any) -> None:
         n = len(segments)
         theta, omega = part(state, 0, segments), part(state, n, segments)
         r, mass = lanes_like(theta), square_like(theta)
-        zero = 0.0 * theta[0]
+        zero = zero_like(theta[0])
         equation_of_motion(segment, theta, omega, zero, zero, mass, r)
         position, _ = tip(theta, segment.length)
         result[0] = dot(position, planar(1.0 + zero, zero))
@@ -132,7 +133,7 @@ def _integrate(parameters: Any, pulls: Any, h: float, steps: Any, out: Any, segm
             state[i] = before[i]
         theta, omega = part(state, 0, segments), part(state, n, segments)
         for _ in range(steps[sample]):
-            step(segment, theta, omega, (pull[0], pull[1]), None, h + 0.0 * pull[0])
+            step(segment, theta, omega, (pull[0], pull[1]), NoTendons(), h + zero_like(pull[0]))
 
 
 def integrate(

@@ -12,7 +12,7 @@ masses beyond a segment give M and both Jacobians of r in O(n^2).
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import dot, planar, turn
+from wristctl.lanes.lane import dot, planar, turn, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import chords, spring, tendon_torques
@@ -55,7 +55,7 @@ def bias(segment: Any, theta: Any, omega: Any, arc: Any, tangent: Any, pull: Any
     z, dz, d2z = arc.z, arc.dz, arc.d2z
     force = planes_like(z)
     weight = planar(segment.gravity_x, segment.gravity_y)
-    spin = 0.0 * segment.length
+    spin = zero_like(segment.length)
     a = planar(spin, spin)
     for k in range(len(z)):
         w = omega[k]

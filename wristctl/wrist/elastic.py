@@ -1,18 +1,22 @@
-"""Elastic tendons and what else of a real wrist its ideal model leaves out, evaluated inside an integration step.
+"""Tendons between spools and wrist, as the integration step evaluates them.
 
-Each side has one tendon or two alike; `given` holds what they have reeled in [m], (plus, minus) or twice that. Where
-a path is shorter by x a tendon of stiffness k is stretched by e = given - x, pulls k max(e - f psi, 0) at its spool,
-never pushes, and pulls less at the wrist by its friction (tendon_friction). psi is the creep of one Maxwell branch: it
-follows e with a time constant, so that the share f of the stiffness relaxes. Springs creep alike (yielding).
+What there is follows from a type. NoTendons and PulledTendons hold pulls [N] over a step, ElasticTendons and
+RealTendons the lengths [m] that spools have reeled in. Either is the step's `spool_input`, (plus, minus) of one tendon
+a side, or of RealTendons twice that of two alike.
+
+Where a path is shorter by x a tendon of stiffness k that has reeled in l is stretched by e = l - x, pulls
+k max(e - f psi, 0) at its spool, never pushes, and pulls less at the wrist by its friction (tendon_friction). psi is
+the creep of one Maxwell branch: it follows e with a time constant, so that the share f of the stiffness relaxes.
+Springs creep alike (yielding).
 """
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import rounded, where
+from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.parts import tuple_of
-from wristctl.lanes.rows import lanes_like
+from wristctl.lanes.rows import lanes_like, rows_of
 from wristctl.wrist.chain import lengths, moment_arms
 from wristctl.wrist.tendon_friction import bristle, bristle_slope, capstan
 
@@ -20,8 +24,6 @@ from wristctl.wrist.tendon_friction import bristle, bristle_slope, capstan
 class Nonideal(NamedTuple):
     """What a real wrist has; lanes, SI units. All of it at 0 (`stop` inf) gives the ideal's bits."""
 
-    held: Any
-    """1 where `given` are pulls [N], held during a step, instead of lengths."""
     friction: Any
     sheath: Any
     bristle: Any
@@ -60,16 +62,64 @@ _OWN, PATH = len(OF_A_TENDON), 3
 Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
 
 
-class Tendons(NamedTuple):
-    """Elastic tendons: the stiffness of each in `given` [N/m]; where they are not ideal, how, and their state."""
+class NoTendons(NamedTuple):
+    """Held pulls act on the wrist as they are, and all else of it is ideal."""
+
+
+class PulledTendons(NamedTuple):
+    """Held pulls on a wrist with end stops, creeping springs and tendons that break; of the state path, friction and
+    creep of tendons stay as they are."""
+
+    nonideal: Any
+    state: Any
+
+
+class ElasticTendons(NamedTuple):
+    """One tendon a side that only stretches: its stiffness [N/m]."""
+
+    stiffness: Any
+
+
+class RealTendons(NamedTuple):
+    """Tendons with friction, creep and faults: the stiffness of each [N/m], Nonideal, and their state."""
 
     stiffness: Any
     nonideal: Any
     state: Any
 
 
+Tendons = NoTendons | PulledTendons | ElasticTendons | RealTendons
+
+
+@by_type
+def tendons_in_lanes(tendons: Any) -> Any:
+    """Tendons of lanes from tendons of one block's arrays."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(tendons_in_lanes, NoTendons)
+def _none(tendons: Any) -> Any:
+    return tendons
+
+
+@implements(tendons_in_lanes, PulledTendons)
+def _pulled(tendons: Any) -> Any:
+    return PulledTendons(read_nonideal(rows_of(tendons.nonideal)), rows_of(tendons.state))
+
+
+@implements(tendons_in_lanes, ElasticTendons)
+def _elastic(tendons: Any) -> Any:
+    return ElasticTendons(rows_of(tendons.stiffness)[0])
+
+
+@implements(tendons_in_lanes, RealTendons)
+def _real(tendons: Any) -> Any:
+    nonideal = read_nonideal(rows_of(tendons.nonideal))
+    return RealTendons(rows_of(tendons.stiffness)[0], nonideal, rows_of(tendons.state))
+
+
 def state_rows(tendons: int, coordinates: int) -> int:
-    """Rows of the state of so many tendons in `given` and of a wrist with so many coordinates."""
+    """Rows of the state of so many tendons and of a wrist with so many coordinates."""
     return PATH + _OWN * tendons + coordinates
 
 
@@ -82,7 +132,7 @@ def row_of(t: int, which: int) -> int:
 @compiled
 def travel(segment: Any, theta: Any) -> Any:
     """By how much both sides' paths are shorter than on the straight wrist [m], and the bend [rad]."""
-    zero = 0.0 * segment.length
+    zero = zero_like(segment.length)
     plus, minus, bend = zero, zero, zero
     for k in range(len(theta)):
         path_plus, path_minus = lengths(segment, theta[k])
@@ -98,109 +148,149 @@ def _slid(nonideal: Any, state: Any, t: int, x: Any) -> Any:
 
 
 @compiled
-def spool_pull(tendons: Any, given: Any, t: int, x: Any) -> Any:
-    """Pull [N] at its spool of one tendon that is not ideal and has reeled in `given` [m]."""
+def spool_pull(tendons: Any, length: Any, t: int, x: Any) -> Any:
+    """Pull [N] at its spool of one real tendon that has reeled in a length [m]."""
     state = tendons.state
-    elongation = (given - x) - tendons.nonideal.tendon_creep * state[row_of(t, _CREPT)]
-    return rounded(state[row_of(t, SHARE)] * tendons.stiffness * maximum(elongation, 0.0 * x))
+    elongation = (length - x) - tendons.nonideal.tendon_creep * state[row_of(t, _CREPT)]
+    return rounded(state[row_of(t, SHARE)] * tendons.stiffness * maximum(0.0, elongation))
 
 
 @compiled
-def _at_wrist(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, z: Any) -> Any:
+def _stretch_pull(tendons: Any, length: Any, x: Any) -> Any:
+    return rounded(tendons.stiffness * maximum(0.0, length - x))
+
+
+@compiled
+def _at_wrist(tendons: Any, length: Any, t: int, path: Any, z: Any) -> Any:
     """Pull [N] of one tendon whose bristle is in this state."""
-    left = capstan(nonideal.friction, nonideal.sheath + path[2], z)
-    pull = rounded(spool_pull(tendons, given[t], t, path[t % 2]) * left)
-    return where(nonideal.held > 0.0, given[t], pull)
+    left = capstan(tendons.nonideal.friction, tendons.nonideal.sheath + path[2], z)
+    return rounded(spool_pull(tendons, length, t, path[t % 2]) * left)
 
 
-@compiled
-def _as_it_was(nonideal: Any, state: Any, t: int, x: Any) -> Any:
-    return state[row_of(t, Z)]
+@by_type
+def pulls_along(tendons: Any, spool_input: Any, path: Any) -> Any:
+    """Pulls [N] of both sides at the wrist, at a path (plus, minus, bend) within a step."""
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _pull(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, bristle_of: Any) -> Any:
-    x = path[t % 2]
-    if nonideal is None:
-        return rounded(tendons.stiffness * maximum(given[t] - x, 0.0 * x))
-    return _at_wrist(tendons, nonideal, given, t, path, bristle_of(nonideal, tendons.state, t, x))
+@by_type
+def pulls_at_start(tendons: Any, spool_input: Any, path: Any) -> Any:
+    """Pulls [N] of both sides at the wrist at the start of a step, where no tendon has slid yet."""
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _pulls(tendons: Any, given: Any, path: Any, bristle_of: Any) -> Any:
-    if tendons is None:
-        return given[0], given[1]
-    plus, minus = 0.0 * path[0], 0.0 * path[0]
-    for t in range(0, len(given), 2):
-        plus = plus + _pull(tendons, tendons.nonideal, given, t, path, bristle_of)
-        minus = minus + _pull(tendons, tendons.nonideal, given, t + 1, path, bristle_of)
+@implements(pulls_at_start, NoTendons, PulledTendons)
+@implements(pulls_along, NoTendons, PulledTendons)
+def _held_pulls(tendons: Any, pulls: Any, path: Any) -> Any:
+    return pulls[0], pulls[1]
+
+
+@implements(pulls_at_start, ElasticTendons)
+@implements(pulls_along, ElasticTendons)
+def _elastic_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
+    return _stretch_pull(tendons, reeled[0], path[0]), _stretch_pull(tendons, reeled[1], path[1])
+
+
+@implements(pulls_along, RealTendons)
+def _slid_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
+    plus, minus = zero_like(path[0]), zero_like(path[0])
+    for t in range(0, len(reeled), 2):
+        slid_plus = _slid(tendons.nonideal, tendons.state, t, path[0])
+        slid_minus = _slid(tendons.nonideal, tendons.state, t + 1, path[1])
+        plus = plus + _at_wrist(tendons, reeled[t], t, path, slid_plus)
+        minus = minus + _at_wrist(tendons, reeled[t + 1], t + 1, path, slid_minus)
     return plus, minus
 
 
-@compiled
-def pulls_along(tendons: Any, given: Any, path: Any) -> Any:
-    """Pulls [N] of both sides at the wrist at a path (plus, minus, bend); those given where `tendons` is None."""
-    return _pulls(tendons, given, path, _slid)
+@implements(pulls_at_start, RealTendons)
+def _stuck_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
+    plus, minus = zero_like(path[0]), zero_like(path[0])
+    for t in range(0, len(reeled), 2):
+        plus = plus + _at_wrist(tendons, reeled[t], t, path, tendons.state[row_of(t, Z)])
+        minus = minus + _at_wrist(tendons, reeled[t + 1], t + 1, path, tendons.state[row_of(t + 1, Z)])
+    return plus, minus
 
 
-@compiled
-def pulls_at_start(tendons: Any, given: Any, path: Any) -> Any:
-    """The same at the start of a step, where no tendon has slid yet."""
-    return _pulls(tendons, given, path, _as_it_was)
+@by_type
+def _slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+    """By how much one tendon's pull falls with its path's shortening at the start of a step [N/m]."""
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _slope(tendons: Any, nonideal: Any, given: Any, t: int, path: Any, speed: Any) -> Any:
-    """By how much the pull falls with travel at the start of a step [N/m]."""
+@implements(_slope, ElasticTendons)
+def _elastic_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     x = path[t % 2]
-    if nonideal is None:
-        return where(given[t] - x > 0.0, tendons.stiffness, 0.0 * x)
-    z, wrapped = tendons.state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + path[2])
-    pull = spool_pull(tendons, given[t], t, x)
-    taut = where(pull > 0.0, tendons.state[row_of(t, SHARE)] * tendons.stiffness, 0.0 * x)
-    slope = (taut + pull * wrapped * bristle_slope(z, speed, nonideal.bristle)) * capstan(wrapped, 1.0 + 0.0 * x, z)
-    return where(nonideal.held > 0.0, 0.0 * x, slope)
+    return where(length - x > 0.0, tendons.stiffness, 0.0)
 
 
-@compiled
-def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, path: Any, by_theta: Any) -> None:
+@implements(_slope, RealTendons)
+def _real_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+    x, nonideal, state = path[t % 2], tendons.nonideal, tendons.state
+    z, wrapped = state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + path[2])
+    pull = spool_pull(tendons, length, t, x)
+    taut = where(pull > 0.0, state[row_of(t, SHARE)] * tendons.stiffness, 0.0)
+    sliding = pull * wrapped * bristle_slope(z, speed, nonideal.bristle)
+    return (taut + sliding) * capstan(wrapped, 1.0, z)
+
+
+@by_type
+def stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, path: Any, by_theta: Any) -> None:
     """Add to dr/d(theta) (n, n) what tendons on held spools add: arm_i (-dT/dx) arm_j of each."""
-    if tendons is not None:
-        n, ahead, behind = len(theta), lanes_like(theta), lanes_like(theta)
-        zero = 0.0 * segment.length
-        speed_plus, speed_minus = zero, zero
-        for k in range(n):
-            arm_plus, arm_minus = moment_arms(segment, theta[k])
-            ahead[k] = arm_plus
-            behind[k] = arm_minus
-            speed_plus = speed_plus + arm_plus * omega[k]
-            speed_minus = speed_minus + arm_minus * omega[k]
-        plus, minus = zero, zero
-        for t in range(0, len(given), 2):
-            plus = plus + _slope(tendons, tendons.nonideal, given, t, path, speed_plus)
-            minus = minus + _slope(tendons, tendons.nonideal, given, t + 1, path, speed_minus)
-        for i in range(n):
-            for j in range(n):
-                by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def settle(tendons: Any, theta: Any, given: Any, path: Any) -> None:
+@implements(stiffen, NoTendons, PulledTendons)
+def _stiffen_nothing(tendons: Any, segment: Any, theta: Any, omega: Any, pulls: Any, path: Any, by_theta: Any) -> None:
+    pass
+
+
+@implements(stiffen, ElasticTendons, RealTendons)
+def _stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, reeled: Any, path: Any, by_theta: Any) -> None:
+    n, ahead, behind = len(theta), lanes_like(theta), lanes_like(theta)
+    zero = zero_like(segment.length)
+    speed_plus, speed_minus = zero, zero
+    for k in range(n):
+        arm_plus, arm_minus = moment_arms(segment, theta[k])
+        ahead[k] = arm_plus
+        behind[k] = arm_minus
+        speed_plus = speed_plus + arm_plus * omega[k]
+        speed_minus = speed_minus + arm_minus * omega[k]
+    plus, minus = zero, zero
+    for t in range(0, len(reeled), 2):
+        plus = plus + _slope(tendons, reeled[t], t, path, speed_plus)
+        minus = minus + _slope(tendons, reeled[t + 1], t + 1, path, speed_minus)
+    for i in range(n):
+        for j in range(n):
+            by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]
+
+
+@by_type
+def update_memory(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     """Take the state over to the end of a step, at coordinates theta with this path."""
-    if tendons is not None:
-        _settle(tendons.nonideal, tendons.state, theta, given, path)
+    raise NotImplementedError("compiled code only")
 
 
+@implements(update_memory, NoTendons, ElasticTendons)
+def _update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+    pass
+
+
+@implements(update_memory, PulledTendons)
 @compiled
-def _settle(nonideal: Any, state: Any, theta: Any, given: Any, path: Any) -> None:
-    if nonideal is not None:
-        for t in range(len(given)):
-            state[row_of(t, Z)] = _slid(nonideal, state, t, path[t % 2])
-            stretch, at = maximum(given[t] - path[t % 2], 0.0 * path[2]), row_of(t, _CREPT)
-            state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
-        state[0] = path[0]
-        state[1] = path[1]
-        state[2] = path[2]
-        for k in range(len(theta)):
-            at = row_of(len(given), PATH) + k
-            state[at] = theta[k] + nonideal.spring_keep * (state[at] - theta[k])
+def _update_springs(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+    state = tendons.state
+    for k in range(len(theta)):
+        at = row_of(len(spool_input), PATH) + k
+        state[at] = theta[k] + tendons.nonideal.spring_keep * (state[at] - theta[k])
+
+
+@implements(update_memory, RealTendons)
+def _update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
+    nonideal, state = tendons.nonideal, tendons.state
+    for t in range(len(reeled)):
+        state[row_of(t, Z)] = _slid(nonideal, state, t, path[t % 2])
+        stretch, at = maximum(0.0, reeled[t] - path[t % 2]), row_of(t, _CREPT)
+        state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
+    for i in range(PATH):
+        state[i] = path[i]
+    _update_springs(tendons, theta, reeled, path)

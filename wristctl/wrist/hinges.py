@@ -14,13 +14,21 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.compiled import compiled, implements, kernel
 from wristctl.lanes.functions import bessel
-from wristctl.lanes.lane import planar, turn
+from wristctl.lanes.lane import planar, turn, zero_like
 from wristctl.lanes.parts import replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist.arcs import Chords
-from wristctl.wrist.chain import CHAINS, Chain, angle_along, tip_derivatives
+from wristctl.wrist.chain import (
+    angle_along,
+    chords,
+    lengths,
+    moment_arms,
+    spring,
+    tendon_torques,
+    tip_derivatives,
+)
 from wristctl.wrist.dynamics import bias
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
@@ -63,9 +71,10 @@ def _turned(q: Any) -> Any:
     return planar(e0 - q * q * e1, q * e0)  # (cos q, sin q)
 
 
+@implements(chords, Hinges)
 @compiled
 def _chords(segment: Any, theta: Any, arc: Any) -> Any:
-    tangent, half = planar(1.0 + 0.0 * segment.length, 0.0), 0.5 * segment.length
+    tangent, half = planar(1.0 + zero_like(segment.length), 0.0), 0.5 * segment.length
     for k in range(len(theta)):
         after = tangent * _turned(theta[k])
         link = half * after
@@ -79,8 +88,8 @@ def _chords(segment: Any, theta: Any, arc: Any) -> Any:
 
 @compiled
 def _tip(segment: Any, theta: Any) -> Any:
-    tangent, half = planar(1.0 + 0.0 * segment.length, 0.0), 0.5 * segment.length
-    position = 0.0 * tangent
+    tangent, half = planar(1.0 + zero_like(segment.length), 0.0), 0.5 * segment.length
+    position = zero_like(half) * tangent
     for k in range(len(theta)):
         after = tangent * _turned(theta[k])
         position = position + half * (tangent + after)
@@ -95,6 +104,7 @@ def _half(theta: Any) -> Any:
     return e0 - y * y * e1, y * e0  # cos(q/2), sin(q/2)
 
 
+@implements(lengths, Hinges)
 @compiled
 def _lengths(segment: Any, theta: Any) -> Any:
     cosine, sine = _half(theta)
@@ -102,6 +112,7 @@ def _lengths(segment: Any, theta: Any) -> Any:
     return middle - bending, middle + bending
 
 
+@implements(moment_arms, Hinges)
 @compiled
 def _moment_arms(segment: Any, theta: Any) -> Any:
     cosine, sine = _half(theta)
@@ -109,6 +120,7 @@ def _moment_arms(segment: Any, theta: Any) -> Any:
     return bending + compression, compression - bending
 
 
+@implements(tendon_torques, Hinges)
 @compiled
 def _tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any, slope: Any) -> None:
     bend, squeeze = segment.tendon_offset * (plus - minus), 0.5 * segment.length * (plus + minus)
@@ -118,15 +130,13 @@ def _tendon_torques(segment: Any, theta: Any, plus: Any, minus: Any, torque: Any
         slope[k] = 0.5 * (squeeze * cosine - bend * sine)
 
 
+@implements(spring, Hinges)
 @compiled
 def _spring(segment: Any, k: int) -> Any:
     stiffness = segment.stiffness
     for _ in range(k):
         stiffness = stiffness * segment.softening
     return stiffness
-
-
-CHAINS[Hinges] = Chain(_chords, _lengths, _moment_arms, _tendon_torques, _spring)
 
 
 @compiled

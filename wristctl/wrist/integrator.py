@@ -11,6 +11,7 @@ order system the 2n equations of each stage reduce to n:
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import chords, tendon_torques
@@ -26,7 +27,7 @@ from wristctl.wrist.yielding import yield_, yield_jacobians
 def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any, k_theta: Any, k_rate: Any) -> None:
     n = len(r_theta)
     for i in range(n):
-        total = 0.0 * hg
+        total = zero_like(hg)
         for j in range(n):
             total = total + mass[i, j] * r_rate[j] - hg * by_theta[i, j] * r_theta[j]
         k_rate[i] = total
@@ -36,18 +37,18 @@ def _stage(mass: Any, by_theta: Any, lu: Any, hg: Any, r_theta: Any, r_rate: Any
 
 
 @compiled
-def _accelerations(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, mass: Any, a: Any) -> None:
+def _accelerations(segment: Any, theta: Any, omega: Any, spool_input: Any, tendons: Any, mass: Any, a: Any) -> None:
     """-theta'' into `a`, with `mass` to work on."""
-    plus, minus = pulls_along(tendons, given, path_along(tendons, segment, theta))
+    plus, minus = pulls_along(tendons, spool_input, path_along(tendons, segment, theta))
     equation_of_motion(segment, theta, omega, plus, minus, mass, a)
-    yield_(tendons, segment, theta, omega, given, a)
+    yield_(tendons, segment, theta, omega, spool_input, a)
     factorise(mass)
     solve(mass, a)
 
 
 @compiled
-def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any) -> Any:
-    """Advance angles and rates by h [s] with `given` held: both sides' pulls [N], or what their tendons reeled in [m].
+def step(segment: Any, theta: Any, omega: Any, spool_input: Any, tendons: Any, h: Any) -> Any:
+    """Advance angles and rates by h [s] with `spool_input` held: pulls [N] of both sides, or what spools reeled in [m].
 
     Elastic tendons and their friction are evaluated at each stage, and their tangent is in the Jacobian. Returns by how
     much the bend and its rate [rad, rad/s] differ from the embedded solution of second order. That difference is the
@@ -66,11 +67,11 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
 
     tangent = chords(segment, theta, arc)
     path = path_before(tendons, segment, theta)
-    plus, minus = pulls_at_start(tendons, given, path)
+    plus, minus = pulls_at_start(tendons, spool_input, path)
     tendon_torques(segment, theta, plus, minus, pull, slope)
     mass_matrix(segment, arc, tangent, mass)
     bias(segment, theta, omega, arc, tangent, pull, a0)
-    yield_(tendons, segment, theta, omega, given, a0)
+    yield_(tendons, segment, theta, omega, spool_input, a0)
     for i in range(n):
         a0[i] = -a0[i]
         for j in range(n):
@@ -78,7 +79,7 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
     factorise(other_mass)
     solve(other_mass, a0)
     residual_jacobians(segment, omega, a0, arc, tangent, slope, by_theta, lu)
-    stiffen(tendons, segment, theta, omega, given, path, by_theta)
+    stiffen(tendons, segment, theta, omega, spool_input, path, by_theta)
     yield_jacobians(tendons, theta, omega, by_theta, lu)
     for i in range(n):
         for j in range(n):
@@ -94,7 +95,7 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
     for i in range(n):
         at[i] = theta[i] + 2.0 * k1[i]
         rate[i] = omega[i] + 2.0 * l1[i]
-    _accelerations(segment, at, rate, given, tendons, other_mass, a)
+    _accelerations(segment, at, rate, spool_input, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i])
@@ -103,13 +104,13 @@ def step(segment: Any, theta: Any, omega: Any, given: Any, tendons: Any, h: Any)
     for i in range(n):
         at[i] = at[i] + k3[i]
         rate[i] = rate[i] + l3[i]
-    _accelerations(segment, at, rate, given, tendons, other_mass, a)
+    _accelerations(segment, at, rate, spool_input, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i] - 8.0 / 3.0 * k3[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i] - 8.0 / 3.0 * l3[i])
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k4, l4)
     _stage(mass, by_theta, lu, hg, k4, l4, k1, l1)
-    of_bend, of_rate = 0.0 * h, 0.0 * h
+    of_bend, of_rate = zero_like(h), zero_like(h)
     for i in range(n):
         theta[i] = at[i] + k4[i]
         omega[i] = rate[i] + l4[i]

@@ -8,7 +8,7 @@ b_j = d(z_j'')/d(theta_j). Likewise d(p_k'')/d(rate_j) = 2 dJ_kj/dt, and dJ_kj/d
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import dot, planar, turn
+from wristctl.lanes.lane import dot, planar, turn, zero_like
 from wristctl.lanes.rows import planes_like
 from wristctl.wrist.chain import spring
 
@@ -27,7 +27,7 @@ def residual_jacobians(
     velocity, force = planes_like(z), planes_like(z)
     field, sweep, own_field, own_sweep = planes_like(z), planes_like(z), planes_like(z), planes_like(z)
     weight = planar(segment.gravity_x, segment.gravity_y)
-    spin = 0.0 * segment.length
+    spin = zero_like(segment.length)
     spin_rate = spin
     p, v, a = planar(spin, spin), planar(spin, spin), planar(spin, spin)
     for k in range(n):

@@ -24,10 +24,11 @@ from wristctl.config.choices import Choices
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import compiled, kernel
-from wristctl.lanes.lane import dot, planar
+from wristctl.lanes.compiled import by_type, implements, kernel
+from wristctl.lanes.lane import dot, planar, zero_like
 from wristctl.lanes.parts import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons
 from wristctl.wrist.shape import Backbone
 
 
@@ -61,7 +62,8 @@ class PlantModel:
     """Coordinates (q,) at rest under tensions [N per tendon, + and - side]; None where the plant cannot tell."""
 
     def __post_init__(self) -> None:
-        _MODELS[self.parameters] = self
+        for function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
+            implements(function, self.parameters)(getattr(self, function.__name__))
 
     @property
     def sources(self) -> tuple[Path, ...]:
@@ -78,7 +80,6 @@ class PlantModel:
 
 
 PLANTS: Choices[PlantModel] = _TABLE
-_MODELS: dict[Any, PlantModel] = {}
 
 
 class PlantType(numba.types.Type):
@@ -119,83 +120,83 @@ def _parameters_of(model: Any, rows: Any) -> Any:
     return parameters
 
 
-def advance(plant: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> Any:
-    """Move coordinates and rates on by h [s] with `given` (plus, minus) held.
+@by_type
+def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: Any) -> Any:
+    """Move coordinates and rates on by h [s] with `spool_input` held.
 
-    Returns an estimate of the step's error in the bending angle and in its rate [rad, rad/s], as an embedded solution
-    of lower order gives it.
-
-    These are pulls [N] where `tendons` is None, else what elastic tendons have reeled in [m]: their pulls at any place
-    are `wristctl.wrist.elastic.pulls_along`'s, and end stops are `wristctl.wrist.yielding`'s.
+    It is what the spools of both sides hold, (plus, minus) or twice that: by the type of `tendons` pulls [N] or lengths
+    reeled in [m]. Pulls at any place are `wristctl.wrist.elastic.pulls_along`'s, and end stops are
+    `wristctl.wrist.yielding`'s. Returns an estimate of the step's error in the bending angle and in its rate
+    [rad, rad/s], as an embedded solution of lower order gives it.
     """
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def tip_angle(plant: Any, q: Any, rate: Any) -> Any:
     """Bending angle of the last disc [rad] and its rate [rad/s]."""
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def travel(plant: Any, q: Any) -> Any:
     """By how much the paths of the + and the - side's tendons are shorter than on the straight wrist [m], and the bend
     that they are wrapped by [rad]."""
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def within(plant: Any, q: Any) -> Any:
     """Where the coordinates are ones that the plant can have."""
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def disturbed(plant: Any, force: Any, scale: Any) -> Any:
     """The plant with a force on the last disc [N, across the straight wrist] and its stiffness scaled."""
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def tip_pose(plant: Any, q: Any) -> Any:
     """Centre of the last disc and the unit tangent there, planar."""
     raise NotImplementedError("compiled code only")
 
 
+@by_type
 def tip_jacobian(plant: Any, q: Any, place: Any, angle: Any) -> None:
     """Derivatives of the last disc's centre (planar rows) and of its angle (rows) by each coordinate."""
     raise NotImplementedError("compiled code only")
 
 
-def _by_plant(function: Any) -> None:
-    @overload(function, strict=False, jit_options={"error_model": "numpy", "nogil": True, "forceinline": True})
-    def own(plant: Any, *others: Any) -> Any:
-        model = _MODELS.get(plant.instance_class) if isinstance(plant, numba.types.BaseNamedTuple) else None
-        return None if model is None else getattr(model, function.__name__).py_func
-
-
-for _function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
-    _by_plant(_function)
-
-
-@compiled
+@by_type
 def path_along(tendons: Any, plant: Any, q: Any) -> Any:
-    """A plant's `travel` where it matters."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
+    """Path of the tendons at coordinates q, as the plant's `travel`; zeros where pulls are held, which need none."""
+    raise NotImplementedError("compiled code only")
+
+
+@by_type
+def path_before(tendons: Any, plant: Any, q: Any) -> Any:
+    """Path of the tendons before a step, at coordinates q; real tendons remember it from the step before."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(path_before, NoTendons, PulledTendons)
+@implements(path_along, NoTendons, PulledTendons)
+def _no_path(tendons: Any, plant: Any, q: Any) -> Any:
+    zero = zero_like(q[0])
+    return zero, zero, zero
+
+
+@implements(path_before, ElasticTendons)
+@implements(path_along, ElasticTendons, RealTendons)
+def _path(tendons: Any, plant: Any, q: Any) -> Any:
     return travel(plant, q)
 
 
-@compiled
-def path_before(tendons: Any, plant: Any, q: Any) -> Any:
-    """The same before a step, where it may be known."""
-    if tendons is None:
-        zero = 0.0 * q[0]
-        return zero, zero, zero
-    return _known(tendons.state, plant, q)
-
-
-@compiled
-def _known(state: Any, plant: Any, q: Any) -> Any:
-    if state is None:
-        return travel(plant, q)
-    return state[0], state[1], state[2]
+@implements(path_before, RealTendons)
+def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
+    return tendons.state[0], tendons.state[1], tendons.state[2]
 
 
 @cache

@@ -16,8 +16,7 @@ from wristctl.lanes.lane import where
 @compiled
 def bristle(z: Any, travel: Any, slope: Any) -> Any:
     """The bristle's state after its tendon has moved by `travel` [m], positive towards the spool; slope 1/s [1/m]."""
-    one = 1.0 + 0.0 * travel
-    sign = where(travel < 0.0, -one, one)
+    sign = where(travel < 0.0, -1.0, 1.0)
     return z - expm1_of_negative(-slope * abs(travel)) * (sign - z)
 
 
@@ -30,6 +29,5 @@ def capstan(friction: Any, wrapped: Any, z: Any) -> Any:
 @compiled
 def bristle_slope(z: Any, speed: Any, slope: Any) -> Any:
     """dz/dx [1/m] where the tendon moves at this speed; between both directions' where it is at rest."""
-    zero = 0.0 * speed
-    sign = where(speed > 0.0, 1.0 + zero, where(speed < 0.0, zero - 1.0, zero))
+    sign = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, 0.0))
     return (1.0 - z * sign) * slope

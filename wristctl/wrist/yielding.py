@@ -6,11 +6,11 @@ segments; a spring's torque is K (theta - f psi), psi the creep of one Maxwell b
 
 from typing import Any
 
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where
 from wristctl.wrist.chain import spring
-from wristctl.wrist.elastic import PATH, row_of
+from wristctl.wrist.elastic import PATH, ElasticTendons, NoTendons, PulledTendons, RealTendons, row_of
 
 
 @compiled
@@ -18,39 +18,45 @@ def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
     """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
     limit, stiffness = nonideal.stop / n, nonideal.stop_stiffness * n
     depth = theta - clip(theta, -limit, limit)
-    zero = 0.0 * theta
-    damped = 1.0 + nonideal.stop_dissipation * where(depth < zero, -omega, omega)
-    touching = where((abs(depth) > zero) & (damped > zero), 1.0 + zero, zero)
+    damped = 1.0 + nonideal.stop_dissipation * where(depth < 0.0, -omega, omega)
+    touching = where((abs(depth) > 0.0) & (damped > 0.0), 1.0, 0.0)
     torque = stiffness * depth * damped * touching
     return torque, stiffness * damped * touching, stiffness * nonideal.stop_dissipation * abs(depth) * touching
 
 
-@compiled
-def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, given: Any, r: Any) -> None:
+@by_type
+def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
     """Add to the residual r (n,) what end stops take and what creeping springs give."""
-    if tendons is not None:
-        _yield(tendons.nonideal, tendons.state, segment, theta, omega, row_of(len(given), PATH), r)
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _yield(nonideal: Any, state: Any, segment: Any, theta: Any, omega: Any, springs: int, r: Any) -> None:
-    if nonideal is not None:
-        for k in range(len(theta)):
-            torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
-            r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]
-
-
-@compiled
+@by_type
 def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
     """Add what end stops add to dr/d(theta) and dr/d(rate), (n, n)."""
-    if tendons is not None:
-        _yield_jacobians(tendons.nonideal, theta, omega, by_theta, by_rate)
+    raise NotImplementedError("compiled code only")
 
 
-@compiled
-def _yield_jacobians(nonideal: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    if nonideal is not None:
-        for k in range(len(theta)):
-            _, stiffness, damping = _contact(nonideal, len(theta), theta[k], omega[k])
-            by_theta[k, k] = by_theta[k, k] + stiffness
-            by_rate[k, k] = by_rate[k, k] + damping
+@implements(yield_, NoTendons, ElasticTendons)
+def _stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    pass
+
+
+@implements(yield_jacobians, NoTendons, ElasticTendons)
+def _stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    pass
+
+
+@implements(yield_, PulledTendons, RealTendons)
+def _yield(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    nonideal, state, springs = tendons.nonideal, tendons.state, row_of(len(spool_input), PATH)
+    for k in range(len(theta)):
+        torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
+        r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]
+
+
+@implements(yield_jacobians, PulledTendons, RealTendons)
+def _yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    for k in range(len(theta)):
+        _, stiffness, damping = _contact(tendons.nonideal, len(theta), theta[k], omega[k])
+        by_theta[k, k] = by_theta[k, k] + stiffness
+        by_rate[k, k] = by_rate[k, k] + damping
