@@ -1,4 +1,4 @@
-"""wristctl as a library, and how its packages may depend on each other."""
+"""wristctl as a library: its functions, what they say of themselves, and what an import costs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import inspect
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,6 @@ import pytest
 import wristctl
 
 PACKAGE = Path(wristctl.__file__).parent
-LAYERS = (
-    "__main__", "cli", "__init__", "api", "gym", "studies", "report", "comparison", "tuning", "learning",
-    "identification", "stability", "trial", "bench", "vision", "board", "simulation", "control", "wrist", "work",
-    "lanes", "records", "config", "arrays", "interrupt", "loop_priority", "seeds",
-    "version",
-)  # fmt: skip
-
 
 FACE = {
     "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "runs", "simulate",
@@ -95,42 +87,6 @@ def test_import_is_light() -> None:
     for code in ("import wristctl; dir(wristctl)", "import wristctl.api, wristctl; wristctl.load_study()"):
         code = f"import sys; {code}; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
         subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
-
-
-def _imported(tree: ast.AST) -> Iterator[str]:
-    """The modules of wristctl that a module imports, wherever in it."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (each.name for each in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "imports name the whole path"
-            yield from (f"{node.module}.{each.name}" for each in node.names)
-
-
-def _layer(module: str) -> str:
-    """The package or file of wristctl that a module is in; a name that the face imports is where it has it from."""
-    name = [*module.split("."), "__init__"][1]
-    if name in LAYERS:
-        return name
-    face = ast.parse((PACKAGE / "__init__.py").read_text()).body
-    origins = [each for node in face if isinstance(node, ast.ImportFrom) for each in _imported(node)]
-    return next((_layer(each) for each in origins if each.endswith(f".{name}")), "__init__")
-
-
-def test_imports_between_packages_point_down_only() -> None:
-    for file in PACKAGE.rglob("*.py"):
-        own = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        for module in _imported(ast.parse(file.read_text())):
-            if module.split(".")[0] == "wristctl":
-                other = _layer(module)
-                assert LAYERS.index(other) >= LAYERS.index(own), f"{file}: {own} imports {other}"
-
-
-def test_contributing_states_the_order_in_which_packages_may_import() -> None:
-    text = (PACKAGE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    (said,) = re.findall(r"Imports point down: ([^.]*)\.", text)
-    rooms = [name for name in LAYERS if name == "api" or (PACKAGE / name).is_dir()]
-    assert re.split(r"\s*>\s*", said) == rooms
 
 
 def test_every_public_name_has_a_docstring() -> None:

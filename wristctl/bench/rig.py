@@ -20,6 +20,8 @@ from wristctl.seeds import Entropy, stream
 from wristctl.vision.scene import Scene
 from wristctl.wrist.directions import DIRECTIONS
 
+log = logging.getLogger(__name__)
+
 
 class Rig:
     """A wrist that hangs on a chip's pins, before a camera; all times are of the chip's clock [s].
@@ -72,8 +74,6 @@ class Rig:
             self.shutter.begin(start, noise)
         self.faults.begin(start)
 
-
-log = logging.getLogger(__name__)
 
 _BUTTON = "G", 0
 _ACTS = f"press, release, or one of {', '.join(DIRECTIONS)}"

@@ -24,6 +24,8 @@ from wristctl.config.plant import Disturbances
 from wristctl.errors import UserError
 from wristctl.seeds import Entropy
 
+log = logging.getLogger(__name__)
+
 _AT_ONCE = 1e-3
 """A latency timer [s] that is no longer than this is that of USB itself: nothing is held back."""
 
@@ -125,8 +127,6 @@ class BenchRecord:
 def _moved(time: float | None, start: float) -> float | None:
     return None if time is None else start + time
 
-
-log = logging.getLogger(__name__)
 
 _LINGER = 2.0
 """Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors."""

@@ -16,6 +16,8 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
 
+log = logging.getLogger(__name__)
+
 
 def ports(
     find: Annotated[bool, typer.Option("--find", help="Find the board's port by unplugging it.")] = False,
@@ -42,9 +44,6 @@ def ports(
         print(Table("", columns, [(p.device, p.board_like, p.description, p.serial_number) for p in found]).text())
     else:
         print("no serial ports; wristctl hw emulate serves a board without hardware")
-
-
-log = logging.getLogger(__name__)
 
 
 def flash(

@@ -25,6 +25,8 @@ from wristctl.trial.tracking import Tracking
 from wristctl.wrist.across import across_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, in_plane
 
+log = logging.getLogger(__name__)
+
 _HARDER = 1.5
 """Springs that are stiffer than believed and friction may ask for so many times the pull that the model says."""
 _LEAST, _MOST = 0.6, 1.35
@@ -154,8 +156,6 @@ class ExpectedMoves:
         if abs(bend.theta) > _MOST * meant:
             self.judge_steps(axis, reeled / abs(bend.theta))
 
-
-log = logging.getLogger(__name__)
 
 _CHECKED = 1.2
 """Share of `homing.pull` by which a tendon is reeled in to check it."""

@@ -15,6 +15,8 @@ from wristctl.loop_priority import beside_the_loop
 from wristctl.processes import check_hardware_allowed
 from wristctl.vision.camera import CameraError, Frame, grey_of, without_warnings
 
+log = logging.getLogger(__name__)
+
 _MANUAL, _PRIORITY = 1.0, 3.0
 """V4L2's exposure_auto: by hand; by aperture priority, which is the webcams' automatic one."""
 _POWER_LINE, _SET, _GET = 0x00980918, 0xC008561C, 0xC008561B
@@ -103,8 +105,6 @@ def _power_line(source: str, menu: int) -> str | None:
         return next((name for name, number in _MENU.items() if number == now), None)
     return None
 
-
-log = logging.getLogger(__name__)
 
 _FIRST_FRAME = 3.0
 """Seconds that a device may take to its first frame."""

@@ -1,4 +1,4 @@
-"""The first screen of an audit: what of the paper holds, what does not, and what cannot be told, in plain sentences.
+"""The answer of an audit: a first screen of plain sentences on what of the paper holds, and tables of every claim.
 
 Every sentence is chosen by the verdicts. A reader of the paper may repeat it, so none says more than they do.
 """

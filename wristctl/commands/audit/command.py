@@ -201,18 +201,6 @@ def _name(given: Given) -> str:
     return run.id if run else "in memory"
 
 
-AUDIT = Procedure(
-    "audit",
-    plan,
-    audit,
-    (
-        EarlierRun("table1", kind="train", optional=True),
-        EarlierRun("selection", kind="train", optional=True),
-        EarlierRun("hardware", kind="hw-run", optional=True),
-    ),
-)
-
-
 def judged_in_box(session: Session) -> list[Strip]:
     """Every claim that draws can judge; none where the study names no unknowns."""
     from wristctl.commands.audit.figures import shares, strip
@@ -263,3 +251,15 @@ def box_table(found: list[Strip]) -> Table:
     most = max((each.uncounted for each in found), default=0)
     left = f"; those that did not converge, up to {most}, are not counted" * bool(most)
     return Table(f"Shares of {draws} settings drawn from what the paper leaves open{left}", heads, rows)
+
+
+AUDIT = Procedure(
+    "audit",
+    plan,
+    audit,
+    (
+        EarlierRun("table1", kind="train", optional=True),
+        EarlierRun("selection", kind="train", optional=True),
+        EarlierRun("hardware", kind="hw-run", optional=True),
+    ),
+)

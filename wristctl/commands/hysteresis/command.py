@@ -78,7 +78,7 @@ def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
     findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
     _write_fit(findings, found)
     findings.figure("measured", measured, found)
-    return found, _table(findings, found)
+    return found, _fit_table(findings, found)
 
 
 def _write_fit(findings: Findings, found: FrictionFit) -> None:
@@ -90,7 +90,7 @@ def _write_fit(findings: Findings, found: FrictionFit) -> None:
     findings.table("data/measured.csv", columns, units)
 
 
-def _table(findings: Findings, found: FrictionFit) -> Table:
+def _fit_table(findings: Findings, found: FrictionFit) -> Table:
     rows: list[tuple[str, float, float | None, float | None, str, str]] = []
     for name, (unit, meaning) in FITTED.items():
         value, low, high = getattr(found, name)

@@ -271,22 +271,6 @@ def _keep(findings: Findings, found: dict[str, Search], judge: Judge) -> None:
     findings.figure("convergence", convergence, list(found.values()), caption="Best objective against the budget")
 
 
-TUNE = sweepable(
-    Procedure(
-        "tune",
-        plan,
-        tune,
-        (
-            EarlierRun("network", kind="train", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
-            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
-        ),
-        doubts=refuse_out_of_reach,
-        size=size,
-    )
-)
-
-
 _APART = 1.5
 """Factor by which gains are less or more."""
 
@@ -305,3 +289,19 @@ def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
         tried[1 + 2 * at, at] /= _APART
         tried[2 + 2 * at, at] *= _APART
     return gain_sensitivity(name, list(law.gains), _APART, judge(law, tried))
+
+
+TUNE = sweepable(
+    Procedure(
+        "tune",
+        plan,
+        tune,
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+            EarlierRun("resume", kind="tune", optional=True, unfinished=True),
+        ),
+        doubts=refuse_out_of_reach,
+        size=size,
+    )
+)
