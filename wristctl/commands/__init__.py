@@ -1,1 +1,1 @@
-"""What each command plans, computes, says and draws: as a run directory, or as a result in memory."""
+"""Commands: plan, computation, words and figures of each, as a run directory or as a result in memory."""

@@ -35,21 +35,21 @@ def adopted(study: Study, command: str) -> Adopted:
     owners: dict[tuple[str, str], str] = {}
     origins: list[Foreign] = []
     for table, name in named_in(tuple(sections.values())):
-        found = _loaded(table, name)
-        if found is None:
+        loaded = _loaded(table, name)
+        if loaded is None:
             continue
-        entry, origin = found
-        own = _entry(table, name, entry, origin, study)
-        if owners.setdefault((table.what, own), origin.reference) != origin.reference:
-            where = f"{owners[table.what, own]} and {origin.reference}"
-            raise UserError(f"two {table.what}s are called '{own}'", where, "rename one of them")
-        names[table.what, name] = own
-        if table.what == CONTROLLERS.what and (known := table[own].settings):
-            section = own.removesuffix(PLAIN)
-            settings[section] = {key: each.default for key, each in known.items()} | settings.get(section, {})
+        entry, origin = loaded
+        short_name = _entry(table, name, entry, origin, study)
+        if owners.setdefault((table.what, short_name), origin.reference) != origin.reference:
+            where = f"{owners[table.what, short_name]} and {origin.reference}"
+            raise UserError(f"two {table.what}s are called '{short_name}'", where, "rename one of them")
+        names[table.what, name] = short_name
+        if table.what == CONTROLLERS.what and (declared := table[short_name].settings):
+            section = short_name.removesuffix(PLAIN)
+            settings[section] = {key: setting.default for key, setting in declared.items()} | settings.get(section, {})
         origins.append(origin)
 
-    laws = [own.removesuffix(PLAIN) for (what, _), own in names.items() if what == CONTROLLERS.what]
+    laws = [entry_name.removesuffix(PLAIN) for (kind, _), entry_name in names.items() if kind == CONTROLLERS.what]
     for name in study.laws:
         if name not in laws and (meant := nearest(name, laws)):
             raise UserError(f"this study names no law '{name}'", f"laws.{name}", f"did you mean '{meant}'?")
@@ -59,7 +59,7 @@ def adopted(study: Study, command: str) -> Adopted:
 
     if not origins:
         return Adopted(study, ())
-    called = {name: renamed(each, own_name) for name, each in sections.items()}
+    called = {name: renamed(content, own_name) for name, content in sections.items()}
     return Adopted(study.model_copy(update=called | {"laws": settings}), tuple(origins))
 
 
@@ -68,28 +68,30 @@ def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
 
     def place(table: Choices[Any], name: str) -> str:
         origin = table.origin(name)
-        whole = origin.reference if origin else name
-        called = (places or {}).get(whole, whole)
-        if called != whole and table.what == REFERENCES.what:  # by which its section is read, also while it is written
-            table.lend(called, *table.loaded(whole))
+        reference = origin.reference if origin else name
+        called = (places or {}).get(reference, reference)
+        if (
+            called != reference and table.what == REFERENCES.what
+        ):  # by which its section is read, also while it is written
+            table.lend(called, *table.loaded(reference))
         return called
 
     sections = {name: getattr(study, name) for name in type(study).model_fields}
-    return study.model_copy(update={name: renamed(each, place) for name, each in sections.items()})
+    return study.model_copy(update={name: renamed(section, place) for name, section in sections.items()})
 
 
 def sources_in(study: Study) -> dict[str, str]:
-    """What is from elsewhere in a study that calls it by its own name: each source's hash, by its name and place."""
-    found: dict[str, str] = {}
+    """Hashes of the sources from elsewhere in an adopted study, by name and place."""
+    sources: dict[str, str] = {}
     for table, name in named_in(tuple(getattr(study, field) for field in type(study).model_fields)):
         if origin := table.origin(name):
             places = {f"{name}/{file.relative_to(origin.root)}": digest for file, digest in origin.files.items()}
-            found |= places
-    return found
+            sources |= places
+    return sources
 
 
 def adoption(study: Study, command: str) -> dict[str, Any]:
-    """What `adopt` is given elsewhere, as JSON has it, to know the same laws."""
+    """Specification, as JSON has it, from which `adopt` loads the same laws in another process."""
     content = with_places(study).model_dump_json(by_alias=True, include=names_read(command))
     return {"study": json.loads(content), "command": command, "sources": sources_in(study)}
 
@@ -97,14 +99,14 @@ def adoption(study: Study, command: str) -> dict[str, Any]:
 def adopt(spec: Mapping[str, Any]) -> None:
     """Load what a study names from elsewhere, in a process that has not. UserError where it is another text there."""
     study = Study.model_validate_json(json.dumps(spec["study"]))
-    found = sources_in(adopted(study, spec["command"]).study)
-    changed = [name for name, digest in spec["sources"].items() if found.get(name) != digest]
+    sources = sources_in(adopted(study, spec["command"]).study)
+    changed = [name for name, digest in spec["sources"].items() if sources.get(name) != digest]
     if changed:
         raise UserError(f"{', '.join(changed)} is another text here than where the study began", "study")
 
 
 def _loaded(table: Choices[Any], name: str) -> tuple[Any, Foreign] | None:
-    """What a name stands for where it is from elsewhere; None of what belongs to the table."""
+    """Object and origin of a name from elsewhere; None of a name that belongs to the table."""
     if not table.group:
         return None
     lent = table.origin(name)
@@ -113,8 +115,8 @@ def _loaded(table: Choices[Any], name: str) -> tuple[Any, Foreign] | None:
     if lent is not None:
         return table.loaded(lent.reference)
     if name in entry_point_names(table.group):
-        what = f"'{name}' is a {table.what} of wristctl, and an installed package has one of that name too"
-        raise UserError(what, table.group, "uninstall that package, or let its author rename it")
+        reason = f"'{name}' is a {table.what} of wristctl, and an installed package has one of that name too"
+        raise UserError(reason, table.group, "uninstall that package, or let its author rename it")
     return None
 
 
@@ -124,13 +126,13 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         from wristctl.control.vetting import law_of, vet
 
         entry = law_of(entry, origin.reference, study.laws)
-        own = str(entry.name)
+        entry_name = str(entry.name)
     elif table.what == OPTIMISERS.what:
         from wristctl.tuning.optimisers import Optimiser
 
         if not (isinstance(entry, type) and issubclass(entry, Optimiser)):
             raise UserError(f"{origin.attribute} is no Optimiser", str(origin.file), "derive it from Optimiser")
-        own = str(entry.name)
+        entry_name = str(entry.name)
     else:
         from wristctl.simulation.reference import ReferenceKind
 
@@ -139,12 +141,12 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         if not is_reference(name):
             table.lend(name, entry, origin)
         return name  # a reference has no name but its place, by which its section is read
-    if table.belongs(own) or (own in entry_point_names(table.group) and is_reference(name)):
-        what = f"there is a {table.what} '{own}' already"
-        raise UserError(what, origin.reference, f'rename this one: name="my-{own}"')
+    if table.belongs(entry_name) or (entry_name in entry_point_names(table.group) and is_reference(name)):
+        reason = f"there is a {table.what} '{entry_name}' already"
+        raise UserError(reason, origin.reference, f'rename this one: name="my-{entry_name}"')
     if table.what == CONTROLLERS.what:
         vet(entry, origin.reference)
         if entry.plain:
-            log.warning("%s is plain Python: its rollouts run one by one, and its times are Python's", own)
-    table.lend(own, entry, origin)
-    return own
+            log.warning("%s is plain Python: its rollouts run one by one, and its times are Python's", entry_name)
+    table.lend(entry_name, entry, origin)
+    return entry_name

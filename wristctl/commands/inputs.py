@@ -1,4 +1,4 @@
-"""What a study is given from earlier ones: run directories, or results in memory."""
+"""Inputs that a study takes from earlier ones: run directories, or results in memory."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from wristctl.records.manifest import MANIFEST
 from wristctl.study_files.resolved import sections_read
 
 Given = Run | StudyResult
+# Name of an input: path, id, beginning of an id or latest:<kind>; or the run or result itself.
 RunChoice = str | Path | Given
-"""How an input may be named: path, id, beginning of an id or latest:<kind>; or the run or result itself."""
 
 Read = TypeVar("Read")
 
@@ -38,39 +38,39 @@ class EarlierRun:
 class Inputs(Mapping[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 
-    def __init__(self, given: Mapping[str, Given] | None = None) -> None:
-        self._given = dict(given or {})
+    def __init__(self, by_role: Mapping[str, Given] | None = None) -> None:
+        self._by_role = dict(by_role or {})
         self._read: dict[tuple[str, Any], Any] = {}
 
     def __getitem__(self, role: str) -> Given:
-        return self._given[role]
+        return self._by_role[role]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._given)
+        return iter(self._by_role)
 
     def __len__(self) -> int:
-        return len(self._given)
+        return len(self._by_role)
 
     def read(self, role: str, reader: Callable[[Any], Read]) -> Read | None:
-        """What `reader` makes of this input, None where it is not given."""
-        if role not in self._given:
+        """Content that `reader` makes of this input; None without the input."""
+        if role not in self._by_role:
             return None
         if (role, reader) not in self._read:
-            self._read[role, reader] = reader(self._given[role])
-        found: Read = self._read[role, reader]
-        return found
+            self._read[role, reader] = reader(self._by_role[role])
+        content: Read = self._read[role, reader]
+        return content
 
     def runs(self) -> dict[str, Run]:
         """The run directories among them, by role."""
-        found = {role: each if isinstance(each, Run) else each.run for role, each in self._given.items()}
-        return {role: run for role, run in found.items() if run is not None}
+        runs = {role: earlier if isinstance(earlier, Run) else earlier.run for role, earlier in self._by_role.items()}
+        return {role: run for role, run in runs.items() if run is not None}
 
     def recorded(self) -> list[InputRun]:
-        """What the manifest of a run made from them names. Raises UserError where one is in memory only."""
+        """Inputs as the manifest of a run names them. Raises UserError where one is in memory only."""
         runs = self.runs()
-        for role, each in self._given.items():
-            if role not in runs and isinstance(each, StudyResult):
-                fix = ("write it too: ", Call(each.kind, arguments=(Argument("out", metavar="DIR"),)))
+        for role, earlier in self._by_role.items():
+            if role not in runs and isinstance(earlier, StudyResult):
+                fix = ("write it too: ", Call(earlier.kind, arguments=(Argument("out", metavar="DIR"),)))
                 raise UserError("a run directory names what it was made from, and this is in memory only", role, fix)
         return [InputRun(role, run) for role, run in runs.items()]
 
@@ -79,29 +79,43 @@ def opened(
     kind: str,
     section: Any,
     needs: Iterable[EarlierRun],
-    given: Mapping[str, Any],
+    named_inputs: Mapping[str, Any],
     out: Path,
     beside: Sequence[Path] = (),
 ) -> Inputs:
-    """The inputs that a command needs: as `given`, else as its section of a study names them; runs are in `out`.
+    """Inputs of a command by role.
 
-    What is not there is looked for `beside`: in the folders of the runs whose configuration the study is. Raises
-    UserError for a run that is missing, of another kind, or not as it was sealed.
+    Raises UserError for a run that is missing, of another kind, or not as it was sealed.
+
+    Parameters
+    ----------
+    kind
+        Name of the command.
+    section
+        Section of the study that names the inputs.
+    needs
+        Earlier runs that the command reads.
+    named_inputs
+        Inputs by leaf that come before those of the section.
+    out
+        Folder of the runs.
+    beside
+        Folders in which a run is looked for that is not in `out`.
     """
-    found: dict[str, Given] = {}
+    by_role: dict[str, Given] = {}
     for need in needs:
         named, several = _here(getattr(section, need.leaf), out, beside), isinstance(getattr(section, need.leaf), tuple)
-        chosen = named if given.get(need.leaf) is None else given[need.leaf]
+        chosen = named if named_inputs.get(need.leaf) is None else named_inputs[need.leaf]
         if several and chosen:
-            each = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else (chosen,)
-            found |= {f"{need.leaf}[{at}]": _one(one, need, out) for at, one in enumerate(each)}
+            chosen_runs = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else (chosen,)
+            by_role |= {f"{need.leaf}[{number}]": _one(one, need, out) for number, one in enumerate(chosen_runs)}
         elif chosen:
-            found[need.leaf] = _one(chosen, need, out)
+            by_role[need.leaf] = _one(chosen, need, out)
         elif not need.optional:
             latest = Argument(need.leaf, f"latest:{need.kind}", positional=several)
             fix = (latest, f", or the path or id of a {need.kind} run")
             raise UserError(f"{kind} needs a {need.kind} run", f"{kind}.{need.leaf}", fix)
-    return Inputs(found)
+    return Inputs(by_role)
 
 
 def named_for_good(inputs: Inputs, section: Any, out: Path) -> Any:
@@ -117,11 +131,11 @@ def named_for_good(inputs: Inputs, section: Any, out: Path) -> Any:
 def _here(named: Any, out: Path, beside: Sequence[Path]) -> Any:
     """The runs that a study names where they are: a run that was moved stands beside those that were made from it."""
     if isinstance(named, tuple):
-        return tuple(_here(each, out, beside) for each in named)
+        return tuple(_here(name, out, beside) for name in named)
     if not isinstance(named, str) or not named or Path(named).exists():
         return named
-    there = (folder / Path(named).name for folder in (out, *beside))
-    return next((str(path) for path in there if (path / MANIFEST).is_file()), named)
+    places = (folder / Path(named).name for folder in (out, *beside))
+    return next((str(path) for path in places if (path / MANIFEST).is_file()), named)
 
 
 def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
@@ -161,8 +175,8 @@ def _recordings(section: Any) -> Iterator[Reference]:
         for name in type(section).model_fields:
             yield from _recordings(getattr(section, name))
     elif isinstance(section, dict | tuple):
-        for each in section.values() if isinstance(section, dict) else section:
-            yield from _recordings(each)
+        for item in section.values() if isinstance(section, dict) else section:
+            yield from _recordings(item)
 
 
 def _check(reference: Reference, range_deg: float) -> None:
@@ -173,6 +187,6 @@ def _check(reference: Reference, range_deg: float) -> None:
     angle = np.rad2deg(reference.value("scale") * recording_of(reference).arc[0])
     most = float(np.abs(angle).max())
     if most > range_deg:
-        what = f"the recording bends by {most:.4g} deg, beyond the wrist's range of +-{range_deg:g} deg"
+        reason = f"the recording bends by {most:.4g} deg, beyond the wrist's range of +-{range_deg:g} deg"
         fix = "scale it, see to the unit in its header, or widen wrist.range_deg"
-        raise UserError(what, str(reference.file), fix)
+        raise UserError(reason, str(reference.file), fix)

@@ -1,4 +1,4 @@
-"""What closed loops begin with: network, gains and parameters of earlier runs, and a wrist that does not buckle."""
+"""Inputs of closed loops: network, gains and parameters of earlier runs, and a wrist that does not buckle."""
 
 from __future__ import annotations
 
@@ -94,19 +94,19 @@ def check_family_reach(study: Study, name: str) -> None:
     """As `check_reach` for the motions of a family, at both ends of what is drawn; an unknown family has none."""
     motions = ends_of_family(study.families.get(name, Family()))
     half = len(motions) // 2
-    for own in (motions[:half], motions[half:]):
-        check_reach(own, study.wrist, f"families.{name}.references.{{}}")
+    for part in (motions[:half], motions[half:]):
+        check_reach(part, study.wrist, f"families.{name}.references.{{}}")
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
     """UserError where a reference goes through a network and none is among the inputs."""
     if "network" in inverses and "network" not in inputs:
-        what = "the reference goes through a network, and none is given"
-        raise UserError(what, "reference.inverse", Argument("network"))
+        reason = "the reference goes through a network, and none is given"
+        raise UserError(reason, "reference.inverse", Argument("network"))
 
 
 def inverses_of(references: Iterable[Reference]) -> set[str]:
-    """How the tip targets of these references become angles."""
+    """Inverses that turn the tip targets of these references into angles."""
     return {reference.inverse for reference in references}
 
 
@@ -116,7 +116,7 @@ def tuned_gains(inputs: Inputs) -> Gains | None:
 
 
 def tuned_on(inputs: Inputs) -> TuneSettings | None:
-    """What the gains of the tuning among the inputs were tuned on; None without one."""
+    """Settings of the tuning among the inputs; None without one."""
     return inputs.read("tuned", _tune_settings)
 
 
@@ -130,19 +130,19 @@ def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop]) -
     network = inputs.read("network", _network)
     if network is None:
         return None
-    others = sorted({loop.plant_segments for loop in loops} - {network.segments})
-    if network.segments > 1 and others:
+    other_segments = sorted({loop.plant_segments for loop in loops} - {network.segments})
+    if network.segments > 1 and other_segments:
         run = inputs.runs().get("network")
         raise UserError(
-            f"the network learned a wrist of {network.segments} segments, the loop has {others[0]}",
+            f"the network learned a wrist of {network.segments} segments, the loop has {other_segments[0]}",
             str(run.file(NETWORK)) if run else "network",
-            f"plant_segments: {network.segments} in every loop, or train on data with segments: {others[0]}",
+            f"plant_segments: {network.segments} in every loop, or train on data with segments: {other_segments[0]}",
         )
     pose = math.atan2(wrist.gravity[1], -wrist.gravity[0])
-    at = network.at({"pose": pose, "hand_mass": wrist.hand_mass}) if network.others else network
-    if at.domain.is_empty:
+    at_pose = network.at({"pose": pose, "hand_mass": wrist.hand_mass}) if network.others else network
+    if at_pose.domain.is_empty:
         log.warning("the study's pose or hand mass lies outside what the network learned: every angle is a guess")
-    return at.along
+    return at_pose.along
 
 
 def identified(study: Study, command: str, inputs: Inputs) -> Study:
@@ -153,26 +153,26 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     return study if text is None else with_identified(study, command, text)
 
 
-def _gains(given: Run | _Tuning) -> Gains:
+def _gains(earlier: Run | _Tuning) -> Gains:
     from wristctl.control.table import read_gains
 
-    return read_gains(given.file("data/gains.json")) if isinstance(given, Run) else given.gains
+    return read_gains(earlier.file("data/gains.json")) if isinstance(earlier, Run) else earlier.gains
 
 
-def _tune_settings(given: Run | _Tuning) -> TuneSettings:
-    return given.config.tune if isinstance(given, Run) else given.study.tune
+def _tune_settings(earlier: Run | _Tuning) -> TuneSettings:
+    return earlier.config.tune if isinstance(earlier, Run) else earlier.study.tune
 
 
-def _network(given: Run | _Training) -> Network:
+def _network(earlier: Run | _Training) -> Network:
     from wristctl.learning.network_file import NETWORK, load_network
 
-    return load_network(given.file(NETWORK)) if isinstance(given, Run) else given.network
+    return load_network(earlier.file(NETWORK)) if isinstance(earlier, Run) else earlier.network
 
 
-def _identified_yaml(given: Run | _Identification) -> str:
-    if isinstance(given, Run):
-        return given.file("data/identified.yaml").read_text(encoding="utf-8")
-    return given.yaml
+def _identified_yaml(earlier: Run | _Identification) -> str:
+    if isinstance(earlier, Run):
+        return earlier.file("data/identified.yaml").read_text(encoding="utf-8")
+    return earlier.yaml
 
 
 def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:
@@ -194,6 +194,6 @@ def judged_loops(study: Study, settings: TuneSettings | CompareSettings) -> Mapp
 
 
 def compared_inverses(study: Study) -> Iterable[str]:
-    """How the tip targets of what is judged on become angles."""
+    """Inverses that turn the tip targets of the compared references into angles."""
     name = study.compare.worlds.family
     return inverses_of(study.families[name].references) if name else study.compare.inverses

@@ -22,12 +22,12 @@ from wristctl.control.vetting import call_law, vet
 from wristctl.errors import UserError
 from wristctl.study_files.explain import explained
 
+# Angle from which a law should bend the wrist back [rad], and ticks in which its memory may take that in.
 _BENT, _SETTLED = 0.1, 20
-"""Angle from which a law should bend the wrist back [rad], and ticks in which its memory may come to know of it."""
 
 
 class LawCheck(NamedTuple):
-    """What was asked of a law, whether it is so (None: it was not asked), and what was found."""
+    """Check of a law: its subject, its outcome (None: not checked), and the measured values."""
 
     asked: str
     passed: bool | None
@@ -44,8 +44,8 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
         study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(v) for key, v in laws.items()}})
     except ValidationError as error:
         raise explained(error, {}).at(name) from error
-    known, foreign = adopted(study, "hw-run")
-    law = controller(known.hw_run.rows[0].controller)
+    resolved, foreign = adopted(study, "hw-run")
+    law = controller(resolved.hw_run.rows[0].controller)
     for origin in foreign:
         for file, digest in origin.files.items():
             yield LawCheck("source", None, f"{file.relative_to(origin.root)} sha256 {digest}")
@@ -61,15 +61,17 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
         yield LawCheck("compiles", same, f"at widths 1 and 8, with {'the same' if same else 'OTHER'} bits")
         yield LawCheck("takes and changes", True, "no memory of the system, nothing that it is shown")
     yield _restoring(law)
-    gains = ", ".join(f"{each} [{gain.unit or '1'}] {gain.low:g} to {gain.high:g}" for each, gain in law.gains.items())
+    gains = ", ".join(
+        f"{gain_name} [{gain.unit or '1'}] {gain.low:g} to {gain.high:g}" for gain_name, gain in law.gains.items()
+    )
     yield LawCheck("gains", True, f"{gains or 'none'}; presets {', '.join(law.presets) or 'none'}")
     cost = step_time(law, tuple(_gains(law)), WristParameters())
     yield LawCheck("time per tick", None, f"{cost.median:.3g} us, 99 % within {cost.p99:.3g} us, on this machine")
-    yield _on_board(law, known) if on_board else LawCheck("emulated board", None, "not asked")
+    yield _on_board(law, resolved) if on_board else LawCheck("emulated board", None, "not asked")
 
 
 def _gains(law: Controller) -> Array:
-    """Of the last preset, which is for the hardest conditions; the middle of the box where there is none."""
+    """Gains of the last preset, which is for the hardest conditions; the middle of the box without presets."""
     presets = list(law.presets.values())
     return np.array(law.values(presets[-1])) if presets else _middle(law)
 
@@ -83,12 +85,12 @@ def _restoring(law: Controller) -> LawCheck:
     back? With every preset, and in the middle of the box, where a law is stiffer than the wrist itself."""
     sides = np.array([_BENT, -_BENT])
     held = _torques(controller("feedforward"), np.zeros(0), theta_ref=sides)
-    presets = {name: np.array(law.values(each)) for name, each in law.presets.items()}
+    presets = {name: np.array(law.values(preset)) for name, preset in law.presets.items()}
     presets["middle"] = _middle(law)
     net = {name: _torques(law, gains, theta=sides) - held for name, gains in presets.items()}
-    told = "; ".join(f"{name} {low:.3g}, {high:.3g}" for name, (low, high) in net.items())
-    found = f"at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there [N m]: {told}"
-    return LawCheck("bends the wrist back", all(low < 0.0 < high for low, high in net.values()), found)
+    torques = "; ".join(f"{name} {low:.3g}, {high:.3g}" for name, (low, high) in net.items())
+    finding = f"at {_BENT:g} and {-_BENT:g} rad, beyond what holds it there [N m]: {torques}"
+    return LawCheck("bends the wrist back", all(low < 0.0 < high for low, high in net.values()), finding)
 
 
 def _torques(law: Controller, gains: Array, **angles: Array) -> Array:
@@ -111,11 +113,11 @@ def _on_board(law: Controller, study: Study) -> LawCheck:
         "horizon": 1.5,
         "push": study.hw_run.push.model_copy(update={"force": 0.0}),
     }
-    own = study.model_copy(update={"hw_run": study.hw_run.model_copy(update=trial)})
+    trial_study = study.model_copy(update={"hw_run": study.hw_run.model_copy(update=trial)})
     with tempfile.TemporaryDirectory(prefix="wristctl-check-") as scratch:
         try:
-            done = carry_out(HW_RUN, own, {}, Path(scratch), "", None)
+            result = carry_out(HW_RUN, trial_study, {}, Path(scratch), "", None)
         except UserError as error:
             return LawCheck("emulated board", False, f"gains {preset}: {error.what}")
-    rmse = float(np.rad2deg(done.frame()["rmse"].iloc[0]))
+    rmse = float(np.rad2deg(result.frame()["rmse"].iloc[0]))
     return LawCheck("emulated board", True, f"a trial with gains {preset}: RMSE {rmse:.2g} deg")

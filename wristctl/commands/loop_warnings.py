@@ -1,4 +1,4 @@
-"""What a person should know before a closed loop's numbers are believed."""
+"""Warnings about a closed loop: buckling, coarse steps, presets out of their conditions, motions out of reach."""
 
 from __future__ import annotations
 
@@ -42,38 +42,39 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
 
 
 def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
-    """In words each preset that is not made for a loop with motors, tendons and a camera."""
+    """Presets that are not made for a loop with motors, tendons and a camera, in words."""
     from wristctl.control.table import controller
 
-    real, found = [each for each in loops if each.actuator.level == "tendon" and each.sensor.level == "camera"], []
+    real = [rig for rig in loops if rig.actuator.level == "tendon" and rig.sensor.level == "camera"]
+    warnings = []
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
         stated = law.conditions.get(preset)
         if real and stated is None:
             instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
-            found.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
+            warnings.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
         for loop in real:
-            if stated and (told := _outside(stated, loop)):
-                found.append(f"{name}/{preset} was made for {told}: it may swing (docs/margins.md)")
-    return found
+            if stated and (mismatch := _outside(stated, loop)):
+                warnings.append(f"{name}/{preset} was made for {mismatch}: it may swing (docs/margins.md)")
+    return warnings
 
 
 def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
-    """Warn of each of them."""
-    for each in outside_conditions(rows, loops):
-        log.warning("%s", each)
+    """Warn of each preset that is not made for its loop."""
+    for warning in outside_conditions(rows, loops):
+        log.warning("%s", warning)
 
 
 def _outside(stated: Conditions, loop: Loop) -> str:
     (fast, slow), (soft, stiff) = stated
-    told = []
+    mismatches = []
     if not fast <= loop.control_period <= slow:
-        told.append(f"periods of {1e3 * fast:g} to {1e3 * slow:g} ms, not {1e3 * loop.control_period:g}")
+        mismatches.append(f"periods of {1e3 * fast:g} to {1e3 * slow:g} ms, not {1e3 * loop.control_period:g}")
     believed = loop.actuator.tendon_stiffness
     if not soft <= believed <= stiff:
-        told.append(f"tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m, not {believed / 1e3:g}")
-    return " and ".join(told)
+        mismatches.append(f"tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m, not {believed / 1e3:g}")
+    return " and ".join(mismatches)
 
 
 def warn_if_coarse(loops: Iterable[Loop]) -> None:
@@ -81,15 +82,15 @@ def warn_if_coarse(loops: Iterable[Loop]) -> None:
     for loop in loops:
         step = loop.control_period / loop.steps
         if loop.actuator.level == "tendon" and step > longest_step(loop.actuator) * (1.0 + 1e-9):
-            told = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
-            log.warning(told, 1e3 * step, loop.fewest_steps)
+            message = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
+            log.warning(message, 1e3 * step, loop.fewest_steps)
 
 
 class AskedMotion(NamedTuple):
     """A motion that a loop is asked for."""
 
     name: str
-    """Of the loop; empty where there is one alone."""
+    """Name of the loop; empty where there is one alone."""
     loop: Loop
     reference: Reference
     direction: DirectionName
@@ -113,56 +114,62 @@ def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSe
         return [AskedMotion("", settings.loop, settings.reference, settings.direction, settings.horizon)]
     if name := settings.worlds.family:
         family = study.families[name]
-        return [AskedMotion(name, family.loop, each, "ulnar", family.horizon) for each in ends_of_family(family)]
+        return [
+            AskedMotion(name, family.loop, reference, "ulnar", family.horizon) for reference in ends_of_family(family)
+        ]
     if isinstance(settings, TuneSettings):
         scenarios = settings.scenarios
         return [AskedMotion(s.loop, settings.loops[s.loop], s.reference, "ulnar", settings.horizon) for s in scenarios]
-    found = [
+    motions = [
         AskedMotion(name, loop, reference, direction, settings.horizon)
         for name, loop in settings.loops.items()
         for reference in settings.references
         for direction in settings.directions
     ]
-    return found + (asked_by(study, settings.tuning) if settings.tuning else [])
+    return motions + (asked_by(study, settings.tuning) if settings.tuning else [])
 
 
 def out_of_reach(wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[OutOfReach]:
-    """What the tendons cannot hold of these motions, by the statics of one segment; loops and motions alike at once."""
+    """Motions that the tendons cannot hold, by the statics of one segment; equal shortfalls are one entry."""
     from wristctl.simulation.reference import reference_name
 
-    told: dict[tuple[str, str], dict[str, dict[str, None]]] = {}
-    for each in asked:
-        if (short := _shortfall(wrist, each)) is not None:
-            motion = reference_name(each.reference) + (f", {each.direction}" if each.direction != "ulnar" else "")
-            told.setdefault(_told(wrist, short), {}).setdefault(motion, {})[each.name] = None
-    found = []
-    for (what, fix), motions in told.items():
+    shortfalls: dict[tuple[str, str], dict[str, dict[str, None]]] = {}
+    for request in asked:
+        if (short := _shortfall(wrist, request)) is not None:
+            motion = reference_name(request.reference) + (
+                f", {request.direction}" if request.direction != "ulnar" else ""
+            )
+            shortfalls.setdefault(_told(wrist, short), {}).setdefault(motion, {})[request.name] = None
+    unreachable = []
+    for (reason, fix), motions in shortfalls.items():
         for loops in dict.fromkeys(map(tuple, motions.values())):
-            names = ", ".join(motion for motion, own in motions.items() if tuple(own) == loops)
-            found.append(OutOfReach(names + (f" on {', '.join(loops)}" if any(loops) else ""), what, fix))
-    return found
+            names = ", ".join(motion for motion, on_loops in motions.items() if tuple(on_loops) == loops)
+            unreachable.append(OutOfReach(names + (f" on {', '.join(loops)}" if any(loops) else ""), reason, fix))
+    return unreachable
 
 
 def warn_out_of_reach(findings: Findings, wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[OutOfReach]:
-    """Warn of each of them, and note it in the manifest."""
-    found = out_of_reach(wrist, asked)
-    for each in found:
-        log.warning("%s", each)
-    if found:
-        findings.numerics(out_of_reach=[str(each) for each in found])
-    return found
+    """Warn of each motion out of reach, and note it in the manifest."""
+    unreachable = out_of_reach(wrist, asked)
+    for shortfall in unreachable:
+        log.warning("%s", shortfall)
+    if unreachable:
+        findings.numerics(out_of_reach=[str(motion) for motion in unreachable])
+    return unreachable
 
 
 def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
     """UserError where gains are to be searched on motions that no gains can hold; a sweep's points are warned of."""
     settings = study.tune
-    found = [] if study.sweep else out_of_reach(identified(study, "tune", inputs).wrist, asked_by(study, settings))
-    if found:
-        first, family = found[0], settings.worlds.family
+    unreachable = (
+        [] if study.sweep else out_of_reach(identified(study, "tune", inputs).wrist, asked_by(study, settings))
+    )
+    if unreachable:
+        first, family = unreachable[0], settings.worlds.family
         where = f"families.{family}.references" if family else "tune.scenarios"
-        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-        what = f"no gains can help: {first.where}: {first.what}{more}"
-        raise UserError(what, where, f"{first.fix}; or go on with --force")
+        more = f" (and {len(unreachable) - 1} more)" if len(unreachable) > 1 else ""
+        reason = f"no gains can help: {first.where}: {first.what}{more}"
+        raise UserError(reason, where, f"{first.fix}; or go on with --force")
 
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
@@ -173,15 +180,15 @@ def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
 
     if not asked.loop.limits:
         return None
-    seen, loop = loop_facing(wrist, asked.loop, asked.direction)
+    facing, loop = loop_facing(wrist, asked.loop, asked.direction)
     reference = by_angles(toward(asked.reference, asked.direction))
-    theta = motion(reference, seen, asked.horizon, sample_period(loop.control_period)).theta_ref
+    theta = motion(reference, facing, asked.horizon, sample_period(loop.control_period)).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
-    return shortfall(plant_of(seen, loop.plant), low, high, loop.disturbances.load)
+    return shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
 
 
 def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:
-    what = (
+    reason = (
         f"the tendons cannot hold {math.degrees(short.theta):.3g} deg, which asks for {abs(short.asked):.3g} N m where "
         f"{wrist.tension_limit:g} N give {abs(short.given):.3g}"
     )
@@ -189,10 +196,10 @@ def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:
     if abs(short.angle) > 0.0:  # nan where they do not hold it straight
         way.append(f"at most {_rounded(math.degrees(abs(short.angle)), math.floor):.3g} deg")
     way.append(f"a tendon_radius of {_rounded(short.tendon_radius, math.ceil):.3g} m")
-    return what, f"{', '.join(way[:-1])} or {way[-1]} would do"
+    return reason, f"{', '.join(way[:-1])} or {way[-1]} would do"
 
 
 def _rounded(value: float, way: Callable[[float], int]) -> float:
-    """To three digits, up or down."""
+    """Round a value to three digits, up or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
     return way(value / step) * step

@@ -1,4 +1,4 @@
-"""How a study is performed: inputs opened and named, a plan, then the doing, in a run directory or in memory."""
+"""Execution of a study: inputs opened and named, a plan, then the computation, in a run directory or in memory."""
 
 import json
 import math
@@ -25,8 +25,8 @@ from wristctl.records.copied_inputs import sealed_references
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
 
+# Laws that a listing names.
 _NAMED = 2
-"""Laws that a listing names."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Prepared(Generic[Found]):
     study: Study
     inputs: Inputs
     foreign: tuple[Foreign, ...] = ()
-    """Where those of its laws are from that are not this package's."""
+    """Origins of the laws that are not this package's."""
 
     def plan(self) -> str:
-        """What would be done. Raises UserError for what can be known before."""
+        """Describe the computation. Raises UserError for a fault that is known beforehand."""
         return self.procedure.plan(self.study, self.inputs)
 
 
@@ -48,20 +48,30 @@ def prepare(
     procedure: Procedure[Found],
     study: Study,
     out: Path,
-    given: Mapping[str, Any] | None = None,
+    named_inputs: Mapping[str, Any] | None = None,
     files: Sequence[Path] = (),
 ) -> Prepared[Found]:
-    """Open the inputs: those `given` by name, else those that the study names, runs in `out`; load laws from elsewhere.
+    """Open the inputs of a study, and load its laws from elsewhere. Raises UserError.
 
-    Where one of the study's `files` is the configuration of a run, its inputs may also be beside that. Raises
-    UserError.
+    Parameters
+    ----------
+    procedure
+        Procedure of the command.
+    study
+        Study to perform.
+    out
+        Folder of the runs.
+    named_inputs
+        Inputs by leaf that come before those of the study.
+    files
+        Files of the study; where one is the configuration of a run, inputs may also be beside that run.
     """
     section = procedure.section(study)
     beside = [file.absolute().parent.parent for file in files if (file.parent / MANIFEST).is_file()]
-    inputs = opened(procedure.kind, section, procedure.needs, given or {}, out, beside)
+    inputs = opened(procedure.kind, section, procedure.needs, named_inputs or {}, out, beside)
     if inputs:
-        own = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
-        study = study.model_copy(update=own)
+        named = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
+        study = study.model_copy(update=named)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     return Prepared(procedure, study, inputs, foreign)
@@ -77,7 +87,7 @@ def recording(prepared: Prepared[Any], out: Path, label: str, argv: Sequence[str
 
 
 def _about(section: Any) -> str:
-    """What tells a study from others of its kind: its laws with their gains."""
+    """Laws of a study with their gains, which distinguish it from others of its kind."""
     rows = [section] if hasattr(section, "controller") else getattr(section, "rows", ())
     names = [_law(row) for row in rows] or list(getattr(section, "controllers", ()))
     return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} more" * (len(names) > _NAMED)
@@ -97,7 +107,23 @@ def perform(
     executor: str = "serial",
     typed: Sequence[str] = (),
 ) -> Found:
-    """Do it, into `run` where there is one: what fails is noted there, and the tables in the end."""
+    """Perform a prepared study; a failure is noted in `run`, and the tables in the end.
+
+    Parameters
+    ----------
+    prepared
+        Study with open inputs.
+    run
+        Run directory to write; None for a result in memory.
+    show
+        Display of the progress.
+    operator
+        Person at the rig.
+    executor
+        Name of the executor of units of work.
+    typed
+        Files and settings of the study as the command line had them.
+    """
     work, findings, study = prepared.procedure.perform, Findings(prepared.study.seed, run), prepared.study
     if run is not None and run.files:  # what is read is what was sealed
         study = with_files(
@@ -107,9 +133,9 @@ def perform(
     if run is None:
         return work(session)
     try:
-        found = work(session)
-        findings.overview.answer[:] = found.summary
-        findings.overview.marks[:] = found.marks
+        result = work(session)
+        findings.overview.answer[:] = result.summary
+        findings.overview.marks[:] = result.marks
     except UserError as error:
         run.console(f"error: {error}")
         raise
@@ -120,18 +146,18 @@ def perform(
     finally:
         with suppress(OSError, UserError):  # what went wrong is told by another error
             findings.keep_overview()
-    run.console(str(found))
-    run.summary(_summary(found, findings.overview), first=bool(found.summary))
-    content = json.dumps(plain_tables(found.tables), indent=2, allow_nan=False)
+    run.console(str(result))
+    run.summary(_summary(result, findings.overview), first=bool(result.summary))
+    content = json.dumps(plain_tables(result.tables), indent=2, allow_nan=False)
     run.file(TABLES).write_text(content + "\n", encoding="utf-8")
-    if found.fault is not None:
-        run.exit_code = found.fault.exit_code
-    return found
+    if result.fault is not None:
+        run.exit_code = result.fault.exit_code
+    return result
 
 
-def _summary(found: StudyResult, overview: Overview) -> str:
+def _summary(result: StudyResult, overview: Overview) -> str:
     """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
-    tables = "\n\n".join(table.text() for table in found.tables)
+    tables = "\n\n".join(table.text() for table in result.tables)
     if not overview.answer:
         return f"```\n{tables}\n```" if tables else ""
     picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""
@@ -141,7 +167,7 @@ def _summary(found: StudyResult, overview: Overview) -> str:
 
 def plain_tables(tables: Sequence[Table]) -> Any:
     """Tables for JSON."""
-    return jsonable([{"title": each.title, "columns": each.columns, "rows": each.rows} for each in tables])
+    return jsonable([{"title": table.title, "columns": table.columns, "rows": table.rows} for table in tables])
 
 
 def _page(path: Path, manifest: Manifest) -> str:
@@ -152,8 +178,8 @@ def _page(path: Path, manifest: Manifest) -> str:
 
 Ref = str | Path | Run
 Folder = str | Path
+# Folder of runs when none is named.
 RESULTS = "results"
-"""Where runs are looked for when no folder is given."""
 
 
 @contextmanager
@@ -174,12 +200,30 @@ def check_executor(named: str) -> None:
 
 
 def carry_out(
-    procedure: Procedure[Found], study: Study, given: Mapping[str, Any], out: Folder | None, label: str,
+    procedure: Procedure[Found], study: Study, named_inputs: Mapping[str, Any], out: Folder | None, label: str,
     progress: Watch | None, executor: str = "serial",
 ) -> Found:  # fmt: skip
-    """Plan and perform a procedure with inputs by their roles; with a folder `out` it leaves a sealed run there."""
+    """Plan and perform a procedure.
+
+    Parameters
+    ----------
+    procedure
+        Procedure of the command.
+    study
+        Study to perform.
+    named_inputs
+        Inputs by role.
+    out
+        Folder in which a sealed run is left; None for a result in memory.
+    label
+        Label of the run.
+    progress
+        Callback of the progress; None for no display.
+    executor
+        Name of the executor of units of work.
+    """
     folder, show = Path(RESULTS if out is None else out), watched(progress)
-    prepared = prepare(procedure, study, folder, given)
+    prepared = prepare(procedure, study, folder, named_inputs)
     prepared.plan()
     check_executor(executor)
     if out is None:
@@ -188,14 +232,14 @@ def carry_out(
         return perform(prepared, run, show, Unattended(), executor)
 
 
+# Kinds of runs whose repetition gives the same result.
 AGAIN = ("gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "identify", "audit")
-"""Kinds of runs that come out the same again."""
+# Relative difference of metrics up to which a repetition counts as the same result.
 _ALIKE = 1e-6
-"""Relative difference of metrics up to which a repetition shows what the run found."""
 
 
 def redrawn(run: Run, show: ShowProgress) -> StudyResult:
-    """What a run found, with all its figures, each drawn when it is asked for.
+    """Repeat a run for its result with all figures, each drawn when it is asked for.
 
     UserError for a kind of run that cannot be had again, for one that did not end well, and where the repetition does
     not find what the run did: a figure of it would show something else.
@@ -209,19 +253,19 @@ def redrawn(run: Run, show: ShowProgress) -> StudyResult:
     if run.state != "ok":
         raise UserError(f"the run is {run.state}, not ok", str(run.path), "name one that ended ok")
     prepared = _prepared(run)
-    found: StudyResult = perform(prepared, None, show, Unattended())
-    again = {name: each["value"] for name, each in found.findings.metrics.items()}
+    result: StudyResult = perform(prepared, None, show, Unattended())
+    again = {name: metric["value"] for name, metric in result.findings.metrics.items()}
     searched = run.kind == "compare" and run.config.compare.tuning is not None
-    known = {name: each["value"] for name, each in run.metrics.items() if name in again or not searched}
-    other = [name for name, value in known.items() if name not in again or not _alike(value, again[name])]
-    if other:
+    recorded = {name: metric["value"] for name, metric in run.metrics.items() if name in again or not searched}
+    different = [name for name, value in recorded.items() if name not in again or not _alike(value, again[name])]
+    if different:
         raise UserError(
-            f"again it finds something else: {other[0]}{f' and {len(other) - 1} more' * (len(other) > 1)}",
+            f"again it finds something else: {different[0]}{f' and {len(different) - 1} more' * (len(different) > 1)}",
             str(run.path),
             f"wristctl runs replay {run.id} says why",
             exit_code=3,
         )
-    return found
+    return result
 
 
 def _prepared(run: Run) -> Prepared[Any]:
@@ -236,5 +280,5 @@ def _prepared(run: Run) -> Prepared[Any]:
 
 
 def _alike(value: float | None, again: float | None) -> bool:
-    known = [each for each in (value, again) if each is not None and math.isfinite(each)]
-    return not known or (len(known) == 2 and math.isclose(*known, rel_tol=_ALIKE, abs_tol=1e-12))
+    finite = [metric for metric in (value, again) if metric is not None and math.isfinite(metric)]
+    return not finite or (len(finite) == 2 and math.isclose(*finite, rel_tol=_ALIKE, abs_tol=1e-12))

@@ -24,19 +24,22 @@ class Table:
 
     def text(self, width: int | None = None) -> str:
         """Aligned columns, numbers to four digits; columns beyond `width` go below, the first repeated."""
-        heads = [printable(each) for each in self.columns]
+        heads = [printable(column) for column in self.columns]
         rows = [[_plain(value) for value in row] for row in self.rows]
         cells = [[_cell(value) for value in row] for row in rows]
         widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
-        right = [_numeric([row[at] for row in rows]) for at in range(len(self.columns))]
+        right = [_numeric([row[index] for row in rows]) for index in range(len(self.columns))]
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
-            padded = [values[at].rjust(widths[at]) if right[at] else values[at].ljust(widths[at]) for at in chosen]
+            padded = [
+                values[index].rjust(widths[index]) if right[index] else values[index].ljust(widths[index])
+                for index in chosen
+            ]
             return "  ".join(padded).rstrip()
 
         blocks = []
         for chosen in _blocks(widths, width):
-            rule = "  ".join("-" * widths[at] for at in chosen)
+            rule = "  ".join("-" * widths[index] for index in chosen)
             blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
         return "\n".join([printable(self.title), ""] * bool(self.title) + ["\n\n".join(blocks)])
 
@@ -65,14 +68,14 @@ def _numeric(column: Sequence[Any]) -> bool:
 
 
 def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
-    """Which columns stand beside each other: the first everywhere, the others as far as `width` reaches."""
+    """Indices of the columns in each block: the first everywhere, the others as far as `width` reaches."""
     blocks, used = [[0]], widths[0]
-    for at in range(1, len(widths)):
-        if width is not None and at > 1 and used + 2 + widths[at] > width:
+    for index in range(1, len(widths)):
+        if width is not None and index > 1 and used + 2 + widths[index] > width:
             blocks.append([0])
             used = widths[0]
-        blocks[-1].append(at)
-        used += 2 + widths[at]
+        blocks[-1].append(index)
+        used += 2 + widths[index]
     return blocks
 
 
@@ -80,12 +83,12 @@ def latex_table(table: Table) -> str:
     """A table for the packages booktabs and caption, numbers to four digits and aligned to the right."""
     import pandas as pd
 
-    columns = [printable(each) for each in table.columns]
+    columns = [printable(column) for column in table.columns]
     cells = [[_latex_cell(value) for value in row] for row in table.rows]
-    numeric = [not any(isinstance(row[at], str | bool) for row in table.rows) for at in range(len(columns))]
+    numeric = [not any(isinstance(row[index], str | bool) for row in table.rows) for index in range(len(columns))]
     styled = pd.DataFrame(cells, columns=columns).style.hide(axis="index").format(escape="latex")
     styled = styled.format_index(escape="latex", axis="columns")
-    aligned = "".join("r" if each else "l" for each in numeric)
+    aligned = "".join("r" if is_number else "l" for is_number in numeric)
     text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(printable(table.title)) or None)
     return text.rstrip()
 
@@ -98,18 +101,18 @@ def _latex_cell(value: Any) -> str:
     return printable(value) if isinstance(value, str) else number(float(value))
 
 
-_ESCAPED = {each: f"\\{each}" for each in "&%$#_{}"} | {
+_ESCAPED = {character: f"\\{character}" for character in "&%$#_{}"} | {
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}",
 }  # fmt: skip
 
 
 def escaped(text: str) -> str:
     """Text with what LaTeX reads as its own written out."""
-    return "".join(_ESCAPED.get(each, each) for each in text)
+    return "".join(_ESCAPED.get(character, character) for character in text)
 
 
+# Columns of a line of an answer, at most.
 COLUMNS = 100
-"""What a line of an answer may take."""
 
 
 def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent: str = "") -> list[str]:
@@ -140,5 +143,5 @@ def degrees(error: float, digits: int = 2) -> str:
 
 def percent(share: Share) -> str:
     """A share with its 95 % interval: 0.8 % [0.1, 2.9]."""
-    value, low, high = (f"{100.0 * each:.2g}" for each in (share.value, share.low, share.high))
+    value, low, high = (f"{100.0 * bound:.2g}" for bound in (share.value, share.low, share.high))
     return f"{value} % [{low}, {high}]"

@@ -26,7 +26,7 @@ Found = TypeVar("Found", bound=StudyResult)
 
 @dataclass(frozen=True)
 class Procedure(Generic[Found]):
-    """What a command does with its section of a study. Its docstring is that of `perform`."""
+    """Plan and computation of a command. `perform` carries the command's docstring."""
 
     kind: str
     """The command's name, and its runs' kind."""
@@ -67,7 +67,7 @@ _PLACES |= {"study": "study.command:FAIR_STUDY"}
 
 
 def procedure_of(run: Run) -> Procedure[Any]:
-    """What made a run. Raises UserError for a kind that no command makes."""
+    """Procedure that made a run. Raises UserError for a kind that no command makes."""
     if run.kind not in _PLACES:
         raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
     module, _, name = _PLACES[run.kind].partition(":")
@@ -80,17 +80,17 @@ def inputs_of(run: Run) -> dict[str, Input | list[Input]]:
 
     Raises UserError where its manifest has one play a part that the run's command knows nothing of.
     """
-    procedure, found = procedure_of(run), dict[str, Input | list[Input]]()
+    procedure, by_role = procedure_of(run), dict[str, Input | list[Input]]()
     defaults = procedure.section(Study())
     several = {need.leaf: isinstance(getattr(defaults, need.leaf), tuple) for need in procedure.needs}
-    for each in run.manifest.inputs:
-        leaf = each.role.partition("[")[0]
-        before = found.setdefault(leaf, []) if several.get(leaf) else None
-        if isinstance(before, list) and each.role == f"{leaf}[{len(before)}]":
-            before.append(each)
-        elif before is None and each.role in several and leaf not in found:
-            found[leaf] = each
+    for recorded in run.manifest.inputs:
+        leaf = recorded.role.partition("[")[0]
+        before = by_role.setdefault(leaf, []) if several.get(leaf) else None
+        if isinstance(before, list) and recorded.role == f"{leaf}[{len(before)}]":
+            before.append(recorded)
+        elif before is None and recorded.role in several and leaf not in by_role:
+            by_role[leaf] = recorded
         else:
-            what = f"{run.kind} has no place for a run as its {each.role!r}"
-            raise UserError(what, str(run.path / MANIFEST), NAME_A_RUN, exit_code=3)
-    return found
+            reason = f"{run.kind} has no place for a run as its {recorded.role!r}"
+            raise UserError(reason, str(run.path / MANIFEST), NAME_A_RUN, exit_code=3)
+    return by_role

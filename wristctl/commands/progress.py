@@ -1,4 +1,4 @@
-"""How far something has come: counted for whoever shows it, noted in the run's events, told in the end."""
+"""Progress of a task: counted for a display, noted in the run's events, logged in the end."""
 
 import logging
 import time
@@ -12,18 +12,18 @@ from wristctl.commands.session import Done, Event, ShowProgress
 
 log = logging.getLogger(__name__)
 
+# Called with what goes on, how much of it is done, of how much (None: unknown), and figures beside it.
 Watch = Callable[[str, int, int | None, Mapping[str, float]], None]
-"""Called with what goes on, how much of it is done, of how much (None: unknown), and figures beside it."""
 
+# Time between two events [s].
 _EVENT_EVERY = 1.0
-"""Seconds between two events."""
+# Time after which a pace is meaningful [s].
 _TELLS = 2.0
-"""Seconds after which a pace tells something."""
 
 
 @dataclass
 class Count:
-    """How far something has come, and the figures beside it."""
+    """Progress of a task, and the figures beside it."""
 
     what: str
     total: int | None
@@ -33,14 +33,14 @@ class Count:
     began: float = field(default_factory=lambda: time.monotonic())
 
     def seconds_left(self) -> float | None:
-        """What is left at the pace so far [s]; None where nothing is known of it, or all is done."""
+        """Time left at the pace so far [s]; None where it is unknown, or all is done."""
         passed = time.monotonic() - self.began
         if self.total is None or not 0 < self.count < self.total or passed < _TELLS:
             return None
         return passed * (self.total - self.count) / self.count
 
     def remaining(self) -> str:
-        """The same in words; empty where it is not known."""
+        """Time left in words; empty where it is unknown."""
         left = self.seconds_left()
         return "" if left is None else f"about {duration(left)} left"
 
@@ -49,21 +49,35 @@ class Count:
         return ", ".join(f"{name} {number(float(value))}" for name, value in self.figures.items())
 
     def line(self) -> str:
-        """All of it as text."""
+        """Progress and figures as text."""
         of = "" if self.total is None else f" of {self.total}"
         counted = f"{self.count}{of} {self.unit}".rstrip() if self.count else ""
         shown = ", ".join(part for part in (counted, self.beside()) if part)
         return f"{self.what}: {shown}" if shown else self.what
 
     def fields(self) -> dict[str, Any]:
-        """All of it as an event has it."""
+        """Progress and figures as fields of an event."""
         return {"what": self.what, "total": self.total, "count": self.count, **self.figures}
 
 
 @contextmanager
-def counting(event: Event, what: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
-    """Count while a block works: each call is shown, at most one a second is an event; the end is one and a message."""
-    state = Count(what, total, unit)
+def counting(event: Event, task: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
+    """Count while a block works: each call is shown, and at most one a second is an event.
+
+    Parameters
+    ----------
+    event
+        Function that notes an event; the end is one, and a log message.
+    task
+        Name of the task.
+    total
+        Length of the task in `unit`; None where it is unknown.
+    unit
+        Unit of the count.
+    show
+        Display of the count.
+    """
+    state = Count(task, total, unit)
     last_event = state.began - _EVENT_EVERY
 
     def done(count: int = 0, **figures: float) -> None:
@@ -96,9 +110,9 @@ def watched(watch: Watch | None) -> ShowProgress:
         if watch is not None:
             watch(count.what, count.count, count.total, dict(count.figures))
 
-    def shown(event: Event, what: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
-        show(Count(what, total, unit))
-        return counting(event, what, total, unit, show)
+    def shown(event: Event, task: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+        show(Count(task, total, unit))
+        return counting(event, task, total, unit, show)
 
     return shown
 

@@ -1,4 +1,4 @@
-"""What a study has found so far: kept in memory, and written at once into the run directory where there is one."""
+"""Results of a study: kept in memory, and written at once into the run directory where there is one."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Findings:
         """value, unit, better, n, interval and meaning by name, as a run's metrics.json has them"""
         self.figures = Figures()
         self.overview = Overview()
-        """What the run's page begins with, and in which order it shows the figures."""
+        """Head of the run's page, and the order of its figures."""
         self._seed, self._draws = seed, draws
 
     def stream(self, name: str) -> tuple[int, int]:
@@ -87,20 +87,51 @@ class Findings:
         interval: tuple[float, float] | None = None,
         meaning: str = "",
     ) -> None:
-        """A number with unit, better direction, sample size and interval; None: there is none."""
-        known = {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
-        self.metrics[name] = known
+        """Record a metric.
+
+        Parameters
+        ----------
+        name
+            Name of the metric.
+        value
+            Value in `unit`; None where there is none.
+        unit
+            Unit; empty for a ratio.
+        better
+            Better direction; empty where there is none.
+        n
+            Sample size.
+        interval
+            Ends of the 95 % interval, in `unit`.
+        meaning
+            Meaning in words.
+        """
+        entry = {"value": value, "unit": unit, "better": better, "n": n, "interval": interval, "meaning": meaning}
+        self.metrics[name] = entry
         if self.run:
             self.run.metric(name, value, unit, better, n, interval, meaning)
 
     def figure(
-        self, name: str, draw: Callable[..., Figure], *of: Any, caption: str = "", later: bool = False, **how: Any
+        self, name: str, draw: Callable[..., Figure], *of: Any, caption: str = "", later: bool = False, **options: Any
     ) -> None:
-        """The figure that `draw(*of, **how)` gives: drawn now into a run, else when somebody asks for it.
+        """Record a figure: drawn now into a run, else when somebody asks for it.
 
-        The `caption` says what it shows; one for `later` is drawn when somebody asks for it in any case.
+        Parameters
+        ----------
+        name
+            Name of the figure's file.
+        draw
+            Function that draws it.
+        of
+            Arguments of `draw`.
+        caption
+            Subject of the figure.
+        later
+            Whether it is drawn only when somebody asks for it, also with a run.
+        options
+            Keyword arguments of `draw`.
         """
-        drawer = partial(draw, *of, **how)
+        drawer = partial(draw, *of, **options)
         self.figures.add(name, drawer)
         self.overview.captions[name] = caption
         if self.run and self._draws and not later:
@@ -143,7 +174,7 @@ class Findings:
             self.run.volatile(name)
 
     def file(self, name: str) -> Path | None:
-        """Where to write a file of another format; None without a run."""
+        """Path for a file of another format; None without a run."""
         return self.run.file(name) if self.run else None
 
     def event(self, name: str, /, **fields: Any) -> None:
@@ -152,7 +183,7 @@ class Findings:
             self.run.event(name, **fields)
 
     def numerics(self, **facts: Any) -> None:
-        """How numbers were computed, for the run's manifest."""
+        """Note in the run's manifest how numbers were computed."""
         if self.run:
             self.run.numerics(**facts)
 
@@ -176,7 +207,7 @@ class StudyResult(ABC):
     """As it was performed: inputs that have a run directory are named in it."""
     findings: Findings
     tables: Sequence[Table]
-    """What the command prints."""
+    """Tables that the command prints."""
 
     @abstractmethod
     def frame(self) -> pd.DataFrame:
@@ -188,12 +219,12 @@ class StudyResult(ABC):
 
     @property
     def fault(self) -> UserError | None:
-        """What the command ends with although the study was done: a result that cannot stand; None where it can."""
+        """Error with which the command ends after a complete study: a result that cannot stand; None where it can."""
         return None
 
     @property
     def summary(self) -> Sequence[str]:
-        """What was found in a few lines of at most 100 columns, as its `answer`; empty where the tables are that."""
+        """Answer in a few lines of at most 100 columns; empty where the tables are the answer."""
         answer = getattr(self, "answer", ())
         return answer if isinstance(answer, list) else ()
 
@@ -210,8 +241,8 @@ class StudyResult(ABC):
     @property
     def metrics(self) -> dict[str, float]:
         """Numbers by name, in the units that the run's metrics.json gives; nan where there is none."""
-        known = {name: each["value"] for name, each in self.findings.metrics.items()}
-        return {name: math.nan if value is None else value for name, value in known.items()}
+        values = {name: metric["value"] for name, metric in self.findings.metrics.items()}
+        return {name: math.nan if value is None else value for name, value in values.items()}
 
     @property
     def figures(self) -> Figures:

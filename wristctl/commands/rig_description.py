@@ -1,4 +1,4 @@
-"""What of a rig is real and what is emulated, and how its loop is scheduled."""
+"""Description of a rig: its real and its emulated parts, and the scheduling of its loop."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

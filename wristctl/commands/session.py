@@ -1,4 +1,4 @@
-"""What a study works with while it is performed."""
+"""Session of a study: inputs, findings, progress and operator."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class Done(Protocol):
         """Say it."""
 
 
+# Notes an event by its name, with fields.
 Event = Callable[..., None]
-"""Notes an event by its name, with fields."""
 
 
 class ShowProgress(Protocol):
-    """Shows how far something has come while a block works on it, and notes that as events."""
+    """Display of the progress of a task while a block works on it; notes it as events."""
 
-    def __call__(self, event: Event, what: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
-        """Begin to show `what`; without a `total` its length is unknown."""
+    def __call__(self, event: Event, task: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+        """Begin to show `task`; without a `total` its length is unknown."""
 
 
 class Operator(Protocol):
@@ -42,17 +42,17 @@ class Operator(Protocol):
     def tell(self, text: str) -> None:
         """Show a text that is no part of the result."""
 
-    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
-        """Say what is to be done or will be, and come back once that is agreed to. Raises UserError where it is not.
+    def confirm(self, action: str, meanwhile: Meanwhile | None = None) -> None:
+        """Ask for agreement to `action`, and return once it is given. Raises UserError where it is refused.
 
         Until then `meanwhile` is called again and again: what it raises ends the question.
         """
 
-    def dare(self, what: str) -> None:
-        """What should not be done on hardware. Raises UserError where nobody has said that it is to be done anyway."""
+    def dare(self, action: str) -> None:
+        """Allow an action that is unsafe on hardware. Raises UserError unless the operator has forced it."""
 
-    def wait_for(self, what: str) -> None:
-        """Say what is to be done, and come back once it is."""
+    def wait_for(self, action: str) -> None:
+        """Ask the operator for `action`, and return once it is done."""
 
     def watch(self, trials: Sequence[Trial], session: Session) -> AbstractContextManager[Shown]:
         """Show the trials while a block performs them: it yields what each tick is handed to."""
@@ -72,9 +72,9 @@ class Session:
     typed: Sequence[str] = ()
     """The study's files and settings as the command line had them, for commands that are advised."""
 
-    def progress(self, what: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
-        """Show how far `what` has come: a context manager that yields `done(count, **figures)`."""
-        return self.show(self.findings.event, what, total, unit)
+    def progress(self, task: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
+        """Show the progress of `task`: a context manager that yields `done(count, **figures)`."""
+        return self.show(self.findings.event, task, total, unit)
 
 
 class Unattended:
@@ -83,17 +83,17 @@ class Unattended:
     def tell(self, text: str) -> None:
         """Nobody to tell."""
 
-    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
+    def confirm(self, action: str, meanwhile: Meanwhile | None = None) -> None:
         """Raises UserError."""
-        raise UserError(f"nobody is there to agree to this: {what}", fix="use the command line", exit_code=3)
+        raise UserError(f"nobody is there to agree to this: {action}", fix="use the command line", exit_code=3)
 
-    def dare(self, what: str) -> None:
+    def dare(self, action: str) -> None:
         """Raises UserError."""
-        self.confirm(what)
+        self.confirm(action)
 
-    def wait_for(self, what: str) -> None:
+    def wait_for(self, action: str) -> None:
         """Raises UserError."""
-        self.confirm(what)
+        self.confirm(action)
 
     @contextmanager
     def watch(self, trials: Sequence[Trial], session: Session) -> Iterator[Shown]:

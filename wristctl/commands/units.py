@@ -18,11 +18,26 @@ log = logging.getLogger(__name__)
 
 
 def performed(
-    session: Session, command: str, what: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
+    session: Session, command: str, task: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
 ) -> UnitsDone:
-    """Compute a command's units with the session's workers, into the run where there is one, and show how far they are.
+    """Compute a command's units with the session's workers, into the run where there is one, and show the progress.
 
-    Sizes are `counted` in these. The hashes of laws from elsewhere are part of the units' specifications.
+    The hashes of laws from elsewhere are part of the units' specifications.
+
+    Parameters
+    ----------
+    session
+        Session of the study.
+    command
+        Name of the command.
+    task
+        Name of the task in the display of the progress.
+    units
+        Units of work.
+    golden
+        Numbers that all workers must reproduce; None for no check.
+    counted
+        Unit of the units' sizes.
     """
     from wristctl.commands.adoption import adoption, sources_in
     from wristctl.work.executors import Workers
@@ -30,7 +45,7 @@ def performed(
     from wristctl.work.worker import UNITS, Computed, Furnish, code_digest
 
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
-    folder, earlier = (each.path / UNITS if each else None for each in (run, stopped))
+    folder, earlier = (source.path / UNITS if source else None for source in (run, stopped))
     first = folder is None or not folder.exists()
     if first and stopped is not None and stopped.manifest.code.tree_sha256 != code_digest():
         log.warning("%s was made by other code: none of its units can be taken over, all are computed anew", stopped.id)
@@ -38,22 +53,22 @@ def performed(
         folder.mkdir(exist_ok=True)
     furnish = None
     if sources := sources_in(session.study):
-        units = [replace(each, spec={**each.spec, "sources": sources}) for each in units]
+        units = [replace(unit, spec={**unit.spec, "sources": sources}) for unit in units]
         furnish = Furnish("wristctl.commands.adoption:adopt", adoption(session.study, command))
     count = 0
-    with session.progress(what, total=sum(each.size for each in units), unit=counted) as done:
+    with session.progress(task, total=sum(unit.size for unit in units), unit=counted) as report:
 
         def told(unit: Unit, computed: Computed | None) -> None:
             nonlocal count
             count += unit.size
-            done(count)
+            report(count)
             if computed is not None:
                 spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
                 session.findings.event("unit", name=unit.name, key=unit.key, **{counted: unit.size}, **spent)
 
-        found = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
+        results = perform_units(units, Workers.of(session.executor), golden, folder, earlier, told, furnish)
     if run is not None and stopped is not None:
-        run.took_over(stopped.id, len(found.taken_over), int(found.tried_again is not None))
-    for each in found.poisoned:
-        session.findings.event("warning", message=f"{each.unit.name} was given up: {each.why}")
-    return found
+        run.took_over(stopped.id, len(results.taken_over), int(results.tried_again is not None))
+    for lost in results.poisoned:
+        session.findings.event("warning", message=f"{lost.unit.name} was given up: {lost.why}")
+    return results

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Change of a law's slope over 1e-4 typical sizes from which its margins are of less than anybody can see.
 _CURVED = 0.05
-"""Change of a law's slope over 1e-4 typical sizes from which its margins are of less than anybody can see."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -61,16 +61,16 @@ class Analysed(StudyResult):
     answer: str
     angles: Sequence[float]
     found: Sequence[LoopAnalysis]
-    """Of each angle."""
+    """Analysis at each resting angle."""
     locus: RootLocus | None
-    """At the last one; None where nothing is fed back."""
+    """Root locus at the last angle; None where nothing is fed back."""
     portrait: PhasePortrait | None
-    """Of a sliding law, toward the last one."""
+    """Phase portrait of a sliding law, toward the last angle; None of another law."""
 
     @property
     def fault(self) -> UserError | None:
-        """That it is unstable somewhere."""
-        bad = [angle for angle, each in zip(self.angles, self.found, strict=True) if not each.margins.stable]
+        """Error that names the angles at which the loop is unstable; None where it is stable."""
+        bad = [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
         if not bad:
             return None
         where = str(self.findings.run.path) if self.findings.run else ""
@@ -83,7 +83,7 @@ class Analysed(StudyResult):
 
         from wristctl.commands.analyse.answer import margins_of
 
-        return pd.DataFrame([margins_of(*each) for each in zip(self.angles, self.found, strict=True)])
+        return pd.DataFrame([margins_of(*row) for row in zip(self.angles, self.found, strict=True)])
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -100,15 +100,15 @@ def plan(study: Study, inputs: Inputs) -> str:
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:
-        what = f"{law.name} is plain Python, and only compiled laws can be linearised"
-        raise UserError(what, "simulate.controller", "one that compiles (docs/your-own-controller.md)")
+        reason = f"{law.name} is plain Python, and only compiled laws can be linearised"
+        raise UserError(reason, "simulate.controller", "one that compiles (docs/your-own-controller.md)")
     if settings.over not in ("loop", *law.gains):
-        what = f"{law.name} has no gain '{settings.over}' for a root locus"
-        raise UserError(what, "analyse.over", meant(settings.over, ["loop", *law.gains]))
-    far = [each for each in settings.angles_deg if abs(each) > study.wrist.range_deg]
+        reason = f"{law.name} has no gain '{settings.over}' for a root locus"
+        raise UserError(reason, "analyse.over", meant(settings.over, ["loop", *law.gains]))
+    far = [angle for angle in settings.angles_deg if abs(angle) > study.wrist.range_deg]
     if far:
-        what = f"{far[0]:g} deg lies outside the wrist's range of +-{study.wrist.range_deg:g} deg"
-        raise UserError(what, "analyse.angles_deg", "smaller angles, or widen wrist.range_deg")
+        reason = f"{far[0]:g} deg lies outside the wrist's range of +-{study.wrist.range_deg:g} deg"
+        raise UserError(reason, "analyse.angles_deg", "smaller angles, or widen wrist.range_deg")
     angles = listed(settings.angles_deg) if settings.angles_deg else "where its reference begins, is half way, and ends"
     return f"linearise {chosen.controller} at rest at {angles}, friction {settings.friction}"
 
@@ -126,31 +126,31 @@ def analyse(session: Session) -> Analysed:
     _warn_of_frames(chosen.loop)
     network = network_for(session.inputs, study.wrist, [chosen.loop])
     row, angles = _row(study, session.inputs), _angles(study, network)
-    found = []
-    with session.progress("linearising the loop", len(angles), "angles") as done:
-        for each in angles:
-            found.append(_at_rest(row, study, each))
-            done(len(found))
+    analyses = []
+    with session.progress("linearising the loop", len(angles), "angles") as report:
+        for angle in angles:
+            analyses.append(_at_rest(row, study, angle))
+            report(len(analyses))
     locus, last = None, _theta(study, angles[-1])
-    if not all(each.is_open for each in found):
+    if not all(analysis.is_open for analysis in analyses):
         with session.progress("following the poles"):
             locus = row.locus(last, settings.over, settings.span)
     portrait = _portrait(session, row, study, last)
     label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}"
-    said = answer(label, found, angles)
-    findings.summary(f"**{said}**\n\n![Bode plot](figures/bode.png)")
-    write(findings, angles, found, locus, portrait)
+    sentence = answer(label, analyses, angles)
+    findings.summary(f"**{sentence}**\n\n![Bode plot](figures/bode.png)")
+    write(findings, angles, analyses, locus, portrait)
     with session.progress("drawing"):
-        draw(findings, label, angles, found, locus, portrait)
-    tables = [margin_table(said, found, angles), step_table(found, angles)]
+        draw(findings, label, angles, analyses, locus, portrait)
+    tables = [margin_table(sentence, analyses, angles), step_table(analyses, angles)]
     if locus is not None:
         value = None if settings.over == "loop" else row.gains[settings.over]
         tables.append(
             locus_table(locus, value, "" if value is None else row.law.gains[settings.over].unit, settings.span)
         )
-    tables.append(limit_table(found[-1], CUTS[chosen.loop.sensor.level]))
+    tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
     tables += [] if portrait is None else [portrait_table(portrait)]
-    return Analysed(session.study, findings, tables, said, angles, found, locus, portrait)
+    return Analysed(session.study, findings, tables, sentence, angles, analyses, locus, portrait)
 
 
 def _row(study: Study, inputs: Inputs) -> AnalysedRow:
@@ -188,9 +188,9 @@ def _angles(study: Study, network: Inverse | None) -> list[float]:
 def _warn_of_frames(loop: Loop) -> None:
     from wristctl.stability.smooth_loop import smooth
 
-    rate, told = smooth(loop, "slipping").sensor.frame_rate, loop.sensor.frame_rate
-    if loop.sensor.level == "camera" and rate != told:
-        log.warning("frames at %g Hz repeat on no few control periods: linearised with %.5g Hz", told, rate)
+    rate, configured = smooth(loop, "slipping").sensor.frame_rate, loop.sensor.frame_rate
+    if loop.sensor.level == "camera" and rate != configured:
+        log.warning("frames at %g Hz repeat on no few control periods: linearised with %.5g Hz", configured, rate)
 
 
 def _sign(study: Study) -> float:
@@ -205,17 +205,17 @@ def _theta(study: Study, angle: float) -> float:
 
 def _at_rest(row: AnalysedRow, study: Study, angle: float) -> LoopAnalysis:
     """The loop about one resting angle [deg]; UserError where it rests nowhere near, or beyond what tendons bear."""
-    found = row.analysed(_theta(study, angle))
-    if found is None:
+    analysis = row.analysed(_theta(study, angle))
+    if analysis is None:
         fix = "other gains, or another angle in analyse.angles_deg"
         raise UserError(f"the loop rests nowhere near {angle:g} deg", "simulate.gains", fix)
-    most, bears = max(found.linear.tensions), study.wrist.tension_limit
+    most, bears = max(analysis.linear.tensions), study.wrist.tension_limit
     if study.simulate.loop.limits and most > bears:
-        what = f"to rest at {angle:g} deg takes {most:.3g} N in a tendon that bears {bears:g}"
-        raise UserError(what, "analyse.angles_deg", "a smaller angle, or a larger wrist.tension_limit")
-    if found.linear.bend > _CURVED:
+        reason = f"to rest at {angle:g} deg takes {most:.3g} N in a tendon that bears {bears:g}"
+        raise UserError(reason, "analyse.angles_deg", "a smaller angle, or a larger wrist.tension_limit")
+    if analysis.linear.bend > _CURVED:
         log.warning("at %g deg the law bends within 1e-4 rad: its margins are of smaller swings", angle)
-    return found
+    return analysis
 
 
 def _portrait(session: Session, row: AnalysedRow, study: Study, theta: float) -> PhasePortrait | None:

@@ -30,27 +30,27 @@ from wristctl.stability.sampled_loop import Complex
 
 _COLOURS = (SKY, ORANGE, VERMILLION, BLUE, GREY)
 _TURN = 2.0 * np.pi
+# Loop gain, and frequency [Hz], below which nothing is drawn.
 _LEAST, _SLOWEST = 1e-4, 0.02
-"""Loop gain, and frequency [Hz], below which nothing is drawn."""
 
 
-def bode(found: Sequence[LoopAnalysis], angles: Sequence[float], heading: str) -> Figure:
+def bode(analyses: Sequence[LoopAnalysis], angles: Sequence[float], heading: str) -> Figure:
     """Magnitude and phase of the loop's transfer over frequency [Hz], a line for each resting angle [deg].
 
     Dots are where the gain is 1 and where the phase is -180 deg. A loop that feeds nothing back is shown as its plant:
     angle per torque.
     """
-    made, axes = figure(2, 1, height=5.2, sharex=True)
+    fig, axes = figure(2, 1, height=5.2, sharex=True)
     gain, phase = axes[:, 0]
-    alone = all(each.is_open for each in found)
-    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
-        response = each.plant if alone else each.response
-        at = each.omega / _TURN
-        shown = at >= min(_SLOWEST, 0.1 * at[-1])
-        gain.plot(at[shown], np.abs(response)[shown], label=f"at {angle:g} deg", **style)
-        phase.plot(at[shown], _phase(response)[shown], **style)
+    alone = all(loop.is_open for loop in analyses)
+    for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
+        response = analysis.plant if alone else analysis.response
+        frequency = analysis.omega / _TURN
+        shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
+        gain.plot(frequency[shown], np.abs(response)[shown], label=f"at {angle:g} deg", **style)
+        phase.plot(frequency[shown], _phase(response)[shown], **style)
         if not alone:
-            _mark(gain, each, style["color"])
+            _mark(gain, analysis, style["color"])
     logarithmic(gain.xaxis)
     logarithmic(gain.yaxis)
     gain.set_ylabel("angle per torque [rad/(N m)]" if alone else "loop gain")
@@ -64,13 +64,13 @@ def bode(found: Sequence[LoopAnalysis], angles: Sequence[float], heading: str) -
     phase.set_ylim(low, high)
     title(gain, heading)
     legend(gain, loc="lower left")
-    return made
+    return fig
 
 
-def _mark(axes: Axes, each: LoopAnalysis, colour: str) -> None:
-    limits = [limit for limit in (each.margins.least, each.margins.most) if 0.0 < limit.value < np.inf]
+def _mark(axes: Axes, analysis: LoopAnalysis, colour: str) -> None:
+    limits = [limit for limit in (analysis.margins.least, analysis.margins.most) if 0.0 < limit.value < np.inf]
     axes.plot([limit.omega / _TURN for limit in limits], [1.0 / limit.value for limit in limits], "o", color=colour)
-    crossed = [crossing.omega / _TURN for crossing in each.margins.gain_crossings]
+    crossed = [crossing.omega / _TURN for crossing in analysis.margins.gain_crossings]
     axes.plot(crossed, np.ones(len(crossed)), "s", color=colour, markersize=4.0)
 
 
@@ -85,50 +85,54 @@ def _styles(count: int) -> list[dict[str, Any]]:
     return [{"color": _COLOURS[k % len(_COLOURS)], "linewidth": 1.0 + 1.2 * (count - 1 - k)} for k in range(count)]
 
 
-def sensitivity(found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
+def sensitivity(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
     """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| over frequency [Hz]."""
-    made, ((axes,),) = figure(height=3.2)
-    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
-        amplified = 1.0 / (1.0 + each.response)
-        at = each.omega / _TURN
-        shown = at >= min(_SLOWEST, 0.1 * at[-1])
-        axes.plot(at[shown], np.abs(amplified)[shown], label=f"S at {angle:g} deg", **style)
+    fig, ((axes,),) = figure(height=3.2)
+    for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
+        amplified = 1.0 / (1.0 + analysis.response)
+        frequency = analysis.omega / _TURN
+        shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
+        axes.plot(frequency[shown], np.abs(amplified)[shown], label=f"S at {angle:g} deg", **style)
         axes.plot(
-            at[shown], np.abs(each.response * amplified)[shown], linestyle="--", label=f"T at {angle:g} deg", **style
+            frequency[shown],
+            np.abs(analysis.response * amplified)[shown],
+            linestyle="--",
+            label=f"T at {angle:g} deg",
+            **style,
         )
     axes.axhline(1.0, **DOTTED)
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
     axes.set_ylim(bottom=max(1e-3, axes.get_ylim()[0]))
     axes.set(xlabel="frequency [Hz]", ylabel="amplification")
-    legend_below(made, 2)
-    return made
+    legend_below(fig, 2)
+    return fig
 
 
-def step(found: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
+def step(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
     """The angle after a small step of the reference, as a share of it, over time [s], where the loop is stable."""
-    made, ((axes,),) = figure(height=3.2)
+    fig, ((axes,),) = figure(height=3.2)
     lasts = 0.0
-    for each, angle, style in zip(found, angles, _styles(len(found)), strict=True):
-        if each.margins.stable:
-            axes.plot(each.step.time, each.step.angle, label=f"at {angle:g} deg", **style)
-            lasts = max(lasts, 2.0 * each.step.settling, 5.0 * each.step.rise)
+    for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
+        if analysis.margins.stable:
+            axes.plot(analysis.step.time, analysis.step.angle, label=f"at {angle:g} deg", **style)
+            lasts = max(lasts, 2.0 * analysis.step.settling, 5.0 * analysis.step.rise)
     axes.axhline(1.0, **DOTTED)
     axes.set_xlim(0.0, lasts)
     axes.set(xlabel="time [s]", ylabel="angle / step")
     legend(axes, loc="lower right")
-    return made
+    return fig
 
 
-def locus(found: RootLocus, least_growth: float = -60.0) -> Figure:
+def locus(root_locus: RootLocus, least_growth: float = -60.0) -> Figure:
     """Poles as the gain grows: decay or growth [1/s] and frequency [Hz]; black rings stand for the loop as it is."""
-    made, ((axes,),) = figure(height=4.2)
-    points = np.concatenate([each for each in found.poles if len(each)])
-    shades = np.concatenate([np.full(len(p), f) for f, p in zip(found.factors, found.poles, strict=True)])
-    own = found.poles[len(found.factors) // 2]
+    fig, ((axes,),) = figure(height=4.2)
+    points = np.concatenate([poles for poles in root_locus.poles if len(poles)])
+    shades = np.concatenate([np.full(len(p), f) for f, p in zip(root_locus.factors, root_locus.poles, strict=True)])
+    current = root_locus.poles[len(root_locus.factors) // 2]
     near = np.log10(shades)
     shown = axes.scatter(points[:, 0], points[:, 1], c=near, s=8.0, cmap="viridis", linewidths=0.0)
-    axes.scatter(own[:, 0], own[:, 1], s=42.0, facecolors="none", edgecolors=BLACK, label="as it is")
+    axes.scatter(current[:, 0], current[:, 1], s=42.0, facecolors="none", edgecolors=BLACK, label="as it is")
     axes.axvline(0.0, color=VERMILLION, linewidth=1.0)
     left = max(least_growth, float(points[:, 0].min())) if len(points) else least_growth
     right = max(5.0, min(float(points[:, 0].max()), -left)) if len(points) else 5.0
@@ -136,21 +140,21 @@ def locus(found: RootLocus, least_growth: float = -60.0) -> Figure:
     inside = points[(points[:, 0] > 1.05 * left) & (points[:, 0] < 1.05 * right)]
     axes.set_ylim(-0.02 * inside[:, 1].max(initial=1.0), 1.05 * inside[:, 1].max(initial=1.0))
     axes.set(xlabel="growth [1/s]; left of 0 it decays", ylabel="frequency [Hz]")
-    bar = made.colorbar(shown, ax=axes, label="log10 of the gain's factor")
+    bar = fig.colorbar(shown, ax=axes, label="log10 of the gain's factor")
     bar.ax.tick_params(labelsize=9.0)
-    over = "the loop's gain" if found.over == "loop" else found.over
+    over = "the loop's gain" if root_locus.over == "loop" else root_locus.over
     title(axes, f"Root locus over {over}")
     legend(axes, loc="upper left")
-    return made
+    return fig
 
 
-def portrait(found: PhasePortrait) -> Figure:
+def portrait(phase_portrait: PhasePortrait) -> Figure:
     """Error and its rate of the nonlinear loop, over the sliding surface (black) and its boundary layer (grey).
 
     Vermillion until a course has come into the layer for good, blue from then on.
     """
-    made, ((axes,),) = figure(height=4.2)
-    for course in found.courses:
+    fig, ((axes,),) = figure(height=4.2)
+    for course in phase_portrait.courses:
         error, rate = np.degrees(course.error), np.degrees(course.rate)
         points = np.stack([error, rate], axis=1)
         late = course.time >= (course.reached if np.isfinite(course.reached) else np.inf)
@@ -161,11 +165,11 @@ def portrait(found: PhasePortrait) -> Figure:
     low, high = axes.get_xlim()
     bottom, top = axes.get_ylim()
     across = np.array([low, high])
-    line, layer = -found.slope * across, np.degrees(found.layer)
+    line, layer = -phase_portrait.slope * across, np.degrees(phase_portrait.layer)
     axes.fill_between(across, line - layer, line + layer, color=LIGHT, linewidth=0.0, zorder=0.5)
     axes.plot(across, line, color=BLACK, linewidth=1.0, label="sliding surface, without its integral")
     for colour, label in ((VERMILLION, "reaching"), (BLUE, "within the layer for good")):
         axes.plot([], [], color=colour, label=label)
     axes.set(xlim=(low, high), ylim=(bottom, top), xlabel="error [deg]", ylabel="error rate [deg/s]")
-    legend_below(made, 3)
-    return made
+    legend_below(fig, 3)
+    return fig

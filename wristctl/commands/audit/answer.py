@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from wristctl.config.audit import Claim
 
 
+# Lines of a terminal that the first screen may take.
 LINES = 24
-"""What the first screen may take of a terminal."""
+# Claims shown with both numbers; one less where a box was drawn.
 _HEAVIEST = 5
-"""Claims of which it has both numbers; one less where a box was drawn."""
 _MORE = "All claims with reasons: `wristctl audit ... --all`, or README.md of the run. Words: docs/index.md."
 
 
@@ -39,49 +39,49 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
 
 
 def _fitted(paragraphs: Sequence[Sequence[str]], room: int) -> list[str]:
-    """Paragraphs of sentences in so many lines; what there is no room for is left out from the end, whole."""
-    lines = [line for each in paragraphs for line in in_lines(" ".join(each))]
+    """Paragraphs of sentences in at most `room` lines; whole sentences are left out from the end."""
+    lines = [line for paragraph in paragraphs for line in in_lines(" ".join(paragraph))]
     if len(lines) <= room or not paragraphs:
         return lines
-    *others, last = paragraphs
-    return _fitted([*others, last[:-1]] if last else others, room)
+    *earlier, last = paragraphs
+    return _fitted([*earlier, last[:-1]] if last else earlier, room)
 
 
 def _conditions(loops: Sequence[str], limit: float) -> list[str]:
-    told = [f"{name} ({_described(name, limit)})" for name in loops]
-    return [f"The paper's claims, tried in simulation on the loops {_and(told)}."] * bool(loops)
+    descriptions = [f"{name} ({_described(name, limit)})" for name in loops]
+    return [f"The paper's claims, tried in simulation on the loops {_and(descriptions)}."] * bool(loops)
 
 
 def _described(loop: str, limit: float) -> str:
-    """A built-in loop by what sets it apart."""
-    own = LOOPS.get(loop)
-    if own is None:
+    """Segments, control rate and tension limit of a built-in loop, in words."""
+    builtin = LOOPS.get(loop)
+    if builtin is None:
         return "a loop of yours"
-    n, rate = own.plant_segments, 1e-3 / own.control_period
+    n, rate = builtin.plant_segments, 1e-3 / builtin.control_period
     ticks = "nearly continuous" if rate >= 100.0 else f"{rate:g} kHz"
-    tensions = f"{limit:g} N" if own.limits and math.isfinite(limit) else "no tension limit"
+    tensions = f"{limit:g} N" if builtin.limits and math.isfinite(limit) else "no tension limit"
     return f"{n} segment{'s' * (n > 1)}, {ticks}, {tensions}"
 
 
+# Rows that the paper prints, and the one of ours: what they are, and in short.
 _GAINS = {
     "smc/printed": ("its sliding mode controller (SMC) with the printed gains", "SMC as printed"),
     "smc/exchanged": ("SMC with P1 and P2 exchanged (a guess of ours)", "SMC with P1 and P2 exchanged"),
     "pid/printed": ("its PID with the printed gains", "PID as printed"),
 }
-"""Rows that the paper prints, and the one of ours: what they are, and in short."""
 
 
 def _gains(claims: Sequence[Judgement]) -> list[str]:
-    """Where each set of gains brings the wrist to 30 deg, and where T2's RMSE comes out."""
+    """Loops on which each set of gains reaches 30 deg, and loops on which it gives T2's RMSE."""
     arrivals, numbers = [], []
     for label, (who, short) in _GAINS.items():
-        own = [j for j in claims if j.claim.label == label]
-        if arrival := _one(j for j in own if j.claim.evidence == "arrival"):
+        labelled = [j for j in claims if j.claim.label == label]
+        if arrival := _one(j for j in labelled if j.claim.evidence == "arrival"):
             arrivals.append(f"by {who} {_places(arrival.found)}")
-        if number := _one(j for j in own if _is_number(j.claim, "rmse")):
+        if number := _one(j for j in labelled if _is_number(j.claim, "rmse")):
             numbers.append(f"for {short} {_places(number.found)}{_mark(number.found)}")
-    said = [f"30 deg are reached {', '.join(arrivals)}."] if arrivals else []
-    return said + [f"The printed RMSE comes out {', '.join(numbers)}."] * bool(numbers)
+    sentences = [f"30 deg are reached {', '.join(arrivals)}."] if arrivals else []
+    return sentences + [f"The printed RMSE comes out {', '.join(numbers)}."] * bool(numbers)
 
 
 def _is_number(claim: Claim, metric: str) -> bool:
@@ -94,10 +94,10 @@ def _is_number(claim: Claim, metric: str) -> bool:
     )
 
 
-def _mark(found: Mapping[str, Finding]) -> str:
-    there = _where(found, "reproduced")
-    beyond = [name for name in there if found[name].mark]
-    where = f"on {_and(beyond)} " * (len(there) > len(beyond))
+def _mark(findings: Mapping[str, Finding]) -> str:
+    reproduced = _where(findings, "reproduced")
+    beyond = [name for name in reproduced if findings[name].mark]
+    where = f"on {_and(beyond)} " * (len(reproduced) > len(beyond))
     return f" ({where}with tensions that no tendon bears)" * bool(beyond)
 
 
@@ -106,23 +106,25 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     from wristctl.comparison.paper import T2
 
     pairs = []
-    for gains, how in (("printed", "as printed"), ("exchanged", "with P1 and P2 exchanged")):
+    for gains, wording in (("printed", "as printed"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
-        pairs += [f"{how} {_places(one.found)}"] if one else []
-    said = [f"SMC has less RMSE than PID: {', '.join(pairs)}."] if pairs else []
+        pairs += [f"{wording} {_places(one.found)}"] if one else []
+    sentences = [f"SMC has less RMSE than PID: {', '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
-    known = [each for each in links if each is not None]
-    if len(known) < len(links):
-        return said
+    tried = [link for link in links if link is not None]
+    if len(tried) < len(links):
+        return sentences
     named = [name.upper() for name in order if name not in ("smc", "pid")]
     holds = [
         loop
         for loop in loops
-        if all((own := each.found.get(loop)) and (own.beside or own.verdict) == "reproduced" for each in known)
+        if all(
+            (finding := link.found.get(loop)) and (finding.beside or finding.verdict) == "reproduced" for link in tried
+        )
     ]
     return [
-        *said,
+        *sentences,
         f"The ranking {' < '.join(name.upper() for name in order)} in RMSE cannot be judged: the paper gives no "
         f"equations of {_and(named)}; with designs of ours and P1 and P2 exchanged it holds {_on(holds, loops)}.",
     ]
@@ -141,29 +143,31 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     """In which share of the settings that the paper may have had gains arrive, and give a whole row of T2."""
     from wristctl.comparison.paper import FACTOR
 
-    own = {evidence: [each for each in strips if each.claim.evidence == evidence] for evidence in _IN_BOX}
-    used = [each for parts in own.values() for each in parts]
+    in_box = {evidence: [strip for strip in strips if strip.claim.evidence == evidence] for evidence in _IN_BOX}
+    used = [strip for parts in in_box.values() for strip in parts]
     if not used:
         return []
     shares = {
-        evidence: _and([f"{_short(each.claim.label)} in {_share(each)}" for each in parts])
-        for evidence, parts in own.items()
+        evidence: _and([f"{_short(strip.claim.label)} in {_share(strip)}" for strip in parts])
+        for evidence, parts in in_box.items()
     }
-    said = []
-    if own["arrival"]:
-        resting = any(each.share("reproduced").times for each in own["arrival"])
+    sentences = []
+    if in_box["arrival"]:
+        resting = any(strip.share("reproduced").times for strip in in_box["arrival"])
         also = " (also by wrists that rest there whatever is asked of them)" * resting
-        said.append(f"30 deg are reached with {shares['arrival']}{also}")
-    if own["together"]:
-        said.append(f"T2's three numbers come out at once, within a factor of {FACTOR:g}, with {shares['together']}")
-    left = sorted({each.uncounted for each in used})
+        sentences.append(f"30 deg are reached with {shares['arrival']}{also}")
+    if in_box["together"]:
+        sentences.append(
+            f"T2's three numbers come out at once, within a factor of {FACTOR:g}, with {shares['together']}"
+        )
+    left = sorted({strip.uncounted for strip in used})
     many = f"{left[0]} to {left[-1]}" if len(left) > 1 else f"{left[0]}"
     open_ = f" ({many} did not converge and are not counted)" * bool(left[-1])
-    return [f"Of {len(strips[0].verdicts)} settings that the paper may have had{open_} {'; '.join(said)}."]
+    return [f"Of {len(strips[0].verdicts)} settings that the paper may have had{open_} {'; '.join(sentences)}."]
 
 
+# Claims over the box that the first screen tells.
 _IN_BOX = ("arrival", "together")
-"""Claims over the box that the first screen tells."""
 
 
 def _short(label: str) -> str:
@@ -182,47 +186,47 @@ def _networks(claims: Sequence[Judgement]) -> list[str]:
     best = [j for j in tested if str(j.claim.metric).endswith("_is_best")]
     beaten = [j for j in tested if str(j.claim.metric).endswith("_is_beaten")]
     learns = [j for j in tested if str(j.claim.metric).endswith("_median_r2")]
-    said = []
+    sentences = []
     if best:
-        there = [j.claim.says for j in best if j.verdict == "reproduced"]
+        shown = [j.claim.says for j in best if j.verdict == "reproduced"]
         count = len([j for j in beaten if j.verdict == "reproduced"])
         also = f", and another to be more accurate in {count or 'none'}" * bool(beaten)
-        which = f" ({'; '.join(there)})" if 0 < len(there) < len(best) else ""
-        said.append(
+        which = f" ({'; '.join(shown)})" if 0 < len(shown) < len(best) else ""
+        sentences.append(
             f"Of {len(best)} ways to train its networks, between which it does not tell, sigmoid is shown to be the "
-            f"most accurate in {len(there) or 'none'}{which}{also}."
+            f"most accurate in {len(shown) or 'none'}{which}{also}."
         )
-    for verdict, what in (("does not hold", "does not learn"), ("open", "may or may not learn")):
-        own = [j.claim.says for j in learns if j.verdict == verdict]
-        if own:
-            said.append(f"Sigmoid {what} (R^2 of {learns[0].claim.value:g}) with {'; with '.join(own)}.")
+    for verdict, wording in (("does not hold", "does not learn"), ("open", "may or may not learn")):
+        trainings = [j.claim.says for j in learns if j.verdict == verdict]
+        if trainings:
+            sentences.append(f"Sigmoid {wording} (R^2 of {learns[0].claim.value:g}) with {'; with '.join(trainings)}.")
     if learns and all(j.verdict == "reproduced" for j in learns):
-        said.append(f"Sigmoid learns (R^2 of {learns[0].claim.value:g}) in all of them.")
-    return said
+        sentences.append(f"Sigmoid learns (R^2 of {learns[0].claim.value:g}) in all of them.")
+    return sentences
 
 
 def _by_topic(claims: Sequence[Judgement]) -> list[str]:
-    """What the paper's own words or equations contradict, and what they leave open."""
-    own = [j for j in claims if j.claim.topic and j.claim.whose == "paper" and not j.claim.weight]
-    said = []
+    """Topics that the paper's own words or equations contradict, and topics that they leave open."""
+    topical = [j for j in claims if j.claim.topic and j.claim.whose == "paper" and not j.claim.weight]
+    sentences = []
     for verdict, begin in (
         ("not specified enough", "Cannot be told, since the paper does not say enough"),
         ("contradicted", "Contradicted by its own equations or words"),
     ):
-        topics = [j.claim.topic for j in own if j.verdict == verdict and not j.claim.part_of]
+        topics = [j.claim.topic for j in topical if j.verdict == verdict and not j.claim.part_of]
         if topics:
-            said.append(f"{begin}: {', '.join(topics)}.")
-    return said
+            sentences.append(f"{begin}: {', '.join(topics)}.")
+    return sentences
 
 
+# Subjects of the claims that want an earlier run.
 _RUNS = {"table1": "the table of networks", "selection": "the number of layers", "hardware": "the experiment"}
-"""What claims are about that want an earlier run."""
 
 
 def _untested(claims: Sequence[Judgement]) -> list[str]:
     wanted = dict.fromkeys(j.claim.evidence for j in claims if j.verdict == "open" and j.claim.evidence in _RUNS)
-    told = [f"{_RUNS[name]} (--{name} RUN)" for name in wanted]
-    return [f"Not tested here: {', '.join(told)}."] if told else []
+    missing = [f"{_RUNS[name]} (--{name} RUN)" for name in wanted]
+    return [f"Not tested here: {', '.join(missing)}."] if missing else []
 
 
 def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> list[str]:
@@ -241,38 +245,38 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> li
     ]
 
 
-def _ours(found: Finding) -> str:
+def _ours(finding: Finding) -> str:
     from wristctl.comparison.claims import interval
 
-    if math.isnan(found.low):
+    if math.isnan(finding.low):
         return "fails"
-    return interval(found.low, found.high) + "*" * (found.verdict == "reproduced")
+    return interval(finding.low, finding.high) + "*" * (finding.verdict == "reproduced")
 
 
-def _places(found: Mapping[str, Finding]) -> str:
+def _places(findings: Mapping[str, Finding]) -> str:
     """On which loops something is so, on which for some motions only, and on which two are alike."""
-    loops, open_ = [name for name in found if name], _where(found, "not specified enough")
-    alike = [name for name in open_ if found[name].reason.startswith("alike")]
+    loops, open_ = [name for name in findings if name], _where(findings, "not specified enough")
+    alike = [name for name in open_ if findings[name].reason.startswith("alike")]
     some = [name for name in open_ if name not in alike]
-    said = [_on(_where(found, "reproduced"), loops)]
-    said += [f"for some motions only on {_and(some)}"] * bool(some)
-    said += [f"as much as it on {_and(alike)}"] * bool(alike)
-    return ", ".join(said)
+    places = [_on(_where(findings, "reproduced"), loops)]
+    places += [f"for some motions only on {_and(some)}"] * bool(some)
+    places += [f"as much as it on {_and(alike)}"] * bool(alike)
+    return ", ".join(places)
 
 
-def _on(there: Sequence[str], loops: Sequence[str]) -> str:
-    if len(there) == len(loops) > 1:
+def _on(holding: Sequence[str], loops: Sequence[str]) -> str:
+    if len(holding) == len(loops) > 1:
         return "on all loops"
-    return f"on {_and(there)}{' alone' * (len(loops) > 1 == len(there))}" if there else "on no loop"
+    return f"on {_and(holding)}{' alone' * (len(loops) > 1 == len(holding))}" if holding else "on no loop"
 
 
-def _where(found: Mapping[str, Finding], verdict: str) -> list[str]:
-    return [name for name, each in found.items() if name and each.verdict == verdict]
+def _where(findings: Mapping[str, Finding], verdict: str) -> list[str]:
+    return [name for name, finding in findings.items() if name and finding.verdict == verdict]
 
 
 def _one(judged: Iterable[Judgement]) -> Judgement | None:
     """The first that was judged on loops."""
-    return next((each for each in judged if any(name for name in each.found)), None)
+    return next((judgement for judgement in judged if any(name for name in judgement.found)), None)
 
 
 def _percent(share: float) -> str:
@@ -293,13 +297,13 @@ def ledger_tables(judged: Sequence[Judgement]) -> list[Table]:
     claims = [j for j in judged if j.verdict is not None]
     settings = [j for j in judged if j.verdict is None]
     tables = []
-    for title, others, kind in (
+    for title, other_title, kind in (
         ("Claims of the paper that rollouts decide", "Other claims of the paper", "paper"),
         ("Details that rollouts decide", "Other details", "part"),
         ("Our own checks that rollouts decide", "Our own other checks", "ours"),
         ("Rollouts on what the paper's authors say elsewhere", "What the paper's authors say elsewhere", "group"),
     ):
-        tables += _section(title, others, [j for j in claims if _kind(j.claim) == kind])
+        tables += _section(title, other_title, [j for j in claims if _kind(j.claim) == kind])
     if settings:
         tables.append(Table("Settings taken over as printed", ("setting", "the paper says", "paper", "unit"),
                             [tuple(_claim(j)) for j in settings]))  # fmt: skip
@@ -319,11 +323,11 @@ def _kind(claim: Claim) -> str:
 
 
 def _section(title: str, title_of_others: str, judged: Sequence[Judgement]) -> list[Table]:
-    """Its claims that loops decide, and those that they do not."""
+    """Tables of a section: the claims that loops decide, and the remaining claims."""
     from wristctl.comparison.claims import worded
 
     by_loop = [j for j in judged if any(name for name in j.found)]
-    others = [j for j in judged if j not in by_loop]
+    remaining = [j for j in judged if j not in by_loop]
     loops = list(dict.fromkeys(name for j in by_loop for name in j.found if name))
     heads, tables = ("claim", "says", "paper", "unit"), []
     if by_loop:
@@ -337,11 +341,11 @@ def _section(title: str, title_of_others: str, judged: Sequence[Judgement]) -> l
             for j in by_loop
         ]
         tables.append(Table(title, (*heads, "verdict", *pairs), rows))
-    if others:
-        sources = any(j.claim.source for j in others)
+    if remaining:
+        sources = any(j.claim.source for j in remaining)
         rows = [
             (*_claim(j), *_cells(j.claim, j.found.get("")), ", ".join(j.shown_by), *(j.claim.source,) * sources)
-            for j in others
+            for j in remaining
         ]
         tables.append(Table(title_of_others, (*heads, "ours", "verdict", "shown by", *("source",) * sources), rows))
     return tables
@@ -361,12 +365,16 @@ def _bound(sense: str) -> str:
     return {"at most": "<= ", "at least": ">= "}.get(sense, "")
 
 
-def _cells(claim: Claim, found: Finding | None) -> tuple[str, str]:
+def _cells(claim: Claim, finding: Finding | None) -> tuple[str, str]:
     """Our range and the verdict, marked where it must be."""
     from wristctl.comparison.claims import interval, worded
 
-    if found is None:
+    if finding is None:
         return "", ""
-    mark = f" ({found.mark})" if found.mark else ""
-    ours = "" if found.low != found.low and not found.reason.startswith("fails") else interval(found.low, found.high)
-    return ours, worded(claim, found.verdict) + mark
+    mark = f" ({finding.mark})" if finding.mark else ""
+    ours = (
+        ""
+        if finding.low != finding.low and not finding.reason.startswith("fails")
+        else interval(finding.low, finding.high)
+    )
+    return ours, worded(claim, finding.verdict) + mark

@@ -34,13 +34,13 @@ class Audited(StudyResult):
 
     judgements: list[Judgement]
     comparisons: dict[str, Compared]
-    """by loop"""
+    """Comparisons by loop."""
     strips: list[Strip]
-    """over the box of what the paper leaves open, where the study names it"""
+    """Verdicts of each claim over the box of unknowns; empty where the study names no box."""
 
     @property
     def answer(self) -> list[str]:
-        """What of the paper holds, in a few lines."""
+        """Verdicts on the paper's claims, in a few lines."""
         from wristctl.commands.audit.answer import answer_of
 
         return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit)
@@ -53,7 +53,7 @@ class Audited(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """What will be run; no claims, or a train run that cannot show them, are errors here."""
+    """Describe the run. Raises UserError without claims, or for a train run that cannot show them."""
     from wristctl.comparison.claims import TRAININGS, conditions_of
     from wristctl.simulation.size import Size, check_size
 
@@ -83,9 +83,9 @@ def _check_box(study: Study) -> None:
 
     box, rows = study.audit.box, len(rows_in_box(study.audit.claims))
     few = drawn_settings(box.model_copy(update={"draws": 8}), study.wrist, study.seed)
-    each = sum(Size([own.loop], own.horizon).steps for own in few) / len(few)
+    mean_steps = sum(Size([sample.loop], sample.horizon).steps for sample in few) / len(few)
     count = box.draws + sum(box.continuous)
-    check_steps(rows * (box.draws * each + sum(box.continuous) * box.horizon / CONTINUOUS), rows * count)
+    check_steps(rows * (box.draws * mean_steps + sum(box.continuous) * box.horizon / CONTINUOUS), rows * count)
 
 
 def audit(session: Session) -> Audited:
@@ -97,22 +97,22 @@ def audit(session: Session) -> Audited:
 
     findings, inputs, study = session.findings, session.inputs, session.study
     claims = study.audit.claims
-    known = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
+    loadable = [claim for claim in claims if claim.controller is None or claim.controller in CONTROLLERS]
     compared = {}
-    for loop, scale in conditions_of(known):
+    for loop, scale in conditions_of(loadable):
         name = loop if scale == 1.0 else f"{loop}-stiffness-{scale:g}"
-        compared[name] = _evidence(session, evidence_study(study, known, (loop, scale)), f"audit-{name}")
+        compared[name] = _evidence(session, evidence_study(study, loadable, (loop, scale)), f"audit-{name}")
     grounds = Grounds(
-        dict(zip(conditions_of(known), (each.frame() for each in compared.values()), strict=True)),
-        {role: found for role in TRAININGS if (found := inputs.read(role, _metrics)) is not None},
+        dict(zip(conditions_of(loadable), (comparison.frame() for comparison in compared.values()), strict=True)),
+        {role: metrics for role in TRAININGS if (metrics := inputs.read(role, _metrics)) is not None},
         inputs.read("hardware", _trials),
         study.wrist.tension_limit,
     )
     judged = judge_all(claims, grounds)
     boxed = judged_in_box(session)
-    if not boxed and any(name for each in judged for name in each.found):
+    if not boxed and any(name for judgement in judged for name in judgement.found):
         findings.figure("ledger", ours_over_the_papers, judged)
-    shown_by = {name: _name(each) for name, each in (*compared.items(), *inputs.items())}
+    shown_by = {name: _name(source) for name, source in (*compared.items(), *inputs.items())}
 
     units = {"paper": "", "low": "", "high": ""}
     meaning = {
@@ -145,11 +145,11 @@ def _check_claims(claims: Sequence[Claim]) -> None:
     loops: Iterable[str] = METRICS
     tables = {"equation": set(EQUATIONS)} | {kind: set(loops) for kind in _METRICS}
     for claim in claims:
-        known = tables.get(claim.evidence)
-        if known is not None and claim.metric not in known:
+        names = tables.get(claim.evidence)
+        if names is not None and claim.metric not in names:
             kind = "equation" if claim.evidence == "equation" else "metric"
-            what = f"claim {claim.id} asks for the {kind} '{claim.metric}', which there is not"
-            raise UserError(what, "audit.claims", meant(str(claim.metric), known))
+            reason = f"claim {claim.id} asks for the {kind} '{claim.metric}', which there is not"
+            raise UserError(reason, "audit.claims", meant(str(claim.metric), names))
 
 
 def _check_trainings(claims: Sequence[Claim], inputs: Inputs) -> None:
@@ -180,24 +180,24 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
         return compared(run)
 
 
-def _metrics(given: Given) -> Metrics:
-    return given.metrics if isinstance(given, Run) else given.findings.metrics
+def _metrics(earlier: Given) -> Metrics:
+    return earlier.metrics if isinstance(earlier, Run) else earlier.findings.metrics
 
 
-def _trials(given: Given) -> TrialsDone:
+def _trials(earlier: Given) -> TrialsDone:
     from wristctl.comparison.claims import TrialsDone
     from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
 
-    study = given.config if isinstance(given, Run) else given.study
-    table = given.data("trials") if isinstance(given, Run) else given.frame()
-    own = study.hw_run
-    moving = motion(own.reference, study.wrist, own.horizon, sample_period(own.control_period))
-    return TrialsDone(table, min(moving.rest, own.horizon), own.port is None)
+    study = earlier.config if isinstance(earlier, Run) else earlier.study
+    table = earlier.data("trials") if isinstance(earlier, Run) else earlier.frame()
+    settings = study.hw_run
+    moving = motion(settings.reference, study.wrist, settings.horizon, sample_period(settings.control_period))
+    return TrialsDone(table, min(moving.rest, settings.horizon), settings.port is None)
 
 
-def _name(given: Given) -> str:
-    run = given if isinstance(given, Run) else given.run
+def _name(earlier: Given) -> str:
+    run = earlier if isinstance(earlier, Run) else earlier.run
     return run.id if run else "in memory"
 
 
@@ -216,39 +216,45 @@ def judged_in_box(session: Session) -> list[Strip]:
         return []
     turned = {claim.label for claim in claims if claim.evidence == "symmetry"}
     settings = [*drawn_settings(box, study.wrist, study.seed), *continuous_settings(box, study.wrist, study.seed)]
-    with session.progress("drawing settings from the box", total=100, unit="%") as done:
+    with session.progress("drawing settings from the box", total=100, unit="%") as report:
         share = len(rows) / (len(rows) + len(turned))
-        drawn = react(rows, settings, lambda part: done(round(100 * share * part)))
-        rest = [row for row in rows if row.label in turned]
-        mirrored = react(rest, settings, lambda part: done(round(100 * (share + (1 - share) * part))), mirrored=True)
-    found = strips(claims, drawn, mirrored)
-    findings.table("data/box.csv", strips_frame(found))
+        drawn = react(rows, settings, lambda part: report(round(100 * share * part)))
+        symmetric = [row for row in rows if row.label in turned]
+        mirrored = react(
+            symmetric, settings, lambda part: report(round(100 * (share + (1 - share) * part))), mirrored=True
+        )
+    in_box = strips(claims, drawn, mirrored)
+    findings.table("data/box.csv", strips_frame(in_box))
     findings.table("data/draws.csv", draws_frame(drawn))
-    own = [each for each in found if not each.claim.unspecified or each.claim.evidence == "symmetry"]
+    specified = [
+        claim_strip
+        for claim_strip in in_box
+        if not claim_strip.claim.unspecified or claim_strip.claim.evidence == "symmetry"
+    ]
     heading = "In which of the settings that the paper may have had its claims hold"
-    findings.figure("box", shares, own or found, heading)
-    for each in found:
-        if each.leaves:
-            name = each.leaves[0].name
+    findings.figure("box", shares, specified or in_box, heading)
+    for row_strip in in_box:
+        if row_strip.leaves:
+            name = row_strip.leaves[0].name
             within = study if name.startswith("wrist.") else study.simulate
             unit = unit_at(within, name.split("."))
-            findings.figure(f"strip-{each.claim.id}", strip, each, drawn.values(name), unit, later=True)
-    return found
+            findings.figure(f"strip-{row_strip.claim.id}", strip, row_strip, drawn.values(name), unit, later=True)
+    return in_box
 
 
-def box_table(found: list[Strip]) -> Table:
-    """Where each claim holds, and what decides it."""
+def box_table(boxed: list[Strip]) -> Table:
+    """Table of the shares of drawn settings in which each claim holds, with the unknowns that decide it."""
     from wristctl.comparison.verdicts import FAILING
 
     rows = []
-    for each in found:
-        held = each.share("reproduced")
-        beside = (each.share("better than the paper").value, each.share(*FAILING).value)
-        second = each.leaves[1].name if each.told and len(each.leaves) > 1 else ""
-        rows.append((each.claim.id, each.uncounted, held.value, held.low, held.high, *beside, each.told, second))
+    for strip in boxed:
+        held = strip.share("reproduced")
+        beside = (strip.share("better than the paper").value, strip.share(*FAILING).value)
+        second = strip.leaves[1].name if strip.told and len(strip.leaves) > 1 else ""
+        rows.append((strip.claim.id, strip.uncounted, held.value, held.low, held.high, *beside, strip.told, second))
     heads = ("claim", "not converged", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
-    draws = len(found[0].verdicts) if found else 0
-    most = max((each.uncounted for each in found), default=0)
+    draws = len(boxed[0].verdicts) if boxed else 0
+    most = max((claim_strip.uncounted for claim_strip in boxed), default=0)
     left = f"; those that did not converge, up to {most}, are not counted" * bool(most)
     return Table(f"Shares of {draws} settings drawn from what the paper leaves open{left}", heads, rows)
 

@@ -35,49 +35,49 @@ _COLOURS: dict[tuple[VerdictName, ...], tuple[str, str]] = {
     FAILING: (VERMILLION, "ours is more, fails or never settles; the other way round"),
     ("not specified enough",): (SILVER, "alike within 5 %"),
 }
+# Letters of a line beside the bars.
 _WIDE = 44
-"""Letters of a line beside the bars."""
+# Ratio beyond which a point is drawn at the edge.
 _FURTHEST = 1e4
-"""Ratios beyond are drawn at the edge."""
 
 
-def shares(found: Sequence[Strip], heading: str = "") -> Figure:
+def shares(strips: Sequence[Strip], heading: str = "") -> Figure:
     """For each claim the shares of drawn settings with each verdict; beside it the unknown that decides it most."""
-    made, axes = figure(width=1.2 * WIDTH, height=max(2.6, 1.2 + 0.24 * len(found)))
+    fig, axes = figure(width=1.2 * WIDTH, height=max(2.6, 1.2 + 0.24 * len(strips)))
     panel = axes[0, 0]
-    places = np.arange(len(found))[::-1]
-    left = np.zeros(len(found))
+    places = np.arange(len(strips))[::-1]
+    left = np.zeros(len(strips))
     for verdicts, (colour, label) in _COLOURS.items():
-        width = np.array([each.share(*verdicts).value for each in found])
+        width = np.array([row.share(*verdicts).value for row in strips])
         if width.any():
             panel.barh(places, width, left=left, height=0.72, color=colour, label=label)
         left += width
-    for place, each in zip(places, found, strict=True):
-        _beside(panel, place, f"{100 * each.share('reproduced').value:.1f} %", 40.0, ha="right", fontsize=8.0)
-        said, shade = (fill(each.told, _WIDE), "k") if each.told else ("none alone", GREY)
-        _beside(panel, place, said, 46.0, fontsize=6.0, color=shade, linespacing=0.95)
-    panel.set_yticks(places, [each.claim.id for each in found], fontsize=8.0)
+    for place, claim_strip in zip(places, strips, strict=True):
+        _beside(panel, place, f"{100 * claim_strip.share('reproduced').value:.1f} %", 40.0, ha="right", fontsize=8.0)
+        caption, shade = (fill(claim_strip.told, _WIDE), "k") if claim_strip.told else ("none alone", GREY)
+        _beside(panel, place, caption, 46.0, fontsize=6.0, color=shade, linespacing=0.95)
+    panel.set_yticks(places, [row.claim.id for row in strips], fontsize=8.0)
     panel.set_xlim(0.0, 1.0)
-    panel.set_ylim(-0.6, len(found) - 0.4)
+    panel.set_ylim(-0.6, len(strips) - 0.4)
     panel.grid(False, axis="y")
-    _beside(panel, len(found) - 0.2, "holds in", 40.0, ha="right", fontsize=8.0)
-    _beside(panel, len(found) - 0.2, "by what decides most", 46.0, fontsize=8.0)
-    panel.set_xlabel(f"share of {counted(found)}", fontsize=10.0)
-    made.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
-    legend_below(made, 2)
-    return made
+    _beside(panel, len(strips) - 0.2, "holds in", 40.0, ha="right", fontsize=8.0)
+    _beside(panel, len(strips) - 0.2, "by what decides most", 46.0, fontsize=8.0)
+    panel.set_xlabel(f"share of {counted(strips)}", fontsize=10.0)
+    fig.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
+    legend_below(fig, 2)
+    return fig
 
 
-def counted(found: Sequence[Strip]) -> str:
-    """How many settings there are, and of which claim the most are not counted."""
-    draws, most = len(found[0].verdicts), max(each.uncounted for each in found)
+def counted(strips: Sequence[Strip]) -> str:
+    """Number of drawn settings, and the largest number that one claim does not count, in words."""
+    draws, most = len(strips[0].verdicts), max(row.uncounted for row in strips)
     return f"{draws} settings" + f", without up to {most} that did not converge" * bool(most)
 
 
-def _beside(panel: Axes, place: float, said: str, right: float, **style: Any) -> None:
+def _beside(panel: Axes, place: float, text: str, right: float, **style: Any) -> None:
     """Text beside the axes, so many points to the right of them."""
-    known = {"xytext": (right, 0.0), "textcoords": "offset points", "va": "center"}
-    panel.annotate(said, (1.0, place), xycoords=("axes fraction", "data"), annotation_clip=False, **known | style)
+    placement = {"xytext": (right, 0.0), "textcoords": "offset points", "va": "center"}
+    panel.annotate(text, (1.0, place), xycoords=("axes fraction", "data"), annotation_clip=False, **placement | style)
 
 
 def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
@@ -85,16 +85,16 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
 
     What fails or never settles stands at the upper edge.
     """
-    made, axes = figure(height=3.0)
+    fig, axes = figure(height=3.0)
     panel = axes[0, 0]
     x, names = _places(values)
     failed = ~np.isfinite(one.ratios)
     y = np.clip(np.where(failed, _FURTHEST, one.ratios), 1.0 / _FURTHEST, _FURTHEST)
     for verdicts, (colour, label) in _COLOURS.items():
-        own = np.array([each in verdicts for each in one.verdicts])
-        if own.any():
-            panel.plot(x[own], y[own], "o", ms=2.5, mew=0, alpha=0.6, color=colour, label=label)
-    open_ = np.array([each is None for each in one.verdicts])
+        matching = np.array([verdict in verdicts for verdict in one.verdicts])
+        if matching.any():
+            panel.plot(x[matching], y[matching], "o", ms=2.5, mew=0, alpha=0.6, color=colour, label=label)
+    open_ = np.array([verdict is None for verdict in one.verdicts])
     if open_.any():
         style = {"ms": 2.5, "mew": 0.4, "mfc": "none", "color": GREY}
         panel.plot(x[open_], y[open_], "o", label="did not converge: not counted", **style)
@@ -115,8 +115,8 @@ def strip(one: Strip, values: Sequence[object], unit: str = "") -> Figure:
     over = f"{one.claim.than} over {one.claim.label}" if one.claim.than else "ours over the paper's"
     panel.set_ylabel("one side over the other" if one.claim.evidence == "symmetry" else over, fontsize=10.0)
     title(panel, fill(f"{one.claim.id}: {one.claim.says}", 78))
-    legend_below(made, 2)
-    return made
+    legend_below(fig, 2)
+    return fig
 
 
 def _places(values: Sequence[object]) -> tuple[np.ndarray, list[str]]:
@@ -124,12 +124,12 @@ def _places(values: Sequence[object]) -> tuple[np.ndarray, list[str]]:
     spread = np.random.default_rng(0).uniform(-0.3, 0.3, len(values))
     if not isinstance(values[0], str):
         numbers = np.array(values, float)
-        known = np.isfinite(numbers)
-        apart = np.where(known, numbers, 1.6 * numbers[known].max())
+        finite = np.isfinite(numbers)
+        apart = np.where(finite, numbers, 1.6 * numbers[finite].max())
         few = len(set(numbers.tolist())) <= 12
         return (apart * np.exp(0.3 * spread) if few and apart.min() > 0.0 else apart), []
-    names = list(dict.fromkeys(str(each) for each in values))
-    return np.array([names.index(str(each)) for each in values]) + spread, names
+    names = list(dict.fromkeys(str(value) for value in values))
+    return np.array([names.index(str(value)) for value in values]) + spread, names
 
 
 _LOOPS = {"exact": (BLUE, "o"), "sampled": (ORANGE, "s"), "default": (VERMILLION, "^")}
@@ -141,28 +141,28 @@ def ours_over_the_papers(judged: Sequence[Judgement]) -> Figure:
 
     What never settles, or fails, stands at the right edge; a hollow mark is of a law that the paper only names.
     """
-    own = [j for j in judged if j.claim.value and j.claim.sense == "about" and any(name for name in j.found)]
-    made, axes = figure(height=1.2 + 0.26 * len(own))
+    numeric = [j for j in judged if j.claim.value and j.claim.sense == "about" and any(name for name in j.found)]
+    fig, axes = figure(height=1.2 + 0.26 * len(numeric))
     panel = axes[0, 0]
     panel.axvspan(1.0 / FACTOR, FACTOR, color=LIGHT, lw=0, zorder=0)
     named: set[str] = set()
-    for place, each in enumerate(reversed(own)):
-        assert each.claim.value
-        for at, (loop, found) in enumerate(each.found.items()):
+    for place, judgement in enumerate(reversed(numeric)):
+        assert judgement.claim.value
+        for index, (loop, finding) in enumerate(judgement.found.items()):
             colour, mark = _LOOPS.get(loop, (GREY, "d"))
-            ends = np.array([found.low, found.high]) / each.claim.value
+            ends = np.array([finding.low, finding.high]) / judgement.claim.value
             ends = np.clip(np.where(np.isfinite(ends), ends, _REACH[1]), *_REACH)
             label = None if loop in named else loop
             named.add(loop)
-            fill = "none" if each.claim.unspecified else colour
-            y = place + 0.24 * (1 - at)
+            fill = "none" if judgement.claim.unspecified else colour
+            y = place + 0.24 * (1 - index)
             panel.plot(ends, [y, y], marker=mark, ms=4, mfc=fill, color=colour, lw=1.2, label=label)
     logarithmic(panel.xaxis)
     panel.set_xlim(_REACH[0] / 3.0, _REACH[1] * 3.0)
-    panel.set_yticks(range(len(own)), [each.claim.id for each in reversed(own)], fontsize=8.0)
-    panel.set_ylim(-0.6, len(own) - 0.4)
+    panel.set_yticks(range(len(numeric)), [row.claim.id for row in reversed(numeric)], fontsize=8.0)
+    panel.set_ylim(-0.6, len(numeric) - 0.4)
     panel.set_xlabel(
         "ours over the paper's (band: within a factor of 1.5; left edge: 0; right edge: never)", fontsize=9.0
     )
-    legend_below(made)
-    return made
+    legend_below(fig)
+    return fig

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 
 
 def draw(findings: Findings, study: Study, results: list[ComparedRow], standings: Sequence[ClassStanding]) -> None:
-    """Each class by itself, then RMSE against variation of tension, over what grows, and of every row on every loop."""
+    """Draw each class, RMSE against variation of tension, RMSE over a growing leaf, and every row on every loop."""
     from wristctl.commands.compare.class_figures import answer_figure, error_against_variation
     from wristctl.commands.compare.figures import error_over_disturbance, series_of_sizes
 
@@ -70,7 +70,7 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], standings
     for standing in standings:
         _of_class(findings, standing, results)
     later = partial(findings.figure, later=True)
-    first = [each for each in results if each.inverse == _stands_for(results)[2]]
+    first = [result for result in results if result.inverse == _stands_for(results)[2]]
     caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
     later("rmse-against-tension-variation", error_against_variation, first, standings, caption=caption)
     for leaf, sizes in series_of_sizes(study.compare.loops).items():
@@ -86,16 +86,16 @@ def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[Com
 
     later = partial(findings.figure, later=True)
     cell = _stands_for(standing.of(results))
-    here = {each.label: each for each in results if (each.loop, each.reference, each.inverse) == cell}
-    own = [here[row] for row in shown_rows(standing) if row in here]
-    courses = [each.simulation.trajectory for each in own]
+    by_label = {result.label: result for result in results if (result.loop, result.reference, result.inverse) == cell}
+    shown = [by_label[row] for row in shown_rows(standing) if row in by_label]
+    courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(standing.name), f"{standing.name}: loop {cell[0]}, {cell[1]}"
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
     later(
         f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of both sides, {where}"
     )
-    repeated = [each.repeated for each in own if len(each.repeated.failed) > 1]
+    repeated = [result.repeated for result in shown if len(result.repeated.failed) > 1]
     if repeated:
         caption = f"|error| over repetitions: median and 95 % interval, {where}"
         later(f"error-of-repetitions-{slug}", error_sizes, repeated, where, caption=caption)
@@ -107,26 +107,26 @@ def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRo
 
     later, cells, settings = partial(findings.figure, later=True), paper_cells(study), study.compare
     for loop in settings.loops:
-        here = [each for each in results if each.loop == loop]
+        selected = [result for result in results if result.loop == loop]
         beside = any(cell[0] == loop for cell in cells)
         caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
-        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, here, f"loop {loop}", beside=beside, caption=caption)
+        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, selected, f"loop {loop}", beside=beside, caption=caption)
         caption = f"Total variation of tension of every row, loop {loop}"
-        later(f"tension-variation-{_slug(loop)}", variation_dots, here, f"loop {loop}", caption=caption)
-    for reference in dict.fromkeys(each.reference for each in results) if len(settings.loops) > 1 else ():
-        here = [each for each in results if each.reference == reference]
+        later(f"tension-variation-{_slug(loop)}", variation_dots, selected, f"loop {loop}", caption=caption)
+    for reference in dict.fromkeys(result.reference for result in results) if len(settings.loops) > 1 else ():
+        selected = [result for result in results if result.reference == reference]
         caption = f"RMSE of every row on each loop, {reference}"
-        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, here, reference, "loop", beside=False, caption=caption)
+        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, selected, reference, "loop", beside=False, caption=caption)
 
 
 def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
     """The loop, reference and inverse of the first row that is no step and, if there are others, not of a network."""
-    chosen = min(results, key=lambda each: (each.inverse == "network", each.jumps))
+    chosen = min(results, key=lambda result: (result.inverse == "network", result.jumps))
     return chosen.loop, chosen.reference, chosen.inverse
 
 
 def _slug(name: str) -> str:
-    """A name as a file's."""
+    """Name of a file made from a title."""
     return re.sub(r"[^A-Za-z0-9.-]+", "-", name.replace(" -", " minus ").replace("+", "plus ")).strip("-")
 
 
@@ -137,27 +137,27 @@ class Compared(StudyResult):
     kind = "compare"
 
     rows: list[ComparedRow]
-    """each with the simulation of its loop"""
+    """Compared rows with the simulation of their loop."""
     searches: dict[str, Search]
-    """of the controllers that were tuned here, by name"""
+    """Searches of the controllers that were tuned here, by name."""
     step_times: dict[str, StepTime]
-    """median and 99th percentile of a control step on this machine [us], by controller/gains"""
+    """Median and 99th percentile of a control step on this machine [us], by controller/gains."""
     standings: list[ClassStanding]
-    """of the rows in each class of conditions, or over the worlds of a family"""
+    """Standings of the rows in each class of conditions, or over the worlds of a family."""
     rankings: Sequence[WorldRanking] = ()
-    """over the worlds of a family, where one is named: of its smooth motions, of its steps; there are no `rows` then"""
+    """Rankings over the worlds of a named family: of its smooth motions, of its steps. `rows` is empty then."""
 
     @property
     def fault(self) -> UserError | None:
-        """That nothing in a ranking can be relied on."""
-        if any(len(found.standing.unreliable) < len(found.rows) for found in self.rankings) or not self.rankings:
+        """Error of a ranking in which every row is unreliable; None where some row stands."""
+        if any(len(ranking.standing.unreliable) < len(ranking.rows) for ranking in self.rankings) or not self.rankings:
             return None
-        what, where = "every row fails, swings or chatters in some world", self.findings.run
-        return UserError(what, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
+        reason, where = "every row fails, swings or chatters in some world", self.findings.run
+        return UserError(reason, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
 
     @property
     def answer(self) -> list[str]:
-        """Which row is best in each class of conditions, in words."""
+        """Best row in each class of conditions, in words."""
         return answer_lines(self.standings)
 
     def frame(self) -> pd.DataFrame:
@@ -169,7 +169,7 @@ class Compared(StudyResult):
         from wristctl.comparison.world_ranking import ranking_frame
 
         if self.rankings:
-            return pd.concat([ranking_frame(found) for found in self.rankings], ignore_index=True)
+            return pd.concat([ranking_frame(ranking) for ranking in self.rankings], ignore_index=True)
         return frame(self.rows, paper_cells(self.study))
 
     def series(self) -> dict[str, np.ndarray]:
@@ -179,7 +179,7 @@ class Compared(StudyResult):
         return dict(series(self.rows))
 
     def courses(self) -> Mapping[str, Mapping[str, Any]]:
-        """As `series`."""
+        """Courses over time under the name of their file."""
         return {"series": self.series()}
 
 
@@ -209,8 +209,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         asked = size(study)
         check_inverses(compared_inverses(study), inputs)
         check_size(asked)
-    told = truth_told(study.wrist, judged_loops(study, study.compare))
-    return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{told}"
+    truth = truth_told(study.wrist, judged_loops(study, study.compare))
+    return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{truth}"
 
 
 def size(study: Study) -> Size:
@@ -246,15 +246,15 @@ def compare(session: Session) -> Compared:
     network = network_for(session.inputs, study.wrist, loops)
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
-    tuned = dict(tuned_gains(session.inputs) or {}) | {name: found.gains for name, found in searches.items()}
+    tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     if settings.worlds.family:
         rankings, shown = ranked(session, study, network, tuned)
         stands = [of_ranking(ranking) for ranking in rankings]
         head_with_the_best(findings, stands)
         return Compared(study, findings, shown, [], searches, {}, stands, rankings)
-    with session.progress("comparing", total=100, unit="%") as done:
-        results = run_comparison(study, network, tuned, lambda share: done(round(100 * share)))
-    scenarios = [scenario_of(each, way) for each in settings.references for way in settings.directions]
+    with session.progress("comparing", total=100, unit="%") as report:
+        results = run_comparison(study, network, tuned, lambda share: report(round(100 * share)))
+    scenarios = [scenario_of(reference, way) for reference in settings.references for way in settings.directions]
     findings.note_streams(Draws(study.seed).names(loops, scenarios))
     cells = paper_cells(study)
     findings.table("data/comparison.csv", frame(results, cells), units=units())
@@ -263,8 +263,8 @@ def compare(session: Session) -> Compared:
         findings.table("data/repetitions.csv", repetitions_frame(results), units=units())
     for result in results:
         name = "_".join((result.loop, result.label, result.inverse, result.reference)).replace(" ", "-")
-        found = spread(result.repeated.metrics["rmse"])
-        findings.metric(f"rmse_{name}", found.median, "rad", "lower", found.n, found.interval)
+        rmse = spread(result.repeated.metrics["rmse"])
+        findings.metric(f"rmse_{name}", rmse.median, "rad", "lower", rmse.n, rmse.interval)
     standings = class_standings(results, settings, study.wrist)
     findings.table("data/standings.csv", standings_frame(standings), units=STANDING_UNITS)
     head_with_the_best(findings, standings)

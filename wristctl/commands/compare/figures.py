@@ -34,13 +34,13 @@ from wristctl.plotting.style import (
 )
 from wristctl.study_files.keys import field_at, unit_of
 
+# Subject of the columns of a figure.
 Across = Literal["reference", "loop"]
-"""What the columns of a figure are."""
 
+# Width [in] of names and bar, and width [in] that a cell needs for its number.
 _BESIDE_CELLS, _NUMBER = 2.3, 0.45
-"""Width [in] of names and bar, and what a cell needs for its number."""
+# Hatch of a row that diverged.
 _FAILED = "///"
-"""Hatch of what diverged."""
 
 
 def rmse_map(
@@ -58,21 +58,21 @@ def rmse_map(
     printed = np.full((len(rows), 1), np.nan)
     below: dict[tuple[int, int], str] = {}
     for result in results:
-        at = rows.index(_row(results, result))
-        place = at, columns.index(getattr(result, across))
+        index = rows.index(_row(results, result))
+        place = index, columns.index(getattr(result, across))
         values[place] = metrics_of(result)["rmse"]
         if len(result.repeated.failed) > 1:
             below[place] = _below(result)
-        printed[at] = T2[result.controller].rmse if beside and result.controller in T2 else np.nan
-    known = np.concatenate([values, printed], axis=1)
-    positive = known[known > 0.0]
+        printed[index] = T2[result.controller].rmse if beside and result.controller in T2 else np.nan
+    shown = np.concatenate([values, printed], axis=1)
+    positive = shown[shown > 0.0]
     norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
     widths = (len(columns), 1)
     size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
     beside = bool(np.isfinite(printed).any())
-    made, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
+    fig, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
     ours = axes[0, 0]
-    narrow = (made.get_figwidth() - _BESIDE_CELLS) / len(columns) < _NUMBER  # then colours and bar have to do
+    narrow = (fig.get_figwidth() - _BESIDE_CELLS) / len(columns) < _NUMBER  # then colours and bar have to do
     image = _cells(ours, values, norm, below, numbers=not narrow)
     if beside:
         _cells(axes[0, 1], printed, norm)
@@ -94,10 +94,10 @@ def rmse_map(
     names = columns if narrow else [fill(name, 10) for name in columns]
     ours.set_xticks(range(len(columns)), names, rotation=90.0 if narrow else 0.0)
     title(ours, heading)
-    bar = made.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
+    bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
     bar.minorformatter = PowersOfTen()
     bar.ax.tick_params(labelsize=9.0)
-    return made
+    return fig
 
 
 def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
@@ -106,19 +106,25 @@ def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
     Of repetitions a dot is their median, with its 95 % interval; a row of which something failed is marked x.
     """
     rows, _ = _names(results, "reference")
-    made, ((axes,),) = figure(height=1.6 + 0.24 * len(rows))
-    for at, name in enumerate(rows):
-        own = [result for result in results if _row(results, result) == name]
-        spreads = [spread(result.repeated.metrics["chattering"]) for result in own]
-        values = np.array([each.median for each in spreads])
-        known = values[np.isfinite(values) & (values > 0.0)]
-        failed = any(result.repeated.failed.any() for result in own)
-        shade = colour(own[0].controller)
-        axes.plot(known, np.full(len(known), at), "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8)
-        axes.plot([np.median(known)] * 2 if len(known) else [], [at - 0.3, at + 0.3] if len(known) else [], color=BLACK)
-        for each in spreads:
-            if each.interval is not None:
-                axes.plot(each.interval, [at, at], color=shade, linewidth=1.0)
+    fig, ((axes,),) = figure(height=1.6 + 0.24 * len(rows))
+    for index, name in enumerate(rows):
+        of_row = [result for result in results if _row(results, result) == name]
+        spreads = [spread(result.repeated.metrics["chattering"]) for result in of_row]
+        values = np.array([repeated.median for repeated in spreads])
+        positive = values[np.isfinite(values) & (values > 0.0)]
+        failed = any(result.repeated.failed.any() for result in of_row)
+        shade = colour(of_row[0].controller)
+        axes.plot(
+            positive, np.full(len(positive), index), "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8
+        )
+        axes.plot(
+            [np.median(positive)] * 2 if len(positive) else [],
+            [index - 0.3, index + 0.3] if len(positive) else [],
+            color=BLACK,
+        )
+        for dot in spreads:
+            if dot.interval is not None:
+                axes.plot(dot.interval, [index, index], color=shade, linewidth=1.0)
     logarithmic(axes.xaxis)
     axes.set_yticks(range(len(rows)), rows)
     axes.invert_yaxis()
@@ -129,13 +135,13 @@ def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
         Line2D([], [], linestyle="none", marker="x", color=GREY, label="a reference, row failed somewhere"),
         Line2D([], [], color=BLACK, label="median over references"),
     ]
-    legend_under(made, handles, 3)
-    return made
+    legend_under(fig, handles, 3)
+    return fig
 
 
 def _row(results: Sequence[ComparedRow], result: ComparedRow) -> str:
     """The row's name: controller and gains, and the inverse where several are compared."""
-    several = len({each.inverse for each in results}) > 1
+    several = len({compared.inverse for compared in results}) > 1
     return f"{result.label}, {result.inverse}" if several else result.label
 
 
@@ -147,9 +153,9 @@ def _names(results: Sequence[ComparedRow], across: Across) -> tuple[list[str], l
 
 def _below(result: ComparedRow) -> str:
     """The interval of a repeated row's RMSE, and how many repetitions failed."""
-    found, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
-    ends = "" if found.interval is None else "\n{:.2g} to {:.2g}".format(*found.interval)
-    return ends + (f"\n{failed.sum()} of {found.n} failed" if failed.any() else "")
+    rmse, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
+    ends = "" if rmse.interval is None else "\n{:.2g} to {:.2g}".format(*rmse.interval)
+    return ends + (f"\n{failed.sum()} of {rmse.n} failed" if failed.any() else "")
 
 
 def _cells(
@@ -170,42 +176,42 @@ def _cells(
     return image
 
 
+# Fewest sizes that make a curve.
 _FEWEST = 3
-"""Sizes from which on there is a course to draw."""
 
 
 def series_of_sizes(loops: Mapping[str, Loop]) -> dict[str, dict[str, float]]:
     """Leaves in which at least three loops differ by a number and by nothing else: their sizes by name of the loop."""
     flat = {name: _leaves(loop.model_dump(), "") for name, loop in loops.items()}
-    found: dict[str, dict[str, float]] = {}
-    leaves = dict.fromkeys(leaf for each in flat.values() for leaf in each)
+    series: dict[str, dict[str, float]] = {}
+    leaves = dict.fromkeys(leaf for flat_leaves in flat.values() for leaf in flat_leaves)
     for leaf in leaves:
-        rest: dict[Any, dict[str, float]] = {}
-        for name, each in flat.items():
-            if isinstance(each.get(leaf), int | float) and not isinstance(each[leaf], bool):
-                others = tuple(sorted((key, repr(value)) for key, value in each.items() if key != leaf))
-                rest.setdefault(others, {})[name] = float(each[leaf])
-        longest = max(rest.values(), key=len, default={})
+        alike: dict[Any, dict[str, float]] = {}
+        for name, settings in flat.items():
+            if isinstance(settings.get(leaf), int | float) and not isinstance(settings[leaf], bool):
+                other_leaves = tuple(sorted((key, repr(value)) for key, value in settings.items() if key != leaf))
+                alike.setdefault(other_leaves, {})[name] = float(settings[leaf])
+        longest = max(alike.values(), key=len, default={})
         if len(set(longest.values())) >= _FEWEST:
-            found[leaf] = dict(sorted(longest.items(), key=lambda pair: pair[1]))
-    return found
+            series[leaf] = dict(sorted(longest.items(), key=lambda pair: pair[1]))
+    return series
 
 
 def error_over_disturbance(results: Sequence[ComparedRow], leaf: str, sizes: Mapping[str, float]) -> Figure:
     """RMSE [deg], log, of each row over a leaf of the loop, medians over motions; a line ends where the row fails."""
-    made, ((axes,),) = figure(height=3.6)
-    for label in dict.fromkeys(each.label for each in results):
+    fig, ((axes,),) = figure(height=3.6)
+    for label in dict.fromkeys(result.label for result in results):
         errors = []
         for loop in sizes:
-            own = [each for each in results if each.label == label and each.loop == loop]
-            failed = any(each.repeated.failed.any() for each in own)
-            errors.append(np.nan if failed else np.median([metrics_of(each)["rmse"] for each in own]))
+            of_loop = [result for result in results if result.label == label and result.loop == loop]
+            failed = any(result.repeated.failed.any() for result in of_loop)
+            errors.append(np.nan if failed else np.median([metrics_of(result)["rmse"] for result in of_loop]))
         axes.plot(list(sizes.values()), np.degrees(errors), marker="o", markersize=3.5, label=label, **line(label))
     logarithmic(axes.yaxis)
     axes.set(xlabel=f"{leaf} [{_unit(leaf)}]", ylabel="RMSE [deg]")
     title(axes, f"error over {leaf}")
-    legend_below(made)
-    return made
+    legend_below(fig)
+    return fig
 
 
 def _unit(leaf: str) -> str:
@@ -215,7 +221,7 @@ def _unit(leaf: str) -> str:
 
 def _leaves(node: Mapping[str, Any], begin: str) -> dict[str, Any]:
     """Leaves of nested mappings by their key paths."""
-    found: dict[str, Any] = {}
+    flattened: dict[str, Any] = {}
     for key, value in node.items():
-        found |= _leaves(value, f"{begin}{key}.") if isinstance(value, Mapping) else {f"{begin}{key}": value}
-    return found
+        flattened |= _leaves(value, f"{begin}{key}.") if isinstance(value, Mapping) else {f"{begin}{key}": value}
+    return flattened

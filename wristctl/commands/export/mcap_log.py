@@ -19,8 +19,8 @@ from wristctl.records import Run
 if TYPE_CHECKING:
     import pandas as pd
 
+# Columns that hold the time of a row; the first that a table has counts.
 _TIMES = ("clock", "time", "captured")
-"""Columns that say when a row was, the first of which that is there."""
 _PICTURE = {
     "type": "object",
     "title": "foxglove.CompressedImage",
@@ -33,12 +33,15 @@ _PICTURE = {
 }
 _TYPES = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}
 
+# Tables by name, with unit and meaning of their columns.
 Tables = Mapping[str, tuple["pd.DataFrame", Mapping[str, tuple[str, str]]]]
-"""Each with unit and meaning of its columns."""
 
 
 def write_mcap(run: Run, tables: Tables, about: Mapping[str, Mapping[str, str]], path: Path) -> None:
-    """Write it. Times are those of the run's clock, from 0. Raises UserError where nothing went on in time."""
+    """Write a run as an MCAP log. Times are those of the run's clock, from 0.
+
+    Raises UserError for a run without a table over time.
+    """
     begins = _begins(tables)
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -49,8 +52,8 @@ def write_mcap(run: Run, tables: Tables, about: Mapping[str, Mapping[str, str]],
             if seconds is None:
                 continue
             channel = _channel(writer, f"/{run.kind}/{name}", f"wristctl.{name}", _schema(name, table, columns))
-            for at, (second, row) in enumerate(zip(seconds.tolist(), _rows(table), strict=True)):
-                _add(writer, channel, second, at, row)
+            for index, (second, row) in enumerate(zip(seconds.tolist(), _rows(table), strict=True)):
+                _add(writer, channel, second, index, row)
             written += len(table)
         for name in ("raw", "video"):
             written += _film(writer, run, name, tables)
@@ -62,7 +65,7 @@ def write_mcap(run: Run, tables: Tables, about: Mapping[str, Mapping[str, str]],
 
 
 def _begins(tables: Tables) -> dict[int, float]:
-    """When each trial began on the run's clock."""
+    """Start of each trial on the run's clock [s]."""
     log = tables["log"][0] if "log" in tables else None
     if log is None or not {"trial", "time", "clock"} <= set(log.columns):
         return {}
@@ -71,8 +74,8 @@ def _begins(tables: Tables) -> dict[int, float]:
 
 
 def _seconds(table: pd.DataFrame, begins: Mapping[int, float]) -> Array | None:
-    """When each row was [s]; None of a table that does not go on in time."""
-    name = next((each for each in _TIMES if each in table.columns), None)
+    """Time of each row [s]; None of a table that does not go on in time."""
+    name = next((column for column in _TIMES if column in table.columns), None)
     if name is None or not len(table):
         return None
     seconds: Array = table[name].to_numpy(np.float64)
@@ -86,17 +89,17 @@ def _schema(name: str, table: pd.DataFrame, columns: Mapping[str, tuple[str, str
     for key, values in table.items():
         unit, meaning = columns.get(str(key), ("", ""))
         kind = _TYPES.get(values.to_numpy().dtype.kind, "string")
-        told = f"{meaning} [{unit}]" if unit else meaning
-        properties[str(key)] = {"type": [kind, "null"], "description": told.strip()}
+        description = f"{meaning} [{unit}]" if unit else meaning
+        properties[str(key)] = {"type": [kind, "null"], "description": description.strip()}
     return {"type": "object", "title": name, "properties": properties}
 
 
 def _rows(table: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Each row with null for what is not there."""
+    """Rows of a table by column, with null for a missing value."""
     names, columns = [str(key) for key in table.columns], [table[key].tolist() for key in table.columns]
     for cells in zip(*columns, strict=True):
-        known = (None if isinstance(cell, float) and not math.isfinite(cell) else cell for cell in cells)
-        yield dict(zip(names, known, strict=True))
+        values = (None if isinstance(cell, float) and not math.isfinite(cell) else cell for cell in cells)
+        yield dict(zip(names, values, strict=True))
 
 
 def _film(writer: Writer, run: Run, name: str, tables: Tables) -> int:
@@ -119,11 +122,13 @@ def _film(writer: Writer, run: Run, name: str, tables: Tables) -> int:
 
 
 def _channel(writer: Writer, topic: str, schema: str, content: Mapping[str, Any]) -> int:
-    known = writer.register_schema(name=schema, encoding="jsonschema", data=json.dumps(content).encode())
-    return int(writer.register_channel(topic=topic, message_encoding="json", schema_id=known))
+    schema_id = writer.register_schema(name=schema, encoding="jsonschema", data=json.dumps(content).encode())
+    return int(writer.register_channel(topic=topic, message_encoding="json", schema_id=schema_id))
 
 
 def _add(writer: Writer, channel: int, second: float, number: int, message: Mapping[str, Any]) -> None:
-    at = max(0, round(1e9 * second))  # frames of the moment before a run's clock began
+    nanoseconds = max(0, round(1e9 * second))  # frames of the moment before a run's clock began
     content = json.dumps(message, allow_nan=False).encode()
-    writer.add_message(channel_id=channel, log_time=at, publish_time=at, sequence=number, data=content)
+    writer.add_message(
+        channel_id=channel, log_time=nanoseconds, publish_time=nanoseconds, sequence=number, data=content
+    )

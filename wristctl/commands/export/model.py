@@ -14,8 +14,8 @@ from wristctl.wrist.directions import in_plane
 from wristctl.wrist.hinge_chain import HingeChain, matlab, mjcf
 
 Writer = Callable[[HingeChain, str], str]
+# Programs, each with its file's usual name and what writes it.
 FORMATS: dict[str, tuple[str, Writer]] = {"mujoco": ("wrist.xml", mjcf), "matlab": ("wrist_chain.m", matlab)}
-"""Programs, each with its file's usual name and what writes it."""
 
 
 def wrist_of(run: Run) -> tuple[WristParameters, str]:
@@ -23,8 +23,8 @@ def wrist_of(run: Run) -> tuple[WristParameters, str]:
     from wristctl.identification.unknowns import with_identified
 
     source = run if run.kind == "identify" else None
-    for each in run.manifest.inputs:
-        source = input_run(run, each) if each.role == "from_identified" else source
+    for earlier in run.manifest.inputs:
+        source = input_run(run, earlier) if earlier.role == "from_identified" else source
     if source is None:
         return run.config.wrist, f"the wrist of run {run.id}"
     text = source.file("data/identified.yaml").read_text(encoding="utf-8")

@@ -33,8 +33,8 @@ def arrays_of(run: Run) -> dict[str, dict[str, np.ndarray]]:
 
 def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
     """Unit and meaning of a table's columns, as far as the run says them."""
-    outputs = [each for each in run.manifest.outputs if each.path == f"data/{table}.csv"]
-    return {column.name: (column.unit, column.meaning) for each in outputs for column in each.columns}
+    outputs = [output for output in run.manifest.outputs if output.path == f"data/{table}.csv"]
+    return {column.name: (column.unit, column.meaning) for output in outputs for column in output.columns}
 
 
 def export_run(run: Run, to: str, file: Path | None) -> Path:
@@ -56,19 +56,34 @@ def _mat(run: Run, path: Path) -> None:
     """A struct for each table and each set of arrays, `units` and `meaning` of the columns, `metrics`, `run`."""
     from scipy.io import savemat
 
-    data = {name: {str(key): _column(each) for key, each in table.items()} for name, table in tables_of(run).items()}
+    data = {
+        name: {str(key): _column(column) for key, column in table.items()} for name, table in tables_of(run).items()
+    }
     data |= arrays_of(run)
-    told = {name: columns_of(run, name) for name in data}
-    whole = {
+    columns = {name: columns_of(run, name) for name in data}
+    struct = {
         "data": data,
-        "units": {name: {key: unit for key, (unit, _) in own.items()} for name, own in told.items() if own},
-        "meaning": {name: {key: meaning for key, (_, meaning) in own.items()} for name, own in told.items() if own},
-        "metrics": {name: _number(each["value"]) for name, each in run.metrics.items()},
+        "units": {
+            name: {key: unit for key, (unit, _) in table_columns.items()}
+            for name, table_columns in columns.items()
+            if table_columns
+        },
+        "meaning": {
+            name: {key: meaning for key, (_, meaning) in table_columns.items()}
+            for name, table_columns in columns.items()
+            if table_columns
+        },
+        "metrics": {name: _number(metric["value"]) for name, metric in run.metrics.items()},
         "run": about(run),
     }
     with replacing(path, FILE) as temporary:
         savemat(
-            str(temporary), _named(whole), appendmat=False, long_field_names=True, oned_as="column", do_compression=True
+            str(temporary),
+            _named(struct),
+            appendmat=False,
+            long_field_names=True,
+            oned_as="column",
+            do_compression=True,
         )
 
 
@@ -86,22 +101,22 @@ def _named(content: Any) -> Any:
     """Names that MATLAB has: letters, digits and underscores, 63 at most; of two alike the second ends in _2."""
     if not isinstance(content, Mapping):
         return content
-    found: dict[str, Any] = {}
+    renamed: dict[str, Any] = {}
     for key, value in content.items():
         word = re.sub(r"\W", "_", str(key))
         base = name = (word if word[:1].isalpha() else f"x{word}")[:60]
         number = 1
-        while name in found:
+        while name in renamed:
             name = f"{base}_{(number := number + 1)}"
-        found[name] = _named(value)
-    return found
+        renamed[name] = _named(value)
+    return renamed
 
 
 def about(run: Run) -> dict[str, str]:
-    """Which run it was."""
+    """Id, kind, seed, version and hash of a run."""
     manifest = run.manifest
-    known = {"id": run.id, "kind": run.kind, "seed": str(manifest.seed), "version": manifest.code.version}
-    return known | {"result_sha256": run.result_hash, "started": manifest.timing.started}
+    facts = {"id": run.id, "kind": run.kind, "seed": str(manifest.seed), "version": manifest.code.version}
+    return facts | {"result_sha256": run.result_hash, "started": manifest.timing.started}
 
 
 def _mcap(run: Run, path: Path) -> None:
@@ -110,13 +125,13 @@ def _mcap(run: Run, path: Path) -> None:
     except ImportError:
         raise UserError("MCAP needs the package mcap, which is not installed", "--to mcap", INSTALL) from None
     tables = {name: (table, columns_of(run, name)) for name, table in tables_of(run).items()}
-    metrics = {name: json.dumps(each) for name, each in run.metrics.items()}
+    metrics = {name: json.dumps(metric) for name, metric in run.metrics.items()}
     with replacing(path, FILE) as temporary:
         write_mcap(run, tables, {"run": about(run), "metrics": metrics}, temporary)
 
 
+# File ending and writer of each format.
 FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
     "mat": (".mat", _mat),
     "mcap": (".mcap", _mcap),
 }
-"""How each format's files end, and what writes them."""

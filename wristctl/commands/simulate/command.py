@@ -54,11 +54,11 @@ class Simulated(StudyResult):
     """Metrics of every repetition."""
     failed: bool
     short_of: str = ""
-    """in a line why it does not arrive where it was asked to, and what to try"""
+    """Reason in a line why the loop does not arrive at its reference, with a remedy."""
 
     @property
     def fault(self) -> UserError | None:
-        """That the wrist left its range."""
+        """Error of a wrist that left its range; None where it stayed within."""
         if not self.failed:
             return None
         where = str(self.findings.run.path) if self.findings.run else ""
@@ -75,7 +75,7 @@ class Simulated(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """What became of the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
+        """Verdicts on the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
         return self.repeated.marks
 
     @property
@@ -85,7 +85,7 @@ class Simulated(StudyResult):
 
     @property
     def trajectory(self) -> Trajectory:
-        """Of the first repetition."""
+        """Trajectory of the first repetition."""
         return self.repeated.first.trajectory
 
     def courses(self) -> Mapping[str, Mapping[str, Any]]:
@@ -110,8 +110,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_size(size(study))
 
     times = size(study).rollouts
-    told = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
-    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{told}"
+    truth = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{truth}"
 
 
 def size(study: Study) -> Size:
@@ -148,8 +148,8 @@ def simulate(session: Session) -> Simulated:
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
     course, failed = repeated.first.trajectory, bool(repeated.failed.any())
     warn_if_outside(course.outside)
-    own = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
-    columns = COLUMNS | own
+    segments = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
+    columns = COLUMNS | segments
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
     title = ", ".join(part for part in (course.label, repeated.fate) if part)
@@ -193,8 +193,8 @@ def _short_of(
     arriving = []
     with session.progress("trying the law's other gains"):
         for preset in controller(chosen.controller).presets:
-            other = chosen.model_copy(update={"gains": preset, "repetitions": 1})
-            if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": other}), network).arrives:
+            trial = chosen.model_copy(update={"gains": preset, "repetitions": 1})
+            if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": trial}), network).arrives:
                 arriving.append(preset)
     if arriving:
         return f"{short}; try --gains {' or '.join(arriving)}"
@@ -217,10 +217,10 @@ def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
             findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
             rows.append((name, value, metric.unit, metric.formula))
         else:
-            found = spread(repeated.metrics[name])
+            estimate = spread(repeated.metrics[name])
             meaning = f"{metric.formula}; median"
-            findings.metric(name, found.median, metric.unit, "lower", found.n, found.interval, meaning)
-            rows.append((name, found.median, found.low, found.high, metric.unit, metric.formula))
+            findings.metric(name, estimate.median, metric.unit, "lower", estimate.n, estimate.interval, meaning)
+            rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
     if once:
         return Table(title, ("metric", "value", "unit", "meaning"), rows)
     every = pd.DataFrame({"repetition": range(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics})

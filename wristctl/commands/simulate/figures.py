@@ -36,26 +36,26 @@ def sliding(course: Trajectory, surface: Surface, gains: Mapping[str, float]) ->
     share = np.abs(sigma) / surface.layer(gains)
     outside = np.flatnonzero(share > 1.0)
     reached = int(outside[-1]) + 1 if len(outside) else 0
-    made, ((plane, over_time),) = figure(1, 2, height=3.2)
+    fig, ((plane, over_time),) = figure(1, 2, height=3.2)
     error, speed = np.degrees(course.error), np.degrees(rate)
     span = np.array([error.min(), error.max()]) if np.ptp(error) > 0.0 else np.array([-1.0, 1.0])
     layer = np.degrees(surface.layer(gains) / abs(b))
     plane.fill_between(span, -a / b * span - layer, -a / b * span + layer, color=LIGHT, linewidth=0.0, label="layer")
     plane.plot(span, -a / b * span, color=BLACK, linewidth=1.0, label="surface, without its integral")
     plane.set_ylim(1.1 * min(speed.min(), -_FIRST_RATE), 1.1 * max(speed.max(), _FIRST_RATE))
-    for own, colour, label in (
+    for phase, colour, label in (
         (slice(0, reached + 1), VERMILLION, "reaching"),
         (slice(reached, None), BLUE, "in the layer for good"),
     ):
-        plane.plot(error[own], speed[own], color=colour, linewidth=1.0, label=label)
-        over_time.plot(course.time[own], np.maximum(share[own], 1e-12), color=colour, linewidth=1.0)
+        plane.plot(error[phase], speed[phase], color=colour, linewidth=1.0, label=label)
+        over_time.plot(course.time[phase], np.maximum(share[phase], 1e-12), color=colour, linewidth=1.0)
     over_time.axhline(1.0, color=BLACK, linewidth=0.8)
     logarithmic(over_time.yaxis)
     plane.set(xlabel="error [deg]", ylabel="rate [deg/s]")
     over_time.set(xlabel="time [s]", ylabel="|sigma| over its layer [1]")
     title(plane, course.label)
-    legend_below(made, 2)
-    return made
+    legend_below(fig, 2)
+    return fig
 
 
 _NORMAL_95 = 1.96
@@ -65,7 +65,7 @@ def consistency(course: Trajectory, heading: str = "") -> Figure:
     """The observer's error [deg] in the band that it expects, and its estimate of the load torque [N m], over time."""
     assert course.seen is not None and course.load is not None
     error, band = np.degrees(course.seen - course.theta), _NORMAL_95 * np.degrees(course.expected)
-    made, axes = figure(2, 1, height=4.2, sharex=True)
+    fig, axes = figure(2, 1, height=4.2, sharex=True)
     upper, lower = axes[:, 0]
     upper.axhspan(-band, band, color=GREY, alpha=0.35, linewidth=0.0, label="95 % by what it believes")
     upper.plot(course.time, error, color=VERMILLION, linewidth=1.0, label="observer less true angle")
@@ -77,4 +77,4 @@ def consistency(course: Trajectory, heading: str = "") -> Figure:
     lower.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     lower.set(xlabel="time [s]", ylabel="estimated load [N m]")
     title(lower, heading)
-    return made
+    return fig

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """Check all names, and say what it costs."""
+    """Check all names, and state the number of rollouts."""
     from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
     from wristctl.comparison.world_ranking import noises_of
     from wristctl.control.table import controller
@@ -56,10 +56,10 @@ def plan(study: Study, inputs: Inputs) -> str:
                 if label not in labels:
                     raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
         for name, _, way in ways_to_tune(study):
-            own = name in settings.variants and settings.variants[name].optimiser
+            overridden = name in settings.variants and settings.variants[name].optimiser
             places = {
                 "tune.candidates": f"budgets.{settings.budget}.candidates",
-                "tune.optimiser": f"variants.{name}.optimiser" if own else "optimiser",
+                "tune.optimiser": f"variants.{name}.optimiser" if overridden else "optimiser",
             }
             try:
                 check_optimiser(way)
@@ -72,9 +72,9 @@ def plan(study: Study, inputs: Inputs) -> str:
     for name in families:
         check_family_reach(study, name)
     searches = sum(unit.size for unit in search_units(study).values())
-    each = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
-    judged = each * budget.worlds * len(labels)
-    longest = max(Size([each.loop], each.horizon).steps for each in families.values())
+    per_world = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
+    judged = per_world * budget.worlds * len(labels)
+    longest = max(Size([studied.loop], studied.horizon).steps for studied in families.values())
     with under("study"):
         check_steps((searches + judged) * longest, searches + judged)
     evaluations = budget.candidates * budget.iterations
@@ -108,7 +108,7 @@ def fair_study(session: Session) -> Studied:
         for place, arrays in zip(wanted, tuned.arrays, strict=True)
         if arrays is not None
     }
-    pieces = judge_all(study, {place: found.gains for place, found in searches.items()})
+    pieces = judge_all(study, {place: search.gains for place, search in searches.items()})
     judged = performed(session, "study", "judging", [unit for units in pieces.values() for unit in units], golden)
     poisoned = [*tuned.poisoned, *judged.poisoned]
     return written(session, _whole(pieces, judged.arrays), searches, poisoned)
@@ -117,14 +117,14 @@ def fair_study(session: Session) -> Studied:
 def _whole(
     wanted: Mapping[StudyPlace, Sequence[Unit]], arrays: Sequence[dict[str, np.ndarray] | None]
 ) -> dict[StudyPlace, list[dict[str, np.ndarray]]]:
-    """What was judged whole, in its ranges of worlds."""
-    found, given = {}, iter(arrays)
+    """Judgements of which every range of worlds was computed, by place."""
+    complete, results = {}, iter(arrays)
     for place, units in wanted.items():
-        own = [next(given) for _ in units]
-        known = [each for each in own if each is not None]
-        if len(known) == len(own):
-            found[place] = known
-    return found
+        pieces = [next(results) for _ in units]
+        judged = [piece for piece in pieces if piece is not None]
+        if len(judged) == len(pieces):
+            complete[place] = judged
+    return complete
 
 
 FAIR_STUDY = Procedure(

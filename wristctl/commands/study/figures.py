@@ -31,63 +31,71 @@ _COLOURS = "RdYlBu"
 _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on the wrist [J]"))
 
 
-def medians(found: WorldRanking, metric: str) -> Array:
-    """Of each row over all its rollouts, (R,); nan where there is nothing."""
-    known = (row.measured.metrics[metric] for row in found.rows)
-    return np.array([np.median(each[np.isfinite(each)]) if np.isfinite(each).any() else np.nan for each in known])
+def medians(ranking: WorldRanking, metric: str) -> Array:
+    """Median of a metric over all rollouts of each row, (R,); nan where no rollout has a finite value."""
+    values = (row.measured.metrics[metric] for row in ranking.rows)
+    return np.array(
+        [
+            np.median(row_values[np.isfinite(row_values)]) if np.isfinite(row_values).any() else np.nan
+            for row_values in values
+        ]
+    )
 
 
 def undominated(costs: Array) -> NDArray[np.bool_]:
-    """Which of the rows of costs (R, C) no other row is as cheap as in all and cheaper in one, (R,)."""
+    """Mask (R,) of the rows of `costs` (R, C) on Pareto's front.
+
+    A row is on the front where no other row is at most as dear in all costs and cheaper in one.
+    """
     no_dearer, cheaper = costs[None] <= costs[:, None], costs[None] < costs[:, None]
     beaten = np.any(np.all(no_dearer, axis=2) & np.any(cheaper, axis=2), axis=1)
-    found: NDArray[np.bool_] = ~beaten & np.all(np.isfinite(costs), axis=1)
-    return found
+    front: NDArray[np.bool_] = ~beaten & np.all(np.isfinite(costs), axis=1)
+    return front
 
 
 def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
-    """How many times less than feedforward's each row's RMSE is on each family; with the number of its group.
+    """Feedforward's RMSE over each row's RMSE on each family, with the number of the row's group.
 
     A dash stands for rows that have no place, whatever their error.
     """
-    labels = list(dict.fromkeys(row.label for found in rankings.values() for row in found.rows))
+    labels = list(dict.fromkeys(row.label for family_ranking in rankings.values() for row in family_ranking.rows))
     times, marks = np.full((len(labels), len(rankings)), np.nan), np.full((len(labels), len(rankings)), "", object)
-    for column, found in enumerate(rankings.values()):
-        for at, row in enumerate(found.rows):
+    for column, ranking in enumerate(rankings.values()):
+        for index, row in enumerate(ranking.rows):
             place = labels.index(row.label), column
-            times[place] = found.gains[at].value
-            group = found.standing.group(at)
+            times[place] = ranking.gains[index].value
+            group = ranking.standing.group(index)
             marks[place] = f"{plain(times[place])}  ({group})" if group else f"{plain(times[place])}  -"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
-    made, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
+    fig, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
     undress(axes)
     most = max(2.0, float(np.nanmax(times)))
     drawn = axes.pcolormesh(times[order], cmap=_COLOURS, norm=LogNorm(1.0 / most, most), edgecolors="white")
     dark = drawn.to_rgba(times)[..., :3] @ np.array([0.299, 0.587, 0.114]) < 0.5
-    for y, at in enumerate(order):
+    for y, index in enumerate(order):
         for x in range(len(rankings)):
-            weight, slant = "bold" if "(1)" in marks[at, x] else None, None if "(" in marks[at, x] else "italic"
-            axes.text(x + 0.5, y + 0.5, marks[at, x], ha="center", va="center", fontsize=8.5,
-                      color="white" if dark[at, x] else BLACK, fontweight=weight, fontstyle=slant)  # fmt: skip
+            weight, slant = "bold" if "(1)" in marks[index, x] else None, None if "(" in marks[index, x] else "italic"
+            axes.text(x + 0.5, y + 0.5, marks[index, x], ha="center", va="center", fontsize=8.5,
+                      color="white" if dark[index, x] else BLACK, fontweight=weight, fontstyle=slant)  # fmt: skip
     axes.set_xticks(np.arange(len(rankings)) + 0.5, list(rankings))
-    axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[at] for at in order])
+    axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[line] for line in order])
     axes.invert_yaxis()
     axes.xaxis.tick_top()
     heading = "How many times less error than feedforward; (group of ties); - and slanted: no place"
-    made.suptitle(heading, fontsize=10.0)
-    return made
+    fig.suptitle(heading, fontsize=10.0)
+    return fig
 
 
 def terms_by_rig(values: Sequence[TermValue]) -> Figure:
-    """How many times less error each term makes, with its interval, a panel for each family; grey where 1 is within."""
-    families, terms = (list(dict.fromkeys(getattr(each, name) for each in values)) for name in ("family", "term"))
-    made, axes = figure(1, len(families), height=1.1 + 0.27 * len(terms), sharey=True)
-    for each in values:
-        panel, place, times = axes[0, families.index(each.family)], terms.index(each.term), each.times
-        own = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
+    """RMSE without each term over RMSE with it, with its interval, a panel for each family; grey where 1 is within."""
+    families, terms = (list(dict.fromkeys(getattr(value, name) for value in values)) for name in ("family", "term"))
+    fig, axes = figure(1, len(families), height=1.1 + 0.27 * len(terms), sharey=True)
+    for term_value in values:
+        panel, place, times = axes[0, families.index(term_value.family)], terms.index(term_value.term), term_value.times
+        shade = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
         if np.isfinite(times.high):
-            panel.plot([times.low, times.high], [place, place], color=own, linewidth=3.0)
-        panel.plot(times.value, place, "o", color=own, markeredgecolor=BLACK, markersize=5.0)
+            panel.plot([times.low, times.high], [place, place], color=shade, linewidth=3.0)
+        panel.plot(times.value, place, "o", color=shade, markeredgecolor=BLACK, markersize=5.0)
     for panel, family in zip(axes[0], families, strict=True):
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
         logarithmic(panel.xaxis)
@@ -101,35 +109,35 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
         title(panel, family)
     axes[0, 0].set_yticks(range(len(terms)), terms)
     axes[0, 0].invert_yaxis()
-    made.supxlabel("times less RMSE, with 95 % interval; grey: cannot be told", fontsize=10.0)
-    return made
+    fig.supxlabel("times less RMSE, with 95 % interval; grey: cannot be told", fontsize=10.0)
+    return fig
 
 
-def pareto(found: WorldRanking) -> Figure:
-    """RMSE beside what it costs in tension and in work: a line joins the rows that no other beats in both.
+def pareto(ranking: WorldRanking) -> Figure:
+    """RMSE over variation of tension and over work: a line joins the rows that no other beats in both.
 
     Rows that fail, swing or chatter too often, hollow, are left out where they lie far off.
     """
-    made, ((left, right),) = figure(1, 2, height=4.6, sharey=True)
-    rmse = np.degrees([each.value for each in found.means])
+    fig, ((left, right),) = figure(1, 2, height=4.6, sharey=True)
+    rmse = np.degrees([mean.value for mean in ranking.means])
     for axes, (metric, label) in zip((left, right), _AXES, strict=True):
-        _front(axes, medians(found, metric), rmse, found)
+        _front(axes, medians(ranking, metric), rmse, ranking)
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
-    made.suptitle(f"{found.name}: error and its price; hollow rows fail, swing or chatter", fontsize=10.0)
-    legend_below(made, 4)
-    return made
+    fig.suptitle(f"{ranking.name}: error and its price; hollow rows fail, swing or chatter", fontsize=10.0)
+    legend_below(fig, 4)
+    return fig
 
 
-def _front(axes: Axes, cost: Array, rmse: Array, found: WorldRanking) -> None:
-    sound = np.array([found.standing.group(at) is not None for at in range(len(rmse))])
+def _front(axes: Axes, cost: Array, rmse: Array, ranking: WorldRanking) -> None:
+    sound = np.array([ranking.standing.group(row) is not None for row in range(len(rmse))])
     best = np.flatnonzero(sound)[undominated(np.column_stack([cost, rmse])[sound])]
     best = best[np.argsort(cost[best])]
     axes.plot(cost[best], rmse[best], color=GREY, linewidth=1.0, zorder=1)
-    for at in found.standing.order:
-        own = colour(found.rows[at].label.split("/")[0])
-        axes.plot(cost[at], rmse[at], "o", color=own, markersize=6.0, markerfacecolor=own if sound[at] else "none",
-                  linestyle="none", label=found.rows[at].label)  # fmt: skip
+    for index in ranking.standing.order:
+        shade = colour(ranking.rows[index].label.split("/")[0])
+        axes.plot(cost[index], rmse[index], "o", color=shade, markersize=6.0, linestyle="none",
+                  markerfacecolor=shade if sound[index] else "none", label=ranking.rows[index].label)  # fmt: skip
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
     axes.tick_params(axis="x", which="both", labelrotation=45)  # within a decade powers of ten stand close
@@ -138,23 +146,23 @@ def _front(axes: Axes, cost: Array, rmse: Array, found: WorldRanking) -> None:
         axes.set_ylim(rmse[sound].min() / 1.3, rmse[sound].max() * 1.3)
 
 
-def world_map(found: WorldRanking) -> Figure:
-    """Each row's RMSE over the best row's in each world, sorted by that best; crosses fail, dots swing."""
-    scores = np.array([row.rmse for row in found.rows])
+def world_map(ranking: WorldRanking) -> Figure:
+    """RMSE of each row over the best row's in each world; worlds sorted by the best. Crosses fail, dots swing."""
+    scores = np.array([row.rmse for row in ranking.rows])
     best = np.where(np.isfinite(scores), scores, np.inf).min(axis=0)
-    worlds, rows = np.argsort(best, kind="stable"), np.array(found.standing.order)
-    made, ((axes,),) = figure(height=1.3 + 0.22 * len(rows))
+    worlds, rows = np.argsort(best, kind="stable"), np.array(ranking.standing.order)
+    fig, ((axes,),) = figure(height=1.3 + 0.22 * len(rows))
     undress(axes)
     ratios = (scores / best)[np.ix_(rows, worlds)]
     shown = np.where(np.isfinite(ratios), ratios, np.nan)
     drawn = axes.pcolormesh(shown, cmap="viridis_r", norm=LogNorm(1.0, 10.0), rasterized=True)
     failed = np.argwhere(~np.isfinite(ratios))
-    swings = np.argwhere(np.array([row.swings for row in found.rows])[np.ix_(rows, worlds)] & np.isfinite(ratios))
+    swings = np.argwhere(np.array([row.swings for row in ranking.rows])[np.ix_(rows, worlds)] & np.isfinite(ratios))
     for places, mark in ((failed, "x"), (swings, ".")):
         axes.plot(places[:, 1] + 0.5, places[:, 0] + 0.5, mark, color=VERMILLION, markersize=2.5, linestyle="none")
-    axes.set_yticks(np.arange(len(rows)) + 0.5, [found.rows[at].label for at in rows])
+    axes.set_yticks(np.arange(len(rows)) + 0.5, [ranking.rows[index].label for index in rows])
     axes.invert_yaxis()
-    axes.set_xlabel(f"{found.worlds} worlds, the easiest first")
-    made.colorbar(drawn, ax=axes, label="RMSE over the best row's there", extend="max")
-    title(axes, f"{found.name}: world by world; x fails, a dot swings")
-    return made
+    axes.set_xlabel(f"{ranking.worlds} worlds, the easiest first")
+    fig.colorbar(drawn, ax=axes, label="RMSE over the best row's there", extend="max")
+    title(axes, f"{ranking.name}: world by world; x fails, a dot swings")
+    return fig

@@ -1,4 +1,4 @@
-"""What a study of all laws leaves: the answer first, then rankings, terms and prices, as tables and figures."""
+"""Files of a study of all laws: the answer first, then rankings, terms and costs, as tables and figures."""
 
 from __future__ import annotations
 
@@ -25,57 +25,73 @@ Pieces = Mapping[StudyPlace, Sequence[Mapping[str, "np.ndarray"]]]
 
 
 def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search], poisoned: list[Poisoned]) -> Studied:
-    """Rank what was judged, and write all of it down."""
+    """Rank the judged rows, and write rankings, tables and figures.
+
+    Parameters
+    ----------
+    session
+        Session of the study.
+    judged
+        Metrics of each judged row, in ranges of worlds.
+    searches
+        Search behind each row with tuned gains.
+    poisoned
+        Units that failed on every worker.
+    """
     from wristctl.comparison.paired_worlds import term_values
 
     study = session.study
     with session.progress("ranking"):
         rankings = _rankings(study, judged)
-        terms = [value for found in rankings.values() for value in term_values(found, study.study.terms)]
+        terms = [value for ranking in rankings.values() for value in term_values(ranking, study.study.terms)]
         shifts = _shifts(study, judged)
-    said = answer(rankings, terms, shifts, study.study.varied or families_of(study)[0])
+    sentences = answer(rankings, terms, shifts, study.study.varied or families_of(study)[0])
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
     times = _step_times(session, searches)
     with session.progress("drawing"):
         _draw(session, rankings, terms)
     shown = [Table("Which law for which rig", *_best(rankings))]
-    shown += [_ranking_table(found, times) for found in rankings.values()]
+    shown += [_ranking_table(ranking, times) for ranking in rankings.values()]
     if poisoned:
-        rows = [(each.unit.name, each.why) for each in poisoned]
+        rows = [(lost.unit.name, lost.why) for lost in poisoned]
         shown.append(Table("Given up, and left out", ("unit of work", "why"), rows))
-    return Studied(study, session.findings, shown, said, rankings, searches, terms, shifts, poisoned)
+    return Studied(study, session.findings, shown, sentences, rankings, searches, terms, shifts, poisoned)
 
 
 def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
-    """By their names: a family's, and `family, steps` of those of its motions where it has others."""
+    """Rankings by name: that of the family, and `family, steps` for its steps where it has other motions."""
     from wristctl.comparison.world_ranking import kinds_of, ranking, row_of
     from wristctl.tuning.objective import YARDSTICK
 
-    found = {}
+    rankings = {}
     for family in families_of(study):
-        own = {place: each for place, each in judged.items() if (place.variant, place.family) == (BASE, family)}
-        laws = [place.law for place in own]
+        of_family = {
+            place: pieces for place, pieces in judged.items() if (place.variant, place.family) == (BASE, family)
+        }
+        laws = [place.law for place in of_family]
         if YARDSTICK not in laws:
             continue
         family_of = study.families[family]
         for steps, motions in kinds_of(family_of).items():
-            rows = [row_of(place.label, pieces, study.wrist.tension_range, motions) for place, pieces in own.items()]
+            rows = [
+                row_of(place.label, pieces, study.wrist.tension_range, motions) for place, pieces in of_family.items()
+            ]
             one = ranking(family, family_of, rows, laws.index(YARDSTICK), study.study.tolerated, steps)
-            found[one.name] = one
-    return found
+            rankings[one.name] = one
+    return rankings
 
 
 def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
-    """On the smooth motions of each variant's family, where it has any."""
+    """Shift of the order by each variant, on the smooth motions of its family where it has any."""
     from wristctl.comparison.paired_worlds import order_shift
     from wristctl.comparison.world_ranking import kinds_of, row_of
 
-    found, width = [], study.wrist.tension_range
+    shifts, width = [], study.wrist.tension_range
     for variant, way in study.study.variants.items():
-        after = {place: each for place, each in judged.items() if place.variant == variant}
+        after = {place: pieces for place, pieces in judged.items() if place.variant == variant}
         before = {place: judged.get(place._replace(variant=way.beside or BASE)) for place in after}
-        pairs = [(place, known, after[place]) for place, known in before.items() if known is not None]
+        pairs = [(place, earlier, after[place]) for place, earlier in before.items() if earlier is not None]
         rows = [
             [
                 row_of(place.label, pieces, width, next(iter(kinds_of(study.families[place.family]).values())), 1)
@@ -85,8 +101,8 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
         ]
         if pairs:
             name = f"{variant} beside {way.beside}" if way.beside else variant
-            found.append(order_shift(name, *rows))
-    return found
+            shifts.append(order_shift(name, *rows))
+    return shifts
 
 
 def _note_streams(session: Session) -> None:
@@ -116,50 +132,50 @@ def _tables(
     findings = session.findings
     units = {name: METRICS[name].unit or "1" for name in RANKED}
     units |= dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
-    for name, found in rankings.items():
+    for name, ranking in rankings.items():
         slug = _slug(name)
-        findings.table(f"data/ranking-{slug}.csv", ranking_frame(found), units=units)
-        worlds = {"world": range(found.worlds)} | {row.label: row.rmse for row in found.rows}
-        meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in found.rows}
+        findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
+        worlds = {"world": range(ranking.worlds)} | {row.label: row.rmse for row in ranking.rows}
+        meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in ranking.rows}
         findings.table(f"data/worlds-{slug}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
-        for at, row in enumerate(found.rows):
-            mean = found.means[at]
+        for index, row in enumerate(ranking.rows):
+            mean = ranking.means[index]
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", found.worlds, interval)
+            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.worlds, interval)
     for family in families_of(session.study):
         if file := findings.file(f"data/gains-{family}.json"):
-            own = {
-                place.law: each.gains
-                for place, each in searches.items()
+            gains = {
+                place.law: search.gains
+                for place, search in searches.items()
                 if (place.variant, place.family) == (BASE, family)
             }
-            write_gains(file, own)
+            write_gains(file, gains)
     flat = [
-        {"term": each.term, "family": each.family, "without": each.without, "with": each.given,
-         "times": each.times.value, "low": each.times.low, "high": each.times.high,
-         "lost_without": each.swings[0], "lost_with": each.swings[1]}
-        for each in terms
+        {"term": value.term, "family": value.family, "without": value.without, "with": value.given,
+         "times": value.times.value, "low": value.times.low, "high": value.times.high,
+         "lost_without": value.swings[0], "lost_with": value.swings[1]}
+        for value in terms
     ]  # fmt: skip
     if flat:
         findings.table("data/terms.csv", pd.DataFrame(flat), dict.fromkeys(flat[0], "1"))
     if shifts:
-        frame = pd.DataFrame([each._asdict() | {"best": " -> ".join(each.best)} for each in shifts])
+        frame = pd.DataFrame([shift._asdict() | {"best": " -> ".join(shift.best)} for shift in shifts])
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
 
 
 def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
-    """What a control tick of each law costs here; gains make no difference to it."""
+    """Time of a control tick of each law on this machine; gains make no difference to it."""
     from wristctl.comparison.step_cost import step_time
     from wristctl.control.table import controller
     from wristctl.tuning.objective import YARDSTICK
 
     times = {YARDSTICK: step_time(controller(YARDSTICK), (), session.study.wrist)}
     with session.progress("timing the control step"):
-        for place, found in searches.items():
+        for place, search in searches.items():
             if place.law not in times:
                 law = controller(place.law)
-                times[place.law] = step_time(law, law.values(found.gains), session.study.wrist)
-    session.findings.plain("timing.json", {name: each._asdict() for name, each in times.items()})
+                times[place.law] = step_time(law, law.values(search.gains), session.study.wrist)
+    session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
     return times
 
 
@@ -173,15 +189,15 @@ def _draw(session: Session, rankings: Mapping[str, WorldRanking], terms: Sequenc
         findings.overview.figure = "laws"
     if terms:
         findings.figure("terms", terms_by_rig, terms)
-    for name, found in rankings.items():
-        findings.figure(f"ranking-{_slug(name)}", ranking_intervals, found)
-        findings.figure(f"profiles-{_slug(name)}", world_profiles, found)
-        findings.figure(f"pareto-{_slug(name)}", pareto, found)
-        findings.figure(f"worlds-{_slug(name)}", world_map, found)
+    for name, ranking in rankings.items():
+        findings.figure(f"ranking-{_slug(name)}", ranking_intervals, ranking)
+        findings.figure(f"profiles-{_slug(name)}", world_profiles, ranking)
+        findings.figure(f"pareto-{_slug(name)}", pareto, ranking)
+        findings.figure(f"worlds-{_slug(name)}", world_map, ranking)
 
 
 def _slug(name: str) -> str:
-    """A ranking's name as a file's."""
+    """Name of a file made from a ranking's name."""
     return name.replace(", ", "-")
 
 
@@ -198,38 +214,40 @@ def _best(rankings: Mapping[str, WorldRanking]) -> tuple[tuple[str, ...], list[t
         "cannot be told [%]",
     )
     rows: list[tuple[object, ...]] = []
-    for family, found in rankings.items():
-        floor = 100.0 * (found.standing.floor - 1.0)
-        for at in found.standing.groups[0] if found.standing.groups else []:
-            mean, gain = found.means[at], found.gains[at]
-            ends = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
-            rows.append((family, found.rows[at].label, *ends, gain.value, f"{gain.low:.3g} to {gain.high:.3g}", floor))
+    for family, ranking in rankings.items():
+        floor = 100.0 * (ranking.standing.floor - 1.0)
+        for index in ranking.standing.groups[0] if ranking.standing.groups else []:
+            mean, gain = ranking.means[index], ranking.gains[index]
+            ends = tuple(math.degrees(end) for end in (mean.value, mean.low, mean.high))
+            rows.append(
+                (family, ranking.rows[index].label, *ends, gain.value, f"{gain.low:.3g} to {gain.high:.3g}", floor)
+            )
     return heads, rows
 
 
-def _ranking_table(found: WorldRanking, times: Mapping[str, StepTime]) -> Table:
+def _ranking_table(ranking: WorldRanking, times: Mapping[str, StepTime]) -> Table:
     import numpy as np
 
     from wristctl.commands.study.figures import medians, undominated
 
-    energy, chattering = medians(found, "energy"), medians(found, "chattering")
-    rmse = np.array([each.value for each in found.means])
+    energy, chattering = medians(ranking, "energy"), medians(ranking, "chattering")
+    rmse = np.array([estimate.value for estimate in ranking.means])
     front = undominated(np.column_stack([rmse, chattering, energy]))
     rows = []
-    for at in found.standing.order:
-        mean, gain, group = found.means[at], found.gains[at], found.standing.group(at)
-        failures, swings = found.standing.failures[at], found.standing.swings[at]
-        lost = [f"{100 * each.value:.3g} % (< {100 * each.high:.2g})" for each in (failures, swings)]
-        tick = times.get(found.rows[at].label.split("/")[0])
-        ends = tuple(math.degrees(each) for each in (mean.value, mean.low, mean.high))
+    for index in ranking.standing.order:
+        mean, gain, group = ranking.means[index], ranking.gains[index], ranking.standing.group(index)
+        failures, swings = ranking.standing.failures[index], ranking.standing.swings[index]
+        lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
+        tick = times.get(ranking.rows[index].label.split("/")[0])
+        ends = tuple(math.degrees(end) for end in (mean.value, mean.low, mean.high))
         rows.append((
-            "-" if group is None else str(group), found.rows[at].label, *ends,
-            gain.value, f"{gain.low:.3g} to {gain.high:.3g}", *lost, chattering[at], energy[at],
-            tick.median if tick else None, "yes" if front[at] and group else "",
+            "-" if group is None else str(group), ranking.rows[index].label, *ends,
+            gain.value, f"{gain.low:.3g} to {gain.high:.3g}", *lost, chattering[index], energy[index],
+            tick.median if tick else None, "yes" if front[index] and group else "",
         ))  # fmt: skip
     heads = (
         "group", "row", "RMSE [deg]", "95 % low", "high", "times less", "95 %", "fails", "swings", "tension [N/s]",
         "work [J]", "tick [us]", "undominated",
     )  # fmt: skip
-    title = f"{found.name}: {found.worlds} held-out worlds, {found.motions} motions each"
+    title = f"{ranking.name}: {ranking.worlds} held-out worlds, {ranking.motions} motions each"
     return Table(title, heads, rows)

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from wristctl.work.worker import Golden, Unit
 
 
+# Name of the study's own way to tune, among its variants.
 BASE = ""
-"""The study's own way to tune, among its variants."""
 
 
 class StudyPlace(NamedTuple):
-    """What a search or a judgement is of."""
+    """Variant, family, row and law of a search or a judgement."""
 
     variant: str
     family: str
@@ -62,12 +62,12 @@ def search_units(study: Study) -> dict[StudyPlace, Unit]:
     """A search for every law on every family, and for every variant on one."""
     from wristctl.tuning.search import search_unit
 
-    found = dict[StudyPlace, "Unit"]()
+    units = dict[StudyPlace, "Unit"]()
     for name, family, settings in ways_to_tune(study):
         tuned = study.model_copy(update={"tune": settings})
         for law in study.study.laws:
-            found[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
-    return found
+            units[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
+    return units
 
 
 def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> dict[StudyPlace, list[Unit]]:
@@ -76,7 +76,7 @@ def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> 
     from wristctl.control.table import controller, gains_of
     from wristctl.tuning.objective import YARDSTICK
 
-    budget, found = budget_of(study.study), dict[StudyPlace, list["Unit"]]()
+    budget, units = budget_of(study.study), dict[StudyPlace, list["Unit"]]()
     chosen: dict[StudyPlace, Mapping[str, float]] = dict(gains)
     for family in families_of(study):
         for row in study.study.presets:
@@ -87,8 +87,8 @@ def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> 
         chosen.setdefault(StudyPlace(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
     for place, values in chosen.items():
         noises = budget.noises if place.variant == BASE else 1
-        found[place] = judge_units(study, place.family, place.law, values, budget.worlds, noises)
-    return found
+        units[place] = judge_units(study, place.family, place.law, values, budget.worlds, noises)
+    return units
 
 
 def golden_of(study: Study) -> Golden:
@@ -98,13 +98,13 @@ def golden_of(study: Study) -> Golden:
     from wristctl.work.worker import Golden
 
     settings = study.study
-    laws = dict.fromkeys([YARDSTICK, *settings.laws, *(each.controller for each in settings.presets)])
+    laws = dict.fromkeys([YARDSTICK, *settings.laws, *(row.controller for row in settings.presets)])
     loops = kinds_of_worlds(study.families, families_of(study), study.seed)
     return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
 
 
 def _tune_settings(study: Study, family: str, variant: StudyVariant) -> TuneSettings:
-    """Of a search on a family: the study's own, but for what the variant says."""
+    """Settings of a search on a family: the study's, changed by the variant."""
     settings, budget = study.study, budget_of(study.study)
     return TuneSettings(
         optimiser=variant.optimiser or settings.optimiser,
@@ -123,24 +123,24 @@ class Studied(StudyResult):
     kind = "study"
 
     answer: list[str]
-    """Which law for which rig, what each term buys, and how far the order can be relied on: lines of 100 columns."""
+    """Law for each rig, gain of each term, and reliability of the order: lines of 100 columns."""
     rankings: dict[str, WorldRanking]
-    """By family."""
+    """Rankings by family."""
     searches: dict[StudyPlace, Search]
     terms: list[TermValue]
     shifts: list[OrderShift]
     poisoned: list[Poisoned]
-    """Units that failed wherever they were tried: their rows are left out."""
+    """Units that failed on every worker: their rows are left out."""
 
     @property
     def fault(self) -> UserError | None:
-        """That units were given up."""
+        """Error that names the units given up; None where all were computed."""
         if not self.poisoned:
             return None
         first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
-        others = f" and {len(self.poisoned) - 1} more" if len(self.poisoned) > 1 else ""
-        what = f"{first.unit.name}{others} failed wherever tried, and is left out: {first.why}"
-        return UserError(what, where, "mend it and resume: what is done is kept", exit_code=3)
+        more = f" and {len(self.poisoned) - 1} more" if len(self.poisoned) > 1 else ""
+        reason = f"{first.unit.name}{more} failed wherever tried, and is left out: {first.why}"
+        return UserError(reason, where, "mend it and resume: what is done is kept", exit_code=3)
 
     def frame(self) -> pd.DataFrame:
         """A row per family and row of its ranking, best first; angles in rad."""
@@ -148,5 +148,5 @@ class Studied(StudyResult):
 
         from wristctl.comparison.world_ranking import ranking_frame
 
-        tables = {name: ranking_frame(found) for name, found in self.rankings.items()}
+        tables = {name: ranking_frame(ranking) for name, ranking in self.rankings.items()}
         return pd.concat(tables, names=["family"]).reset_index("family").reset_index(drop=True)

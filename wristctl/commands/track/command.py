@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Skew from which the user is warned [deg]; noise of the corners alone is below 0.1.
 _ASKEW = 0.3
-"""Warn from here on [deg]; noise of the corners alone is below 0.1."""
 _CORNERS = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
 _UNITS = {"time": "s", "theta": "rad", "tip_x": "m", "tip_y": "m"} | dict.fromkeys(_CORNERS, "px")
 _MEANING = {
@@ -44,7 +44,7 @@ _MEANING = {
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tracked(StudyResult):
-    """What each frame of a recording tells."""
+    """Sightings of the wrist's markers in each frame of a recording."""
 
     kind = "track"
 
@@ -56,7 +56,7 @@ class Tracked(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """See that the recording can be read, and what it is."""
+    """Check that the recording can be read, and describe it."""
     from wristctl.vision.camera import open_recording
 
     if study.track.video is None:
@@ -93,16 +93,16 @@ def track(session: Session) -> Tracked:
     with session.progress("drawing"):
         findings.figure("angle", angle, sightings)
         findings.figure("frames", frames, pictures)
-    counts = Counter(each.verdict for each in sightings)
+    counts = Counter(sighting.verdict for sighting in sightings)
     usable, total = counts[SightingVerdict.OK], len(sightings)
     findings.metric("usable", usable / total, "", "higher", total, meaning="share of frames with an angle")
-    thetas = [math.degrees(each.theta) for each in sightings if each.verdict is SightingVerdict.OK]
+    thetas = [math.degrees(sighting.theta) for sighting in sightings if sighting.verdict is SightingVerdict.OK]
     if not thetas:
         verdict = counts.most_common(1)[0][0]
-        what = f"no frame can be used: {verdict} in {counts[verdict]} of {total}: {MEANING[verdict]}"
+        reason = f"no frame can be used: {verdict} in {counts[verdict]} of {total}: {MEANING[verdict]}"
         fix = "see figures/frames.png; are both markers (4x4_50, ids track.markers) uncovered and 40 px or larger?"
-        raise UserError(what, source, fix, exit_code=3)
-    noise = angle_noise(np.degrees([each.theta for each in sightings]))
+        raise UserError(reason, source, fix, exit_code=3)
+    noise = angle_noise(np.degrees([sighting.theta for sighting in sightings]))
     findings.metric("theta_min", min(thetas), "deg", n=usable, meaning="least angle")
     findings.metric("theta_max", max(thetas), "deg", n=usable, meaning="greatest angle")
     findings.metric("noise", noise, "deg", "lower", usable, meaning="deviation from steady motion")
@@ -129,7 +129,7 @@ def track(session: Session) -> Tracked:
 
 
 def _see(session: Session, view: View) -> tuple[list[Sighting], list[NDArray[np.uint8]]]:
-    """What each frame tells, and annotated pictures of some."""
+    """Sightings in each frame of the recording, and annotated pictures of some frames."""
     from wristctl.vision.camera import open_recording
     from wristctl.vision.marker import SightingVerdict, Tracker
     from wristctl.vision.recordings import AnnotatedVideo, Picked
@@ -141,16 +141,16 @@ def _see(session: Session, view: View) -> tuple[list[Sighting], list[NDArray[np.
     film = AnnotatedVideo(video, recording.frame_rate) if video else None
     sightings, picked, zero = [], Picked(), settings.zero == "first"
     try:
-        with session.progress("frames") as done:
+        with session.progress("frames") as report:
             for frame in recording:
-                seen = tracker.see(frame)
-                if zero and seen.verdict is SightingVerdict.OK:
-                    tracker.zero, zero, seen = seen.theta, False, seen._replace(theta=0.0)
-                sightings.append(seen)
-                picked.offer(frame, seen)
+                sighting = tracker.see(frame)
+                if zero and sighting.verdict is SightingVerdict.OK:
+                    tracker.zero, zero, sighting = sighting.theta, False, sighting._replace(theta=0.0)
+                sightings.append(sighting)
+                picked.offer(frame, sighting)
                 if film is not None:
-                    film.add(frame, seen)
-                done(len(sightings))
+                    film.add(frame, sighting)
+                report(len(sightings))
     finally:
         recording.close()
         if film is not None:
@@ -162,12 +162,13 @@ def _frame(sightings: Sequence[Sighting]) -> pd.DataFrame:
     import numpy as np
     import pandas as pd
 
-    known = {
-        name: [getattr(each, name) for each in sightings] for name in ("time", "number", "theta", "tip_x", "tip_y")
+    fields = {
+        name: [getattr(sighting, name) for sighting in sightings]
+        for name in ("time", "number", "theta", "tip_x", "tip_y")
     }
-    verdicts = {"verdict": [str(each.verdict) for each in sightings]}
-    corners = np.array([each.corners.ravel() for each in sightings]).T
-    return pd.DataFrame(known | verdicts | dict(zip(_CORNERS, corners, strict=True)))
+    verdicts = {"verdict": [str(sighting.verdict) for sighting in sightings]}
+    corners = np.array([sighting.corners.ravel() for sighting in sightings]).T
+    return pd.DataFrame(fields | verdicts | dict(zip(_CORNERS, corners, strict=True)))
 
 
 def _digest(source: Path) -> str:

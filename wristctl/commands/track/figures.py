@@ -24,31 +24,34 @@ from wristctl.plotting.style import (
 )
 from wristctl.vision.marker import Sighting, SightingVerdict
 
+# Pixels across a frame in a figure.
 _WIDE = 480
-"""Pixels across a frame in a figure."""
 _REFUSAL_COLOURS = VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK, OLIVE, ROSE
 _COLOURS = dict(zip(list(SightingVerdict)[1:], _REFUSAL_COLOURS, strict=True))
 
 
 def angle(sightings: Sequence[Sighting]) -> Figure:
     """Bending angle [deg] over time [s]; below it the frames that could not be used, by why."""
-    refused = [verdict for verdict in _COLOURS if any(each.verdict is verdict for each in sightings)]
+    refused = [verdict for verdict in _COLOURS if any(sighting.verdict is verdict for sighting in sightings)]
     below_it = 0.2 * len(refused)
-    made, axes = figure(2, 1, height=3.6 + below_it, sharex=True, height_ratios=(3.2, 0.2 + below_it))
+    fig, axes = figure(2, 1, height=3.6 + below_it, sharex=True, height_ratios=(3.2, 0.2 + below_it))
     above, below = axes[:, 0]
-    time, theta = np.array([each.time for each in sightings]), np.degrees([each.theta for each in sightings])
+    time, theta = (
+        np.array([sighting.time for sighting in sightings]),
+        np.degrees([sighting.theta for sighting in sightings]),
+    )
     above.plot(time, theta, color=BLUE, linewidth=1.0, marker=".", markersize=2.5)
     above.set_ylabel("bending angle [deg]")
     for row, verdict in enumerate(refused):
-        at = [each.time for each in sightings if each.verdict is verdict]
-        below.plot(at, np.full(len(at), row), linestyle="", marker="|", markersize=7.0, color=_COLOURS[verdict])
-    below.set_yticks(range(len(refused)), [str(each) for each in refused])
+        times = [sighting.time for sighting in sightings if sighting.verdict is verdict]
+        below.plot(times, np.full(len(times), row), linestyle="", marker="|", markersize=7.0, color=_COLOURS[verdict])
+    below.set_yticks(range(len(refused)), [str(refusal) for refusal in refused])
     below.set(xlabel="time [s]", ylim=(len(refused) - 0.4, -0.6))
     below.grid(False, axis="y")
     if not refused:
         below.set_yticks([])
         below.text(0.0, 0.5, "every frame was used", transform=below.transAxes, va="center", fontsize=9.0, color=GREY)
-    return made
+    return fig
 
 
 def frames(pictures: Sequence[NDArray[np.uint8]]) -> Figure:
@@ -56,12 +59,12 @@ def frames(pictures: Sequence[NDArray[np.uint8]]) -> Figure:
     cols = min(3, len(pictures))
     rows = -(-len(pictures) // cols)
     tall = pictures[0].shape[0] / pictures[0].shape[1]
-    made, _ = figure(rows, cols, width=9.0, height=rows * 9.0 / cols * tall)
-    for place, picture in zip_longest(made.axes, pictures):
+    fig, _ = figure(rows, cols, width=9.0, height=rows * 9.0 / cols * tall)
+    for place, picture in zip_longest(fig.axes, pictures):
         undress(place)
         place.set(xticks=[], yticks=[])
         if picture is not None:
             smaller = _WIDE / picture.shape[1]
             shown = cv2.resize(picture, None, fx=smaller, fy=smaller, interpolation=cv2.INTER_AREA)
             place.imshow(shown[..., ::-1])
-    return made
+    return fig
