@@ -69,7 +69,7 @@ def overheads() -> dict[str, float]:
 def _overhead(workers: Workers, units: list[Unit]) -> float:
     ends: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
-        perform_units(units, workers, None, Path(folder), told=lambda *_: ends.append(time.perf_counter()))
+        perform_units(units, workers, None, Path(folder), report=lambda *_: ends.append(time.perf_counter()))
     return (ends[-1] - ends[0]) / (len(ends) - 1) - TAKES
 
 

@@ -96,7 +96,7 @@ def test_a_worker_killed_and_a_unit_poisoned_leave_the_bytes_of_all_others_as_th
         if len(ended) == 4:
             two.workers[0].send_signal(signal.SIGKILL)
 
-    done = perform_units(units, Workers.of(two.named), golden(), far, told=told)
+    done = perform_units(units, Workers.of(two.named), golden(), far, report=told)
     beside = perform_units(walks(24, takes=0.2), Workers.of("processes:2"), golden(), here)
     assert [each.unit.name for each in done.poisoned] == ["the fail"]
     assert len(ended) == 24 and contents(far) == contents(here) and len(contents(here)) == 24
@@ -126,7 +126,7 @@ def test_a_cluster_that_vanishes_is_named_and_what_was_done_is_kept(tmp_path: Pa
             for each in [made.scheduler, *made.workers]:
                 each.kill()
 
-        perform_units(walks(30, takes=0.2), Workers.of(made.named), golden(), kept, told=told)
+        perform_units(walks(30, takes=0.2), Workers.of(made.named), golden(), kept, report=told)
     assert raised.value.exit_code == 3 and contents(kept)
     done = perform_units(walks(30), Workers.of("serial"), folder=kept)
     assert _whole(done)

@@ -51,7 +51,7 @@ def test_what_is_there_is_copied_and_not_computed_again_but_for_one_to_check(tmp
     def told(unit: Unit, done: Computed | None) -> None:
         computed.append(unit.name if done else "")
 
-    again = perform_units(walks(), Workers.of("serial"), folder=new, earlier=old, told=told)
+    again = perform_units(walks(), Workers.of("serial"), folder=new, earlier=old, report=told)
     assert again.tried_again is not None and len(again.taken_over) == 4 and again.found == 0
     assert {each for each in computed if each} == {"walk 2", again.tried_again.name}
     assert computed.index(again.tried_again.name) < computed.index("walk 2"), "before anything is spent"

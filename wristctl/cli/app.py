@@ -22,12 +22,12 @@ from wristctl.version import __version__
 def typer_of(entry: Entry) -> typer.Typer:
     """The command of an entry, imported now."""
     module, _, name = entry.place.partition(":")
-    found = getattr(import_module(module), name)
-    if isinstance(found, typer.Typer):
-        return found
+    target = getattr(import_module(module), name)
+    if isinstance(target, typer.Typer):
+        return target
     from wristctl.cli.command import study_command
 
-    return study_command(found, entry.shortcuts, entry.flags, entry.examples, entry.argument)
+    return study_command(target, entry.shortcuts, entry.flags, entry.examples, entry.argument)
 
 
 class _OnCall(TyperCommand):
@@ -89,7 +89,7 @@ def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
     gc.set_threshold(100_000, 50, 100)  # imports make many objects and no cycles: looking for them costs 0.15 s
     sys.unraisablehook = again
-    with interrupts() as seen:
+    with interrupts() as interrupt:
         try:
             code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
         except UserError as error:
@@ -103,7 +103,7 @@ def main() -> NoReturn:
             raise
         except BaseException as error:
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
-            if seen.asked:
+            if interrupt.asked:
                 code = 130
             elif refused := error_of_the_system(error):
                 code = _failed(str(refused), error, refused.exit_code)

@@ -24,11 +24,11 @@ from wristctl.study_files.keys import section_keys
 from wristctl.study_files.load import read_study, whole_key
 
 
-def asked_to_trust(given: bool, shown: str) -> bool:
+def asked_to_trust(trust: bool, shown: str) -> bool:
     """Shows what would run; yes where --trust-code was `given`, or where it is typed at a terminal, and never else."""
     typer.echo(shown, err=True)
-    if given or not sys.stdin.isatty():
-        return given
+    if trust or not sys.stdin.isatty():
+        return trust
     typer.echo("Read it. Type yes to let it run: ", nl=False, err=True)
     return typed_line(idle) == "yes"
 
@@ -51,18 +51,18 @@ def study_command(
     files. `flags` (name and help) are switches of this call that are no settings. The docstring of what the procedure
     performs is the help.
     """
-    named = [each.leaf for each in procedure.needs if each.leaf != argument]
+    named = [need.leaf for need in procedure.needs if need.leaf != argument]
     first = (argument,) if argument else ()
 
-    def call(**given: Any) -> None:
-        own = {leaf: given.pop(leaf) for leaf in (*first, *named, *shortcuts)}
-        raised = frozenset(name for name in flags if given.pop(name))
-        sweeps = given.pop("sweep") if procedure.sweeps else None
-        executor = (procedure.in_units and given.pop("executor")) or "serial"
-        typed = {leaf: json.dumps(own[leaf]) if leaf in quoted else own[leaf] for leaf in own}
-        set_ = [f"{leaf}={typed[leaf]}" for leaf in own if own[leaf] is not None]
+    def call(**arguments: Any) -> None:
+        leaves = {leaf: arguments.pop(leaf) for leaf in (*first, *named, *shortcuts)}
+        raised = frozenset(name for name in flags if arguments.pop(name))
+        sweeps = arguments.pop("sweep") if procedure.sweeps else None
+        executor = (procedure.in_units and arguments.pop("executor")) or "serial"
+        typed = {leaf: json.dumps(leaves[leaf]) if leaf in quoted else leaves[leaf] for leaf in leaves}
+        set_ = [f"{leaf}={typed[leaf]}" for leaf in leaves if leaves[leaf] is not None]
         set_ += [f"sweep={json.dumps(sweeps)}"] if sweeps else []
-        options = Options(**given)
+        options = Options(**arguments)
         _execute(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
 
     keys = section_keys(procedure.kind)
@@ -71,17 +71,17 @@ def study_command(
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    completed = {"controller": controllers} | {each.leaf: run_ids for each in procedure.needs}
-    own = [
+    completed = {"controller": controllers} | {need.leaf: run_ids for need in procedure.needs}
+    parameters = [
         Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf))
         for leaf in (*first, *named, *shortcuts)
     ]
-    own += [Own(name, text, bool) for name, text in flags.items()]
-    own += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
-    own += [Own("executor", _EXECUTOR, str)] * procedure.in_units
-    call.__signature__ = signature(own, argument)  # type: ignore[attr-defined]
+    parameters += [Own(name, text, bool) for name, text in flags.items()]
+    parameters += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
+    parameters += [Own("executor", _EXECUTOR, str)] * procedure.in_units
+    call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
-    shown = [each.replace("[", r"\[") for each in examples]  # a bracket begins rich's markup
+    shown = [example.replace("[", r"\[") for example in examples]  # a bracket begins rich's markup
     epilog = "\n\n".join(["Examples:", *shown]) if shown else None
     app.command(procedure.kind, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
@@ -115,18 +115,18 @@ def _perform(
         if procedure.in_units:
             check_executor(executor)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
-        overrides = [whole_key(each, procedure.kind) for each in (*(options.override or ()), *seed)]
-        typed = [*map(str, files), *(word for each in overrides for word in ("--set", each))]
+        overrides = [whole_key(override, procedure.kind) for override in (*(options.override or ()), *seed)]
+        typed = [*map(str, files), *(word for override in overrides for word in ("--set", override))]
         show, run = partial(progress, console, quiet=options.quiet), None
         try:
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
-                found = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
+                outcome = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
         except KeyboardInterrupt:
-            told = f"; what was found is in {run.path}" if run else ""
-            if run and any(each.leaf == "resume" for each in procedure.needs):
-                told += f"; go on: wristctl {procedure.kind} --resume {run.id}"
-            console.print(f"interrupted{told}", **PLAIN)
+            remark = f"; what was found is in {run.path}" if run else ""
+            if run and any(need.leaf == "resume" for need in procedure.needs):
+                remark += f"; go on: wristctl {procedure.kind} --resume {run.id}"
+            console.print(f"interrupted{remark}", **PLAIN)
             raise
-    print_result(run.path, found.tables, options.as_json, found.summary, options.all_ or found.remark)
-    if found.fault is not None:
-        raise found.fault
+    print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_ or outcome.remark)
+    if outcome.fault is not None:
+        raise outcome.fault

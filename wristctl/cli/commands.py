@@ -5,8 +5,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 _REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
+# The flag of commands that move motors, and its help.
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
-"""The flag of commands that move motors, and its help."""
 
 
 class Entry(NamedTuple):
@@ -16,7 +16,7 @@ class Entry(NamedTuple):
     """Module and name, `module:NAME`, imported when the command is called."""
     panel: str | None
     line: str
-    """Its line in the help."""
+    """Line of the command in the help."""
     shortcuts: Sequence[str] = ()
     """Leaves of its section that are options too."""
     flags: Mapping[str, str] = MappingProxyType({})
@@ -179,6 +179,7 @@ COMMANDS = {
     "runs": Entry("wristctl.cli.runs:app", _RESULTS, "Find, compare, verify and repeat runs."),
 }
 
+# Commands of `wristctl hw calibrate`.
 CALIBRATIONS = {
     "board-pdf": Entry(
         "wristctl.cli.hw_calibrate:board_pdf_app",
@@ -211,4 +212,3 @@ CALIBRATIONS = {
         ),
     ),
 }
-"""Of `wristctl hw calibrate`."""

@@ -27,21 +27,21 @@ def ports(
     """List the serial ports of this computer, those that may be a board first."""
     from wristctl.board.transport import ports as serial_ports
 
-    found = serial_ports()
+    listed = serial_ports()
     if find:
         typer.prompt("Unplug the board, then press Enter", default="", show_default=False, err=True)
         left = {port.device for port in serial_ports()}
-        found = [port for port in found if port.device not in left]
-        if len(found) != 1:
-            what = f"{len(found)} ports went away" if found else "no port went away"
-            raise UserError(what, fix="plug the board in, start again, and unplug only the board", exit_code=4)
+        listed = [port for port in listed if port.device not in left]
+        if len(listed) != 1:
+            problem = f"{len(listed)} ports went away" if listed else "no port went away"
+            raise UserError(problem, fix="plug the board in, start again, and unplug only the board", exit_code=4)
     if as_json:
-        print(json.dumps({"schema": "wristctl.ports/1", "ports": [port._asdict() for port in found]}, indent=2))
+        print(json.dumps({"schema": "wristctl.ports/1", "ports": [port._asdict() for port in listed]}, indent=2))
     elif find:
-        print(found[0].device)
-    elif found:
+        print(listed[0].device)
+    elif listed:
         columns = ("port", "may be a board", "description", "serial number")
-        print(Table("", columns, [(p.device, p.board_like, p.description, p.serial_number) for p in found]).text())
+        print(Table("", columns, [(p.device, p.board_like, p.description, p.serial_number) for p in listed]).text())
     else:
         print("no serial ports; wristctl hw emulate serves a board without hardware")
 

@@ -126,7 +126,7 @@ def watch(
 def _newest(results: Path) -> Run:
     from wristctl.records.index import indexed
 
-    found = [each.id for each in indexed(results, renew=False) if each.kind == "hw-run"]
-    if not found:
+    run_ids = [entry.id for entry in indexed(results, renew=False) if entry.kind == "hw-run"]
+    if not run_ids:
         raise UserError("there is no run of hw-run", str(results), "start one, or say --out DIR")
-    return Run(results / found[-1])
+    return Run(results / run_ids[-1])

@@ -67,7 +67,7 @@ def check(
     facts = facts_of({**board.hello._asdict(), **status._asdict()})
     counted = {**asdict(board.traffic), "bad_frames_here": board.bad_frames, **counters._asdict()}
     if as_json:
-        timed = [each._asdict() for each in times]
+        timed = [timing._asdict() for timing in times]
         shown = {
             "schema": "wristctl.board/1",
             "port": transport.name,
@@ -78,7 +78,7 @@ def check(
         print(json.dumps(shown, indent=2))
         return
     columns = ("command", "times", "median [ms]", "p99 [ms]", "worst [ms]")
-    rows = [(each.command, each.rounds, *(1e3 * value for value in each[2:])) for each in times]
+    rows = [(timing.command, timing.rounds, *(1e3 * value for value in timing[2:])) for timing in times]
     for table in (
         Table("Board", ("port", transport.name), [(name, str(value)) for name, value in facts.items()]),
         Table("Round trips", columns, rows),
@@ -93,8 +93,8 @@ def _ask_before_moving(axis: int) -> None:
         raise UserError("nothing was moved", fix="type yes, or leave out --wiring", exit_code=3)
 
 
+# Exit code of a rig that cannot run the loop.
 UNFIT = 3
-"""Exit code of a rig that cannot run the loop."""
 
 
 def check_rig(
@@ -111,8 +111,8 @@ def check_rig(
     from wristctl.vision.view import View
 
     study = load_study((), override, "hw-run")
-    given: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
-    settings = study.hw_run.model_copy(update=given | ({"camera": camera} if camera is not None else {}))
+    overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
+    settings = study.hw_run.model_copy(update=overrides | ({"camera": camera} if camera is not None else {}))
     pictures = Pictures()
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
         if priority:
@@ -122,35 +122,35 @@ def check_rig(
         try:
             with Board(testbed.transport) as board:
                 moved = yes or _agreed(axis, Patience(board).pulse)
-                with progress(console, no_event, "measuring", None, "strokes", quiet) as done:
-                    facts = measure(testbed, board, pictures, settings, axis if moved else None, done)
+                with progress(console, no_event, "measuring", None, "strokes", quiet) as advance:
+                    facts = measure(testbed, board, pictures, settings, axis if moved else None, advance)
         finally:
             testbed.close()
-    found = troubles(facts, settings, testbed.transport.name)
+    faults = troubles(facts, settings, testbed.transport.name)
     if as_json:
-        print(json.dumps(_plain(facts, found), indent=2))
+        print(json.dumps(_plain(facts, faults), indent=2))
     else:
-        _print(facts, found, settings)
-    if any(each.grave for each in found):
+        _print(facts, faults, settings)
+    if any(trouble.grave for trouble in faults):
         raise typer.Exit(UNFIT)
 
 
 def _agreed(axis: int, meanwhile: Any) -> bool:
-    what = (
+    question = (
         f"To see how old pictures are, axis {axis} will take its tendon up until the wrist bends by 3 deg\n"
         "and bend it to 6 deg, 24 to 96 times. All other tendons slack, emergency stop within reach."
     )
-    typer.echo(what, err=True)
+    typer.echo(question, err=True)
     typer.echo("Type yes to let it move, anything else to measure without: ", nl=False, err=True)
     return typed_line(meanwhile) == "yes"
 
 
-def _print(facts: RigFacts, found: list[Trouble], settings: HwRunSettings) -> None:
+def _print(facts: RigFacts, faults: list[Trouble], settings: HwRunSettings) -> None:
     loop = f"the loop of {1e3 * settings.control_period:g} ms"
-    grave = any(each.grave for each in found)
-    print(f"This rig can{'not' if grave else ''} run {loop}{'.' if grave or not found else ', and could be better.'}")
-    for each in found:
-        print(f"- {each.what}\n  {each.fix}")
+    grave = any(trouble.grave for trouble in faults)
+    print(f"This rig can{'not' if grave else ''} run {loop}{'.' if grave or not faults else ', and could be better.'}")
+    for trouble in faults:
+        print(f"- {trouble.what}\n  {trouble.fix}")
     print()
     print(Table("Measured", ("what", "value"), _rows(facts)).text())
 
@@ -168,8 +168,8 @@ def _rows(facts: RigFacts) -> list[tuple[str, str]]:
         ("camera", f"{pace.rate:.1f} pictures/s, uneven by {1e3 * pace.jitter:.1f} ms"),
         ("age of pictures when they come, by their stamps", f"{1e3 * pace.latency:.1f} ms"),
     ]
-    told = "not measured" if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
-    rows.append(("age that stamps do not tell, by strokes", told))
+    age = "not measured" if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
+    rows.append(("age that stamps do not tell, by strokes", age))
     if latency is not None:
         rows.append(("age of pictures when they come", f"{1e3 * (pace.latency + latency.delay):.1f} ms"))
     if quality is not None:
@@ -179,7 +179,7 @@ def _rows(facts: RigFacts) -> list[tuple[str, str]]:
     return rows
 
 
-def _plain(facts: RigFacts, found: list[Trouble]) -> dict[str, Any]:
+def _plain(facts: RigFacts, faults: list[Trouble]) -> dict[str, Any]:
     """For JSON; seconds, radians, pixels."""
     import numpy as np
 
@@ -190,8 +190,8 @@ def _plain(facts: RigFacts, found: list[Trouble]) -> dict[str, Any]:
     plain: dict[str, Any] = jsonable(
         {
             "schema": "wristctl.rig/1",
-            "fit": not any(each.grave for each in found),
-            "troubles": [each._asdict() for each in found],
+            "fit": not any(trouble.grave for trouble in faults),
+            "troubles": [trouble._asdict() for trouble in faults],
             "round_trip": facts.trips._asdict(),
             "latency_timer": facts.timer,
             "woken_late": {"median": median, "p99": most},

@@ -54,7 +54,7 @@ def idle() -> None:
 
 @dataclass(frozen=True)
 class TerminalOperator:
-    """Whoever typed the command; with the flag `yes` everything counts as agreed to."""
+    """Person at the terminal. With the flag `yes` every question counts as agreed to."""
 
     console: Terminal
     quiet: bool
@@ -65,25 +65,25 @@ class TerminalOperator:
         """A text on stderr, also when the command is to be quiet."""
         self.console.print(text, **PLAIN)
 
-    def confirm(self, what: str, meanwhile: Meanwhile | None = None) -> None:
+    def confirm(self, question: str, meanwhile: Meanwhile | None = None) -> None:
         """Asks on the terminal, and takes nothing but yes."""
         with self.console.aside():
-            typer.echo(what, err=True)
+            typer.echo(question, err=True)
             if "yes" in self.flags:
                 return
             typer.echo("Type yes to go on: ", nl=False, err=True)
             if typed_line(meanwhile or idle) != "yes":
                 raise UserError("nothing was moved further", fix="type yes, or --yes for scripted use", exit_code=3)
 
-    def dare(self, what: str) -> None:
+    def dare(self, danger: str) -> None:
         """Only with the flag `force`."""
         if "force" not in self.flags:
-            raise UserError(what, "hw-run.rows", "other gains, or go on with --force", exit_code=3)
-        self.tell(what)
+            raise UserError(danger, "hw-run.rows", "other gains, or go on with --force", exit_code=3)
+        self.tell(danger)
 
-    def wait_for(self, what: str) -> None:
+    def wait_for(self, request: str) -> None:
         """Waits for Enter."""
-        typer.prompt(what, default="", show_default=False, err=True)
+        typer.prompt(request, default="", show_default=False, err=True)
 
     def watch(self, trials: Sequence[Trial], session: Session) -> AbstractContextManager[Shown]:
         """The trials in a live panel on a terminal, as plain lines elsewhere."""

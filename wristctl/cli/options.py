@@ -13,8 +13,8 @@ import typer
 from wristctl.config.choices import CONTROLLERS
 from wristctl.study_files.shipped import shipped_names
 
+# Runs offered: of many thousands nobody reads the list, and a shell asks at every key.
 MOST = 200
-"""Runs offered: of many thousands nobody reads the list, and a shell asks at every key."""
 
 
 def run_ids(context: typer.Context, incomplete: str) -> list[str]:
@@ -34,10 +34,10 @@ def study_files(incomplete: str) -> list[str]:
     typed = Path(incomplete or "experiments/")
     folder = typed if incomplete.endswith("/") or not incomplete else typed.parent
     try:
-        found = [path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") or path.is_dir()]
+        paths = [path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") or path.is_dir()]
     except OSError:
-        found = []
-    names = sorted(f"{path}/" if path.is_dir() else str(path) for path in found)
+        paths = []
+    names = sorted(f"{path}/" if path.is_dir() else str(path) for path in paths)
     fitting = [name for name in names if name.startswith(incomplete)]
     return fitting or [name for name in shipped_names() if name.startswith(incomplete)]
 
@@ -110,37 +110,39 @@ class Own(NamedTuple):
     leaf: str
     help: str
     kind: Any
-    """Its type."""
+    """Type of the parameter."""
     completed: Callable[..., list[str]] | None = None
-    """What the shell completes it with."""
+    """Completions of the parameter in a shell."""
 
 
-def signature(own: Iterable[Own], argument: str | None = None) -> inspect.Signature:
+def signature(parameters: Iterable[Own], argument: str | None = None) -> inspect.Signature:
     """The parameters of a command: the shared ones, then its own.
 
     One of its own may be the `argument` that stands first, in place of study files.
     """
     shared = [
-        each
-        for name, each in inspect.signature(Options, eval_str=True).parameters.items()
+        parameter
+        for name, parameter in inspect.signature(Options, eval_str=True).parameters.items()
         if argument is None or name != "files"
     ]
     named = [
         inspect.Parameter(
-            each.leaf,
+            parameter.leaf,
             inspect.Parameter.KEYWORD_ONLY,
             default=None,
-            annotation=Annotated[each.kind | None, _parameter(each, each.leaf == argument)],
+            annotation=Annotated[parameter.kind | None, _parameter(parameter, parameter.leaf == argument)],
         )
-        for each in own
+        for parameter in parameters
     ]
     return inspect.Signature([*shared, *named])
 
 
-def _parameter(own: Own, first: bool) -> Any:
+def _parameter(parameter: Own, first: bool) -> Any:
     if first:
-        return typer.Argument(metavar=own.leaf.upper(), help=own.help, autocompletion=own.completed)
-    return typer.Option(f"--{own.leaf.replace('_', '-')}", help=own.help, autocompletion=own.completed)
+        return typer.Argument(metavar=parameter.leaf.upper(), help=parameter.help, autocompletion=parameter.completed)
+    return typer.Option(
+        f"--{parameter.leaf.replace('_', '-')}", help=parameter.help, autocompletion=parameter.completed
+    )
 
 
 RESULTS = Path("results")
@@ -177,6 +179,6 @@ def facts_of(values: dict[str, Any]) -> dict[str, Any]:
 
     named = {key: value.name or "none" if hasattr(value, "name") else value for key, value in values.items()}
     if isinstance(cause := values.get("reset_cause"), Reset):
-        why = [RESET_MEANING[each] for each in cause & ~Reset.WARM] or ["hidden by the boot loader"]
+        why = [RESET_MEANING[cause_bit] for cause_bit in cause & ~Reset.WARM] or ["hidden by the boot loader"]
         named["reset_cause"] = "; ".join(why + [RESET_MEANING[Reset.WARM]] * (Reset.WARM in cause))
     return {**named, "dictionary": f"{values['dictionary']:08x}", "firmware": ".".join(map(str, values["firmware"]))}

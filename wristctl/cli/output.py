@@ -1,4 +1,4 @@
-"""What a command leaves on stdout: its plan, or its tables and the run directory."""
+"""Output of a command on stdout: its plan, or its tables and the run directory."""
 
 import json
 import shutil

@@ -25,11 +25,11 @@ from wristctl.commands.progress import Count, counting
 from wristctl.commands.session import Done, Event
 from wristctl.escape import printable_lines
 
+# Keywords with which the console prints text that is not rich's markup.
 PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
-"""How the console prints text that is not rich's markup."""
 
+# Seconds between two plain lines.
 _LINE_EVERY = 10.0
-"""Seconds between two plain lines."""
 
 
 class Terminal(Console):
@@ -38,7 +38,7 @@ class Terminal(Console):
     _live_now: Live | None = None
 
     def on_broken_pipe(self) -> None:
-        """Whoever read what is shown is gone: nothing more is shown, and what was begun goes on."""
+        """Stop to show progress once the reader of the stream is gone. The command goes on."""
         self.quiet = True
         with suppress(OSError, ValueError):
             devnull = os.open(os.devnull, os.O_WRONLY)
@@ -51,7 +51,7 @@ class Terminal(Console):
         return super().set_live(live)
 
     def clear_live(self) -> None:
-        """It ends."""
+        """End the live display."""
         self._live_now = None
         super().clear_live()
 
@@ -95,7 +95,9 @@ def listening(quiet: bool, verbose: bool) -> Iterator[Terminal]:
 
 
 @contextmanager
-def progress(console: Console, event: Event, what: str, total: int | None, unit: str, quiet: bool) -> Iterator[Done]:
+def progress(
+    console: Console, event: Event, activity: str, total: int | None, unit: str, quiet: bool
+) -> Iterator[Done]:
     """Show how far `what` has come; yields `done(count, **figures)`, to be called as often as one likes.
 
     Without a `total` the length is unknown. Figures stand beside the count and go to `event`, at most once a
@@ -103,18 +105,18 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
     """
     live, lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
     bar = Progress(*_columns(), console=console, transient=True, disable=not live)
-    task = bar.add_task(what, total=total, figures="", left="")
+    task = bar.add_task(activity, total=total, figures="", left="")
     last_line = time.monotonic()
-    over, said = threading.Event(), threading.Event()
+    over, reported = threading.Event(), threading.Event()
 
     def still_at_it() -> None:
         """Off a terminal what says nothing of its own for long is said to go on."""
-        passed, each = 0.0, max(1.0, _LINE_EVERY)
-        while not over.wait(each):
-            passed += each
-            if not said.is_set():
-                console.print(f"{what} ... {passed:.0f} s", **PLAIN)
-            said.clear()
+        passed, interval = 0.0, max(1.0, _LINE_EVERY)
+        while not over.wait(interval):
+            passed += interval
+            if not reported.is_set():
+                console.print(f"{activity} ... {passed:.0f} s", **PLAIN)
+            reported.clear()
 
     def show(count: Count) -> None:
         nonlocal last_line
@@ -122,16 +124,16 @@ def progress(console: Console, event: Event, what: str, total: int | None, unit:
         instant = time.monotonic()
         if lines and instant - last_line >= _LINE_EVERY:
             last_line = instant
-            said.set()
+            reported.set()
             console.print(", ".join(part for part in (count.line(), count.remaining()) if part), **PLAIN)
 
     if lines and total is None:
-        console.print(f"{what} ...", **PLAIN)
+        console.print(f"{activity} ...", **PLAIN)
     if lines:
         threading.Thread(target=still_at_it, daemon=True).start()
     try:
-        with counting(event, what, total, unit, show) as done, bar:
-            yield done
+        with counting(event, activity, total, unit, show) as advance, bar:
+            yield advance
     finally:
         over.set()
 

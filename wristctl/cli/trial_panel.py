@@ -16,8 +16,8 @@ from wristctl.trial.control_loop import Shown
 from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import ACTIVE
 
+# Panels a second.
 _PICTURES = 8.0
-"""Panels a second."""
 
 
 class _Panel:
@@ -45,10 +45,10 @@ class _Panel:
         grid.add_row("board", row["state"], "marker", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")
         title = "between trials" if number < 0 else _title(self._trials[number], len(self._trials))
-        whole = Grid.grid()
-        whole.add_row(grid)
-        whole.add_row(ProgressBar(total=len(self._trials), completed=self._begun - (number >= 0), width=60))
-        return Panel(whole, title=title)
+        layout = Grid.grid()
+        layout.add_row(grid)
+        layout.add_row(ProgressBar(total=len(self._trials), completed=self._begun - (number >= 0), width=60))
+        return Panel(layout, title=title)
 
 
 @contextmanager
@@ -62,17 +62,17 @@ def panel_shown(console: Terminal, trials: Sequence[Trial]) -> Iterator[Shown]:
 @contextmanager
 def trials_counted(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
     """Count the trials by the ticks that are handed in."""
-    with session.progress("trials", len(trials), "trials") as done:
+    with session.progress("trials", len(trials), "trials") as advance:
         begun = -1
 
         def take(row: dict[str, Any]) -> None:
             nonlocal begun
             if row["trial"] > begun:
                 begun = row["trial"]
-                done(begun)
+                advance(begun)
 
         yield take
-        done(begun + 1)
+        advance(begun + 1)
 
 
 def _title(trial: Trial, count: int) -> str:

@@ -54,15 +54,15 @@ def new(
     word = name.replace("-", "_")
     file = to / f"{word}.py"
     title = name.replace("-", " ").capitalize()
-    own = "".join(part.capitalize() for part in name.split("-")) if kind == "optimiser" else word.upper()
+    object_name = "".join(part.capitalize() for part in name.split("-")) if kind == "optimiser" else word.upper()
     text = (files("wristctl.cli") / "templates" / f"{kind}.py.txt").read_text(encoding="utf-8")
-    for mark, value in (("@name@", name), ("@OBJECT@", own), ("@Title@", title)):
+    for mark, value in (("@name@", name), ("@OBJECT@", object_name), ("@Title@", title)):
         text = text.replace(mark, value)
     if lexists(file):
         raise UserError("there is such a file already", str(file), "another name, or another folder with --to")
     write_text(file, text, TO)
     say(f"{file} is written, and runs as it stands:")
-    for line in _AFTER_NEW[kind].format(f"{file}:{own}").splitlines():
+    for line in _AFTER_NEW[kind].format(f"{file}:{object_name}").splitlines():
         say(f"  {line}")
 
 
@@ -89,11 +89,11 @@ def init(
     with writing(to, Argument("folder", metavar="DIR", positional=True)):
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder, prefix=f".{EXPERIMENTS}-") as scratch:
-            whole = Path(scratch) / EXPERIMENTS
+            copies = Path(scratch) / EXPERIMENTS
             for file in _files():
-                (whole / file).parent.mkdir(parents=True, exist_ok=True)
-                (whole / file).write_bytes((shipped() / file).read_bytes())
-            whole.rename(to)
+                (copies / file).parent.mkdir(parents=True, exist_ok=True)
+                (copies / file).write_bytes((shipped() / file).read_bytes())
+            copies.rename(to)
     say(f"{to} is written, for you to change. The paper's study in small, a few minutes:")
     for line in (f"cd {shlex.quote(str(folder))}", *_AFTER_INIT.split("\n")[1:-1]):
         say(f"  {line}")
@@ -101,7 +101,7 @@ def init(
 
 def _files() -> list[Path]:
     """From the folder of experiments."""
-    return sorted(each.relative_to(shipped()) for suffix in ("yaml", "py") for each in shipped().rglob(f"*.{suffix}"))
+    return sorted(file.relative_to(shipped()) for suffix in ("yaml", "py") for file in shipped().rglob(f"*.{suffix}"))
 
 
 check_law_app = typer.Typer(add_completion=False)
@@ -128,11 +128,11 @@ def check_law(
 
     checks: list[LawCheck] = []
     with asking(partial(asked_to_trust, trust_code)):
-        for each in certificate(placed(law, None), load_study(config or ()).laws, not no_board):
-            checks.append(each)
+        for check in certificate(placed(law, None), load_study(config or ()).laws, not no_board):
+            checks.append(check)
             if not as_json:
-                say(f"{_VERDICTS[each.passed]:<6}{each.asked + ':':<23} {each.found}")
-    failed = [each.asked for each in checks if each.passed is False]
+                say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<23} {check.found}")
+    failed = [check.asked for check in checks if check.passed is False]
     if as_json:
         shown = {"schema": "wristctl.law/1", "law": law, "fit": not failed, "checks": [c._asdict() for c in checks]}
         print(json.dumps(shown, indent=2))

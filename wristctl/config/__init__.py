@@ -1,1 +1,1 @@
-"""What a study consists of: typed sections, strict YAML, overrides. Knows no physics and no files of results."""
+"""Configuration of a study: typed sections, strict YAML, overrides. Knows no physics and no files of results."""

@@ -19,8 +19,10 @@ VerdictName = Literal[
     "open",
 ]
 WhoseName = Literal["paper", "ours", "group"]
-_Written = Annotated[VerdictName, BeforeValidator(lambda given: "contradicted" if given == "contradictory" else given)]
-"""Older ledgers say contradictory."""
+# Verdict of a claim. Older ledgers say contradictory.
+_Written = Annotated[
+    VerdictName, BeforeValidator(lambda verdict: "contradicted" if verdict == "contradictory" else verdict)
+]
 SenseName = Literal["about", "exactly", "at least", "at most"]
 
 _NEEDED = {
@@ -47,18 +49,18 @@ class Claim(Section):
     part_of: str = ""
     """Id of the statement that this is a detail of. Only the statement is counted."""
     topic: str = ""
-    """What it is about, in a few words, for the first screen of an audit; without one it is not there."""
+    """Topic of the claim in a few words, for the first screen of an audit. A claim without one is not shown there."""
     weight: int = 0
-    """How much a reader of the paper builds on it: the first screen has both numbers of the heaviest."""
+    """Weight of the claim for a reader of the paper. The first screen shows both numbers of the heaviest claims."""
     source: str = ""
-    """Where the paper's authors say it, if elsewhere."""
+    """Source of the claim, if outside the paper."""
     evidence: Literal[
         "comparison", "ordering", "arrival", "together", "symmetry", "table1", "selection", "hardware", "equation",
         "text", "parts", "settings",
     ]  # fmt: skip
     value: float | None = None
     sense: SenseName = "about"
-    """How `value` is meant: within a factor, as it is, or as a bound."""
+    """Meaning of `value`: within a factor, exact, or a bound."""
     printed: bool = True
     """Whether `value` is printed in the paper, and so rounded to its last digit; false: a threshold of ours."""
     ends: tuple[float, float] | None = None
@@ -67,21 +69,21 @@ class Claim(Section):
     controller: str | None = None
     gains: str | None = None
     than: str | None = None
-    """Of an ordering: controller/gains whose metric is the larger one, as the paper has it."""
+    """Controller/gains with the larger metric in an ordering, by the paper."""
     metric: str | None = None
-    """Of a loop or a run; of an equation its name in wristctl.comparison.derived_claims."""
+    """Metric of a loop or a run, or the name of an equation in wristctl.comparison.derived_claims."""
     direction: DirectionName | None = None
-    """Of hardware: trials in this direction only."""
+    """Direction of the hardware trials that count."""
     pushed: bool = False
-    """Of hardware: trials with a push, else those without."""
+    """Whether hardware trials with a push count, else those without."""
     stiffness_scale: float = 1.0
-    """Of a comparison: springs' stiffness over what the controller knows."""
+    """Ratio of the springs' stiffness to the controller's value, in a comparison."""
     derived: bool = False
     """The paper derives it from its equations, which contradict it where, solved as they stand, they do not give it."""
     unspecified: str = ""
-    """What the paper leaves open, so that no number of ours can decide: ours then stands beside."""
+    """Quantity that the paper leaves open. Our number then stands beside the claim and decides nothing."""
     assuming: str = ""
-    """What the verdict assumes and the paper does not give, for example a step as reference. It then stands beside."""
+    """Assumption of the verdict that the paper does not give, for example a step as reference. It is shown beside."""
     verdict: _Written | None = None
     reason: str = ""
 
@@ -106,7 +108,7 @@ _AS_IT_IS = ("settings", "text")
 
 
 class AuditSettings(Section):
-    """Which claims, the runs that show some of them, and over which horizon the rollouts for others go."""
+    """Claims of an audit, the runs that show some of them, and the horizon of the rollouts for the others."""
 
     claims: tuple[Claim, ...] = choice((), "the ledger: claims with what decides them; experiments/claims.yaml has all")
     table1: str | None = choice(None, "train run of experiments/table1.yaml: path, id or latest:train")
@@ -120,9 +122,9 @@ class AuditSettings(Section):
         twice = [name for name, count in Counter(claim.id for claim in self.claims).items() if count > 1]
         if twice:
             raise ValueError(f"claim {twice[0]} stands there twice: give each an id of its own")
-        whole = {claim.id for claim in self.claims if not claim.part_of}
+        undivided = {claim.id for claim in self.claims if not claim.part_of}
         for claim in self.claims:
-            if claim.part_of and claim.part_of not in whole:
+            if claim.part_of and claim.part_of not in undivided:
                 raise ValueError(f"claim {claim.id}: part_of: names no statement '{claim.part_of}' of this ledger")
         parts = {claim.part_of for claim in self.claims}
         empty = [claim.id for claim in self.claims if claim.evidence == "parts" and claim.id not in parts]

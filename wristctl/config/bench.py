@@ -8,6 +8,8 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import SceneSettings
 
+# Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
+# others the bench's; from usb-latency on they are in virtual time only.
 FAULTS = {
     "port-lost": "the cable is pulled: the port is gone for good",
     "board-reset": "the board restarts once: drives off, positions lost",
@@ -50,8 +52,6 @@ FAULTS = {
     "bytes-garbled": "each byte loses a bit with probability `size`",
     "estop-pressed": "somebody presses the emergency stop button",
 }
-"""Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
-others the bench's; from usb-latency on they are in virtual time only."""
 
 FaultKind = Literal[
     "port-lost", "board-reset", "frames-dropped", "marker-covered", "markers-swapped", "camera-frozen", "host-silent",
@@ -67,7 +67,7 @@ FaultKind = Literal[
 class InjectedFault(Section):
     """Something that goes wrong."""
 
-    kind: FaultKind = choice("port-lost", "; ".join(f"{kind}: {what}" for kind, what in FAULTS.items()))
+    kind: FaultKind = choice("port-lost", "; ".join(f"{kind}: {meaning}" for kind, meaning in FAULTS.items()))
     at: float = quantity(1.0, "s", "when", ge=0)
     since: Literal["trial", "first trial", "power-on"] = choice(
         "trial", "what `at` counts from: the start of each trial's motion, of the first one's, or the board's power-on"
@@ -78,7 +78,7 @@ class InjectedFault(Section):
 
 
 class Motors(Section):
-    """What a stepper and its spool do beyond the steps they are sent; one entry for tendons 1, 2, 4, 5 each."""
+    """Behaviour of steppers and spools beyond the commanded steps, with one entry per tendon 1, 2, 4, 5."""
 
     slack: tuple[float, float, float, float] = quantity(
         (3e-4, 2e-4, 4e-4, 2.5e-4), "m", "slack of each tendon at power-on, of the straight wrist", "assumed"
@@ -141,7 +141,7 @@ class StepperActuator(Actuator, TendonFacts):
 
 
 class Person(Section):
-    """Whoever is asked to do something at the emulated rig, as at a real one."""
+    """Person who is asked to act at the emulated rig, as at a real rig."""
 
     takes: float = quantity(10.0, "s", "from a question to its answer", "assumed", ge=0)
     force: float = quantity(

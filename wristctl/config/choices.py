@@ -16,8 +16,8 @@ from wristctl.errors import UserError, meant
 
 T = TypeVar("T")
 
+# The module that loads what is from elsewhere; imported, as every entry is, when a name first asks for it.
 _LOADER = "wristctl.plugins.places"
-"""The module that loads what is from elsewhere; imported, as every entry is, when a name first asks for it."""
 
 
 class Choices(MutableMapping[str, T], Generic[T]):
@@ -29,7 +29,7 @@ class Choices(MutableMapping[str, T], Generic[T]):
 
     def __init__(self, what: str, entries: Mapping[str, str], group: str = "") -> None:
         self.what, self.group = what, group
-        """What an entry is, in a word, and the group of its entry points."""
+        """Noun for an entry, and the group of its entry points."""
         self._entries: dict[str, Any] = dict(entries)
         self._origins: dict[str, Foreign] = {}
 
@@ -40,8 +40,8 @@ class Choices(MutableMapping[str, T], Generic[T]):
         if isinstance(entry, str):
             module, _, attribute = entry.partition(":")
             entry = self._entries[name] = getattr(import_module(module), attribute)
-        found: T = entry
-        return found
+        loaded: T = entry
+        return loaded
 
     def __setitem__(self, name: str, entry: T) -> None:
         self._entries[name] = entry
@@ -87,7 +87,7 @@ class Choices(MutableMapping[str, T], Generic[T]):
         self._entries[name], self._origins[name] = entry, origin
 
     def origin(self, name: str) -> Foreign | None:
-        """Where an entry is from; None of those that belong here."""
+        """Origin of an entry. None for built-in entries."""
         return self._origins.get(name)
 
     def belongs(self, name: str) -> bool:
@@ -95,6 +95,7 @@ class Choices(MutableMapping[str, T], Generic[T]):
         return name in self._entries and name not in self._origins
 
 
+# Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(
     "controller",
     {
@@ -120,8 +121,8 @@ CONTROLLERS: Choices[Any] = Choices(
     },
     "wristctl.controllers",
 )
-"""Of `wristctl.control.law.Controller`."""
 
+# Table of `wristctl.simulation.reference.ReferenceKind`.
 REFERENCES: Choices[Any] = Choices(
     "reference",
     {
@@ -149,8 +150,8 @@ REFERENCES: Choices[Any] = Choices(
     },
     "wristctl.references",
 )
-"""Of `wristctl.simulation.reference.ReferenceKind`."""
 
+# Table of `wristctl.simulation.disturbances.Disturbance`.
 DISTURBANCES: Choices[Any] = Choices(
     "disturbance",
     {
@@ -159,8 +160,8 @@ DISTURBANCES: Choices[Any] = Choices(
         "drift": "wristctl.simulation.disturbances:DRIFT",
     },
 )
-"""Of `wristctl.simulation.disturbances.Disturbance`."""
 
+# Table of `wristctl.simulation.metrics.Metric`.
 METRICS: Choices[Any] = Choices(
     "metric",
     {
@@ -192,8 +193,8 @@ METRICS: Choices[Any] = Choices(
         "range_untracked": "wristctl.simulation.tracked_range:RANGE_UNTRACKED",
     },
 )
-"""Of `wristctl.simulation.metrics.Metric`."""
 
+# Table of subclasses of `wristctl.tuning.optimisers.base.Optimiser`.
 OPTIMISERS: Choices[Any] = Choices(
     "optimiser",
     {
@@ -204,8 +205,8 @@ OPTIMISERS: Choices[Any] = Choices(
     },
     "wristctl.optimisers",
 )
-"""Of subclasses of `wristctl.tuning.optimisers.base.Optimiser`."""
 
+# Table of `wristctl.wrist.plant.PlantModel`.
 PLANTS: Choices[Any] = Choices(
     "plant",
     {
@@ -213,4 +214,3 @@ PLANTS: Choices[Any] = Choices(
         "hinges": "wristctl.wrist.hinges:HINGES",
     },
 )
-"""Of `wristctl.wrist.plant.PlantModel`."""

@@ -1,4 +1,4 @@
-"""What is tuned, compared and simulated: controllers with their gains."""
+"""Controllers with their gains, to tune, compare and simulate."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
@@ -52,13 +52,13 @@ class Objective(OpenSection):
 
     def added(self) -> Mapping[str, Parameter]:
         """A weight for every other metric of the table."""
-        others = {name: METRICS[name] for name in METRICS if name not in type(self).model_fields}
-        return {name: Parameter(0.0, "", f"weight of {each.formula}") for name, each in others.items()}
+        added_metrics = {name: METRICS[name] for name in METRICS if name not in type(self).model_fields}
+        return {name: Parameter(0.0, "", f"weight of {metric.formula}") for name, metric in added_metrics.items()}
 
     def weights(self) -> dict[str, float]:
         """The weight of each metric that has one, by name."""
-        given = {name: getattr(self, name) for name in type(self).model_fields} | (self.model_extra or {})
-        return {name: float(weight) for name, weight in given.items() if weight != 0.0 and name in METRICS}
+        weight_of = {name: getattr(self, name) for name in type(self).model_fields} | (self.model_extra or {})
+        return {name: float(weight) for name, weight in weight_of.items() if weight != 0.0 and name in METRICS}
 
     @model_validator(mode="after")
     def _none_negative(self) -> Self:

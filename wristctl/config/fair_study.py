@@ -10,7 +10,7 @@ from wristctl.config.section import OneOf, Section, choice
 
 
 class StudyBudget(Section):
-    """How much is run, for every law and family alike."""
+    """Computing budget, equal for every law and family."""
 
     candidates: int = choice(10, "candidates per iteration of a search", ge=2, le=10_000)
     iterations: int = choice(8, "iterations of a search", ge=1, le=100_000)
@@ -61,7 +61,7 @@ class FairStudySettings(Section):
 
     @model_validator(mode="after")
     def _laws_once(self) -> Self:
-        twice = sorted({each for each in self.laws if self.laws.count(each) > 1})
+        twice = sorted({law for law in self.laws if self.laws.count(law) > 1})
         if twice:
             raise ValueError(f"{twice[0]} is among the laws twice")
         return self
@@ -69,7 +69,7 @@ class FairStudySettings(Section):
     @model_validator(mode="after")
     def _held_against_another(self) -> Self:
         for name, variant in self.variants.items():
-            others = sorted(self.variants.keys() - {name})
-            if variant.beside and variant.beside not in others:
-                raise ValueError(f"{name} beside '{variant.beside}': one of {', '.join(others) or 'no other'}")
+            other_variants = sorted(self.variants.keys() - {name})
+            if variant.beside and variant.beside not in other_variants:
+                raise ValueError(f"{name} beside '{variant.beside}': one of {', '.join(other_variants) or 'no other'}")
         return self

@@ -16,9 +16,9 @@ _NUMBER = r"([-+]?[0-9]+\.?[0-9]*(?:e[+-]?[0-9]+)?)"
 _RANGE = re.compile(rf"(x?){_NUMBER} ?\.\. ?x?{_NUMBER}( log)?", re.IGNORECASE)
 _OF_REFERENCE = "reference."
 
+# Source of a drawn leaf: `0..3` evenly, `8e3..4e4 log` evenly in the logarithm, `x0.7..1.3` as multiples of the
+# believed value, or a list to choose from.
 Drawn = str | tuple[bool | int | float | str, ...]
-"""What a leaf is drawn from: `0..3` evenly, `8e3..4e4 log` evenly in its logarithm, `x0.7..1.3` as multiples of what
-is believed, or one of a list."""
 
 
 class Range(NamedTuple):
@@ -32,10 +32,10 @@ class Range(NamedTuple):
     @classmethod
     def read(cls, text: str) -> Self:
         """From `x0.7..1.3`, `0..3` or `8e3..4e4 log`; PydanticCustomError for what is none of them."""
-        found = _RANGE.fullmatch(text.strip())
-        low, high = (float(found[2]), float(found[3])) if found else (0.0, 0.0)
-        logarithmic, multiple = bool(found and found[4]), bool(found and found[1])
-        if found is None or not low < high or ((logarithmic or multiple) and low <= 0.0):
+        match = _RANGE.fullmatch(text.strip())
+        low, high = (float(match[2]), float(match[3])) if match else (0.0, 0.0)
+        logarithmic, multiple = bool(match and match[4]), bool(match and match[1])
+        if match is None or not low < high or ((logarithmic or multiple) and low <= 0.0):
             expected = "a range as 0..3, 8e3..4e4 log or x0.7..1.3, its lower end first, or a list of values"
             raise PydanticCustomError(
                 "range", "should be {expected}, not {given}", {"expected": expected, "given": text}
@@ -52,7 +52,7 @@ class Range(NamedTuple):
 
 
 def drawn_value(source: Drawn, share: float) -> Any:
-    """What a leaf is, by a number in [0, 1)."""
+    """Value of a leaf at a share in [0, 1)."""
     if isinstance(source, str):
         return Range.read(source).at(share)
     return source[min(int(share * len(source)), len(source) - 1)]
@@ -87,7 +87,7 @@ class Family(Section):
 
     @model_validator(mode="after")
     def _all_worlds_can_be(self) -> Self:
-        """Each leaf at both of its ends, the others in the middle."""
+        """Check the worlds with one leaf at either end and the others in the middle."""
         for key, source in self.draw.items():
             if not isinstance(source, str) and not source:
                 raise PydanticCustomError("empty_draw", "{key} is drawn from nothing", {"key": key})
@@ -115,7 +115,7 @@ def _put(data: dict[str, Any], key: str, value: Any) -> None:
 
 
 class TuningWorlds(Section):
-    """Which worlds gains are searched on and chosen by."""
+    """Worlds on which gains are searched and chosen."""
 
     family: str = choice("", "name of a family in `families`; empty: none")
     draws: int = choice(16, "worlds drawn of it to search on", ge=1, le=10_000)
@@ -123,7 +123,7 @@ class TuningWorlds(Section):
 
 
 class Worlds(Section):
-    """Which worlds rows are ranked on: draws that no search has seen."""
+    """Worlds on which rows are ranked: draws that no search has seen."""
 
     family: str = choice("", "name of a family in `families`; empty: none")
     draws: int = choice(100, "worlds drawn of it", ge=2, le=100_000)

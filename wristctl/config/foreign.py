@@ -1,19 +1,19 @@
-"""How a study names code from elsewhere, path/to/file.py:NAME, and where such code is from."""
+"""References to code outside the package, path/to/file.py:NAME, and the origin of such code."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+# Suffix of the name of a law in plain Python.
 PLAIN = "(py)"
-"""How the names of laws end that are plain Python."""
 
 _REFERENCE = re.compile(r"[^\n]*\.py:[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True)
 class Foreign:
-    """Where an object from elsewhere is from: its file, its name there, and every source it rests on with its hash."""
+    """Origin of an object outside the package: file, attribute, and the hash of every source file it needs."""
 
     file: Path
     attribute: str

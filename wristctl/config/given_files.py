@@ -41,18 +41,18 @@ def with_files(section: Any, name: Callable[[str], str]) -> Any:
 
 def files_of(section: Any) -> list[str]:
     """Every file that is named in a section, at whatever depth, in order."""
-    found: list[str] = []
+    names: list[str] = []
 
     def note(name: str) -> str:
-        found.append(name)
+        names.append(name)
         return name
 
     with_files(section, note)
-    return found
+    return names
 
 
 def beside(folder: Path, value: Any) -> Any:
     """Names of files as they are meant in a study that stands in a folder; what is no name is left for the schema."""
     if isinstance(value, str) and value:
         return str((folder / Path(value).expanduser()).absolute())
-    return tuple(beside(folder, each) for each in value) if isinstance(value, tuple) else value
+    return tuple(beside(folder, entry) for entry in value) if isinstance(value, tuple) else value

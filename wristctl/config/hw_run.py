@@ -12,12 +12,12 @@ from wristctl.config.section import Section, choice, quantity
 from wristctl.config.vision import Device, Gates, Markers
 from wristctl.errors import Unfitting
 
+# Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
-"""Of a step rate on the board: seconds at least, and ticks."""
 
 
 class Homing(Section):
-    """How zero is found: each motor reels in by small moves until its tendon bends the wrist, then lets go again."""
+    """Homing: every motor reels in by small moves until its tendon bends the wrist, then lets go again."""
 
     slack: float = quantity(2e-3, "m", "longest slack of a tendon that is looked for", "assumed", gt=0, le=0.02)
     move: float = quantity(60e-6, "m", "tendon reeled in by one move", "assumed", gt=0)
@@ -70,8 +70,8 @@ class Safety(Section):
     @model_validator(mode="after")
     def _the_host_notices_first(self) -> Self:
         if self.late >= self.watchdog:
-            what = f"late ({self.late:g} s) must be below watchdog ({self.watchdog:g} s)"
-            raise Unfitting(what, f"safety.late below {self.watchdog:g}, or a longer safety.watchdog")
+            problem = f"late ({self.late:g} s) must be below watchdog ({self.watchdog:g} s)"
+            raise Unfitting(problem, f"safety.late below {self.watchdog:g}, or a longer safety.watchdog")
         return self
 
 
@@ -151,19 +151,19 @@ class HwRunSettings(RigSettings):
     def _ticks_before_the_watchdog(self) -> Self:
         period, limits = self.control_period, self.safety
         if self.rate_life >= limits.watchdog:
-            what = (
+            problem = (
                 f"a step rate lives for {self.rate_life:g} s ({_LIFE_PERIODS:g} times control_period {period:g} s, "
                 f"{_LEAST_LIFE:g} s at least), which must be below safety.watchdog ({limits.watchdog:g} s)"
             )
             shorter = f"control_period below {limits.watchdog / _LIFE_PERIODS:g}, or "
             fix = f"safety.watchdog above {self.rate_life:g}"
-            raise Unfitting(what, (shorter if limits.watchdog > _LEAST_LIFE else "") + fix)
+            raise Unfitting(problem, (shorter if limits.watchdog > _LEAST_LIFE else "") + fix)
         if period + limits.late >= limits.watchdog:
-            what = (
+            problem = (
                 f"a tick that is late by safety.late ({limits.late:g} s) comes {period + limits.late:g} s after the "
                 f"one before: not below safety.watchdog ({limits.watchdog:g} s)"
             )
-            raise Unfitting(what, f"safety.late below {limits.watchdog - period:g}, or a longer safety.watchdog")
+            raise Unfitting(problem, f"safety.late below {limits.watchdog - period:g}, or a longer safety.watchdog")
         return self
 
     def _emulated_world(self) -> Plant:
@@ -171,16 +171,16 @@ class HwRunSettings(RigSettings):
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
         motors = TrueActuator.between(self.actuator, self.bench.actuator)
-        own = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
+        holding = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
         return Plant(
             **wrist,
-            actuator=motors.model_copy(update=own),
+            actuator=motors.model_copy(update=holding),
             sensor=TrueSensor.between(self.sensor, camera),
         )
 
     @property
     def loop(self) -> Loop:
-        """The same loop in simulation: the emulated plant, or the known one of a real or an identified wrist."""
+        """Loop of the trials in simulation: the emulated plant, or the known plant of a real or an identified wrist."""
         emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,

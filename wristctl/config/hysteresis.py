@@ -14,7 +14,7 @@ Path = Annotated[float, Field(gt=0)]
 
 
 class KnownBeforehand(Section):
-    """What a fit takes as known, and how well: standard deviations, of which the relative ones are logarithmic."""
+    """Prior knowledge of a fit as standard deviations. The relative ones are logarithmic."""
 
     stiffness_error: float = quantity(0.1, "", "of wrist.stiffness, relative", "assumed", gt=0)
     damping_error: float = quantity(0.3, "", "of wrist.damping, relative", "assumed", gt=0)

@@ -60,5 +60,5 @@ class IdentifySettings(Section):
 
     @property
     def fixed(self) -> dict[str, float]:
-        """What is held, by name."""
+        """Values of the held parameters, by name."""
         return self.fix.model_dump(exclude_none=True)

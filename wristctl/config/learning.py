@@ -56,6 +56,9 @@ class DataSettings(Section):
 
 _PRINTED = {"optimiser": "adam", "standardise": False, "weight_decay": 0.01}
 
+# T1's columns (momentum read as beta1; coupled decay and raw inputs, of which T1 says nothing, C11), and a network
+# that is accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its
+# layers.
 PRESETS: dict[str, dict[str, Any]] = {
     "t1-sigmoid": {"activation": "sigmoid", "beta1": 0.90, "learning_rate": 0.003, **_PRINTED},
     "t1-relu": {"activation": "relu", "beta1": 0.95, "learning_rate": 0.001, **_PRINTED},
@@ -70,12 +73,9 @@ PRESETS: dict[str, dict[str, Any]] = {
         "patience": 30,
     },
 }
-"""T1's columns (momentum read as beta1; coupled decay and raw inputs, of which T1 says nothing, C11), and a network
-that is accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its
-layers."""
 
+# Most weights of a network trained by second order, which solves for all weights at once (2 inputs counted).
 MOST_WEIGHTS = 4000
-"""Of a network trained by second order, which solves for all of them at once (2 inputs counted)."""
 
 
 class NetworkSettings(Section):
@@ -108,9 +108,9 @@ class NetworkSettings(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_from_preset(cls, given: Any) -> Any:
-        preset = PRESETS.get(str(given.get("preset"))) if isinstance(given, Mapping) else None
-        return {**preset, **given} if preset else given
+    def _fill_from_preset(cls, data: Any) -> Any:
+        preset = PRESETS.get(str(data.get("preset"))) if isinstance(data, Mapping) else None
+        return {**preset, **data} if preset else data
 
     @model_validator(mode="after")
     def _second_order_is_for_small_networks(self) -> Self:
@@ -134,7 +134,7 @@ class NetworkRow(NetworkSettings):
 
 
 class Grid(Section):
-    """What a search tries: all combinations. An empty list stands for the section's own value."""
+    """Grid of a search, which tries all combinations. An empty list stands for the section's own value."""
 
     depths: tuple[Annotated[int, Field(ge=1, le=10)], ...] = choice(
         (1, 2, 3, 4, 5), "hidden layers: `width` neurons in the first, half of that in each other", "paper"

@@ -11,19 +11,19 @@ from wristctl.config.section import OneOf, Section
 
 def with_leaves(value: Any, leaf: Callable[[FieldInfo, Any], Any]) -> Any:
     """A section, or a list or mapping of some, with `leaf(field, value)` in every field; itself where all are equal."""
-    made: Any
+    copy: Any
     if isinstance(value, Section):
         fields = {name: (getattr(value, name), field) for name, field in type(value).model_fields.items()}
-        made = {name: with_leaves(leaf(field, given), leaf) for name, (given, field) in fields.items()}
-        changed = {name: each for name, each in made.items() if each is not fields[name][0]}
+        copy = {name: with_leaves(leaf(field, entry), leaf) for name, (entry, field) in fields.items()}
+        changed = {name: entry for name, entry in copy.items() if entry is not fields[name][0]}
         return value.model_copy(update=changed) if changed else value
     if isinstance(value, dict):
-        made = {key: with_leaves(each, leaf) for key, each in value.items()}
+        copy = {key: with_leaves(entry, leaf) for key, entry in value.items()}
     elif isinstance(value, tuple):
-        made = tuple(with_leaves(each, leaf) for each in value)
+        copy = tuple(with_leaves(entry, leaf) for entry in value)
     else:
         return value
-    return made if made != value else value
+    return copy if copy != value else value
 
 
 Rename = Callable[[Choices[Any], str], str]
@@ -31,9 +31,9 @@ Rename = Callable[[Choices[Any], str], str]
 
 def tables_of(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Choices[Any]]:
     """The tables whose names a leaf may have, by itself or in a list."""
-    for each in metadata:
-        if isinstance(each, OneOf):
-            yield each.table
+    for annotation_part in metadata:
+        if isinstance(annotation_part, OneOf):
+            yield annotation_part.table
     for part in get_args(annotation):
         yield from tables_of(part, getattr(part, "__metadata__", ()))
 
@@ -45,18 +45,18 @@ def renamed(section: Any, rename: Rename) -> Any:
         table = next(tables_of(field.annotation, field.metadata), None)
         if table is None:
             return value
-        return tuple(rename(table, each) for each in value) if isinstance(value, tuple) else rename(table, value)
+        return tuple(rename(table, name) for name in value) if isinstance(value, tuple) else rename(table, value)
 
     return with_leaves(section, leaf)
 
 
 def named_in(value: Any) -> list[tuple[Choices[Any], str]]:
     """Every name of a table that a section names, in order."""
-    found: dict[tuple[int, str], tuple[Choices[Any], str]] = {}
+    named: dict[tuple[int, str], tuple[Choices[Any], str]] = {}
 
     def note(table: Choices[Any], name: str) -> str:
-        found.setdefault((id(table), name), (table, name))
+        named.setdefault((id(table), name), (table, name))
         return name
 
     renamed(value, note)
-    return list(found.values())
+    return list(named.values())

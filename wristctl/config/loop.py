@@ -13,25 +13,25 @@ from wristctl.config.given_files import given_file, of_file
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
+# Former names of plant models in older studies. A loop had the same name.
 _WRITTEN = {"exact": "closed-form"}
-"""What older studies call it, when a loop had that name too."""
 InverseName = Annotated[
     Literal["none", "closed-form", "network"],
-    BeforeValidator(lambda given: _WRITTEN.get(given, given) if isinstance(given, str) else given),
+    BeforeValidator(lambda name: _WRITTEN.get(name, name) if isinstance(name, str) else name),
 ]
 DirectionName = Literal["ulnar", "radial", "flexion", "extension"]
 
 
+# Integration step [s] below which elastic tendons and their friction cost no accuracy (docs/accuracy.md).
 LONGEST_STEP = 1e-3
-"""Integration step [s] below which elastic tendons and their friction cost no accuracy (docs/accuracy.md)."""
+# Integration steps that a control period may have by hand.
 MOST_SUBSTEPS = 1000
-"""Integration steps that a control period may have by hand."""
+# Stiffness [N/m] beyond which tendons take half that step.
 STIFF = 50e3
-"""Stiffness [N/m] beyond which tendons take half that step."""
 
 
+# Default tips of a tip-path, as multiples of the wrist's length.
 _TIP_RATIOS = ((0.975, 0.175), (0.95, 0.2625), (0.9875, -0.125), (0.95, 0.2625))
-"""Where a tip-path goes whose tips are not given, as multiples of the wrist's length."""
 
 
 def longest_step(actuator: Actuator) -> float:
@@ -64,7 +64,7 @@ class Loop(Section):
 
     @property
     def fewest_steps(self) -> int:
-        """How many steps short enough for its elastic tendons a control period has."""
+        """Fewest integration steps of a control period that resolve its elastic tendons."""
         return max(1, math.ceil(self.control_period / longest_step(self.actuator) * (1.0 - 1e-9)))
 
     @model_validator(mode="after")
@@ -128,13 +128,13 @@ class Reference(OpenSection):
         return self.model_copy(update={"tips": tips, "tip_ratios": None})
 
     def added(self) -> Mapping[str, Parameter]:
-        """What a kind from elsewhere adds."""
+        """Parameters that a reference from outside the package adds."""
         parameters: Mapping[str, Parameter] = REFERENCES[self.kind].parameters
         return parameters
 
     def mirrored(self) -> Reference:
-        """The same motion to the other side."""
-        turned = {name: -self.value(name) for name, each in self.added().items() if each.mirrors}
+        """Reference with the same motion to the other side."""
+        turned = {name: -self.value(name) for name, parameter in self.added().items() if parameter.mirrors}
         return self.model_copy(
             update={
                 **turned,
@@ -166,23 +166,23 @@ class Scenario(Section):
     reference: Reference = Reference()
 
 
+# Built-in loops (PAPER C5): model = plant in nearly continuous time, the same sampled, and the four-segment plant.
 LOOPS: dict[str, Loop] = {
     "exact": Loop(plant_segments=1, control_period=1e-6, limits=False),
     "sampled": Loop(plant_segments=1),
     "default": Loop(),
 }
-"""Built-in loops (PAPER C5): model = plant in nearly continuous time, the same sampled, and the four-segment plant."""
 
 
-def _from_built_in(given: Any) -> Any:
+def _from_built_in(loops: Any) -> Any:
     """Loops as given; what a loop with a built-in one's name leaves out is that one's."""
-    if not isinstance(given, Mapping):
-        return given
+    if not isinstance(loops, Mapping):
+        return loops
     built_in = {name: loop.model_dump(exclude_unset=True) for name, loop in LOOPS.items()}
     return {
-        name: {**built_in.get(name, {}), **loop} if isinstance(loop, Mapping) else loop for name, loop in given.items()
+        name: {**built_in.get(name, {}), **loop} if isinstance(loop, Mapping) else loop for name, loop in loops.items()
     }
 
 
+# Loops by name. Those given are all there are: a study that names its loops is judged on these and no others.
 Loops = Annotated[dict[str, Loop], BeforeValidator(_from_built_in)]
-"""Loops by name. Those given are all there are: a study that names its loops is judged on these and no others."""

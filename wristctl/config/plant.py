@@ -1,4 +1,4 @@
-"""What stands between a command and a measurement, and what the simulated world is where that is another."""
+"""Motors, tendons and camera between command and measurement, and how the simulated world differs from the model."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choi
 _SCALE = re.compile(r"x ?([0-9]+\.?[0-9]*(?:e[+-]?[0-9]+)?)", re.IGNORECASE)
 
 
-def _scale(given: str) -> str:
-    found = _SCALE.fullmatch(given)
-    if found is None or float(found[1]) <= 0.0:
+def _scale(text: str) -> str:
+    match = _SCALE.fullmatch(text)
+    if match is None or float(match[1]) <= 0.0:
         raise PydanticCustomError("scale", "Input should be a number, or a multiple of what is believed, as x1.05")
-    return given
+    return text
 
 
 Scale = Annotated[str, AfterValidator(_scale)]
 Positive = Annotated[float, Field(gt=0)] | Scale | None
+# A leaf as it is: a value, a multiple of the believed one, or None where it is as believed.
 NotNegative = Annotated[float, Field(ge=0)] | Scale | None
-"""A leaf as it is: a value, a multiple of the believed one, or None where it is as believed."""
 
 
 def truth(unit: str, meaning: str) -> Any:
@@ -49,13 +49,13 @@ def unsaid(default: Overrides) -> Any:
     return Field(default, json_schema_extra={"unsaid": True})
 
 
-def actual(believed: Any, given: Any) -> Any:
+def actual(believed: Any, difference: Any) -> Any:
     """A leaf as it is, from what is believed of it and what was given."""
-    if given is None:
+    if difference is None:
         return believed
-    if isinstance(given, str):
-        return type(believed)(believed * float(given.lower().removeprefix("x")))
-    return given
+    if isinstance(difference, str):
+        return type(believed)(believed * float(difference.lower().removeprefix("x")))
+    return difference
 
 
 def is_unsaid(field: FieldInfo) -> bool:
@@ -77,16 +77,16 @@ class Overrides(Section):
 
     @classmethod
     def between(cls, believed: Any, actual: Any) -> Self:
-        """What is true of a section, where it is not as in the other."""
-        own = {n: f for n, f in cls.model_fields.items() if n in type(actual).model_fields}
-        known = {n: getattr(believed, n, f.default) for n, f in own.items()}
-        return cls(**{n: getattr(actual, n) for n in own if getattr(actual, n) != known[n]})
+        """Leaves in which the actual section differs from the believed one."""
+        shared_fields = {n: f for n, f in cls.model_fields.items() if n in type(actual).model_fields}
+        believed_values = {n: getattr(believed, n, f.default) for n, f in shared_fields.items()}
+        return cls(**{n: getattr(actual, n) for n in shared_fields if getattr(actual, n) != believed_values[n]})
 
     def of(self, believed: Any) -> Any:
         """The other section with what is true of it."""
         kind: type[Section] = type(believed)
-        given = {name: value for name in _shared(type(self), kind) if (value := getattr(self, name)) is not None}
-        changed = {name: actual(getattr(believed, name), each) for name, each in given.items()}
+        differences = {name: value for name in _shared(type(self), kind) if (value := getattr(self, name)) is not None}
+        changed = {name: actual(getattr(believed, name), difference) for name, difference in differences.items()}
         return believed.model_copy(update=changed) if changed else believed
 
     @model_serializer(mode="wrap")
@@ -95,7 +95,7 @@ class Overrides(Section):
         unsaid = {key for key, field in fields.items() if is_unsaid(field)}
         written = handler(self)
         return {
-            key: each for key, each in written.items() if key not in unsaid or each not in (fields[key].default, {})
+            key: entry for key, entry in written.items() if key not in unsaid or entry not in (fields[key].default, {})
         }
 
 
@@ -103,7 +103,7 @@ PlantName = Annotated[str, OneOf(PLANTS)]
 
 
 class TendonFacts(Section):
-    """What tendons on their spools do that no controller believes; all of the tendon level."""
+    """Effects of tendons on spools that no controller models."""
 
     backlash: float = fact(0.0, "m", "dead band between motor and tendon; homing leaves it where it reels in", ge=0)
     creep: float = fact(0.0, "", "share of a tendon's stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
@@ -172,7 +172,7 @@ class TrueWrist(Overrides):
 
 
 class Plant(TrueWrist):
-    """How the simulated world differs from the one that its controller knows: wrist, motors with tendons, camera."""
+    """Differences of the simulated world from the controller's model: wrist, motors with tendons, camera."""
 
     actuator: TrueActuator = unsaid(TrueActuator())
     sensor: TrueSensor = unsaid(TrueSensor())
@@ -195,16 +195,16 @@ class Drift(Section):
 
 
 class Disturbances(OpenSection):
-    """What acts on the wrist unknown to its controller."""
+    """Disturbances of the wrist, unknown to its controller."""
 
     push: Push = Push()
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
     drift: Drift = Drift()
 
     def added(self) -> Mapping[str, Parameter]:
-        """What disturbances from elsewhere add."""
-        own = (name for name in DISTURBANCES if name not in type(self).model_fields)
-        return {name: each for kind in own for name, each in DISTURBANCES[kind].parameters.items()}
+        """Parameters that disturbances from outside the package add."""
+        added_names = (name for name in DISTURBANCES if name not in type(self).model_fields)
+        return {name: parameter for kind in added_names for name, parameter in DISTURBANCES[kind].parameters.items()}
 
 
 class Actuator(Section):

@@ -45,11 +45,11 @@ class OneOf:
             if not file.is_file():
                 raise PydanticCustomError("added_value", "no file {file}", {"file": str(file)})
         elif self.table.group and name.endswith(".py"):
-            told = {"file": name, "what": self.table.what}
-            raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", told)
+            context = {"file": name, "what": self.table.what}
+            raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", context)
         elif name not in self.table:
-            *others, last = (f"'{each}'" for each in self.table.known())
-            expected = f"{', '.join(others)} or {last}" if others else last
+            *first_names, last = (f"'{name}'" for name in self.table.known())
+            expected = f"{', '.join(first_names)} or {last}" if first_names else last
             raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
         return name
 
@@ -72,28 +72,28 @@ class OpenSection(Section):
     model_config = ConfigDict(extra="allow")
 
     def __hash__(self) -> int:
-        """Of what is added too, which pydantic leaves out: a sweep over it would fill one place of every cache."""
+        """Hash that includes added parameters. Pydantic leaves them out, and points of a sweep would collide."""
         return hash((*self.__dict__.values(), frozenset((self.model_extra or {}).items())))
 
     def added(self) -> Mapping[str, Parameter]:
-        """What entries of the table add to this section, by name."""
+        """Parameters that entries of the table add to this section, by name."""
         raise NotImplementedError
 
     def value(self, name: str) -> float:
-        """What was given of an added parameter, or its default."""
-        given: float = (self.model_extra or {}).get(name, self.added()[name].default)
-        return given
+        """Value of an added parameter, or its default."""
+        number: float = (self.model_extra or {}).get(name, self.added()[name].default)
+        return number
 
     @model_validator(mode="after")
     def _nothing_unknown(self) -> Self:
         extra = self.model_extra or {}
         added = self.added() if extra else {}
-        for key, given in extra.items():
+        for key, entry in extra.items():
             if key not in added:
                 fields = {field.alias or name for name, field in type(self).model_fields.items()}
-                known = sorted({*fields, *added})
-                raise PydanticCustomError("extra_forbidden", "unknown key", {"key": key, "known": known})
-            if isinstance(given, bool) or not isinstance(given, int | float):
-                told = {"key": key, "given": repr(given)}
-                raise PydanticCustomError("added_value", "{given} should be a number", told)
+                allowed = sorted({*fields, *added})
+                raise PydanticCustomError("extra_forbidden", "unknown key", {"key": key, "known": allowed})
+            if isinstance(entry, bool) or not isinstance(entry, int | float):
+                context = {"key": key, "given": repr(entry)}
+                raise PydanticCustomError("added_value", "{given} should be a number", context)
         return self

@@ -57,6 +57,6 @@ class Study(Section):
         """A family's name is part of the names of files of a run."""
         for name in families:
             if not re.fullmatch(r"[\w+-][\w .+-]{0,59}", name):
-                what = "{name} is no name for a family: letters, digits, spaces and . _ + - only, at most 60"
-                raise PydanticCustomError("family_name", what, {"name": repr(name)})
+                problem = "{name} is no name for a family: letters, digits, spaces and . _ + - only, at most 60"
+                raise PydanticCustomError("family_name", problem, {"name": repr(name)})
         return families

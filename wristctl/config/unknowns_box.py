@@ -1,4 +1,4 @@
-"""What the paper leaves open, as a box: of each leaf a range or named alternatives, and why."""
+"""Unknowns of the paper as a box: a range or named alternatives for each leaf, with the reason."""
 
 import math
 from collections.abc import Mapping
@@ -12,12 +12,12 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.wrist import WristParameters
 
+# Sources of angle and rate for the law: true values, the rate as a difference of angles, or both from the observer.
 MEASURED = ("ideal", "differenced", "observer")
-"""How angle and rate come to the law: as they are, the rate as a difference of angles, or both from the observer."""
 
 _ROOTS = ("wrist", "loop", "reference")
+# Unknowns that rollouts of one batch share: every combination of them is drawn as often.
 STRATA = ("loop.plant_segments", "loop.control_period", "measured")
-"""Unknowns that rollouts of one batch share: every combination of them is drawn as often."""
 
 
 class Unstated(Section):
@@ -38,7 +38,7 @@ class Unstated(Section):
         return self
 
     def at(self, share: float) -> tuple[Any, Mapping[str, Any] | None]:
-        """What it is at a share of [0, 1), and the leaves that an alternative sets."""
+        """Value at a share of [0, 1), and the leaves that an alternative sets."""
         if self.draw is None:
             assert self.one_of
             name = list(self.one_of)[min(int(share * len(self.one_of)), len(self.one_of) - 1)]
@@ -57,7 +57,7 @@ class PaperSetting(NamedTuple):
     horizon: float
     measured: str
     values: Mapping[str, Any]
-    """Of each unknown, by its name."""
+    """Values of the unknowns, by name."""
 
 
 class Box(Section):
@@ -75,8 +75,8 @@ class Box(Section):
         for name, unknown in self.unknowns.items():
             values[name], leaves = unknown.at(shares[name])
             for leaf, value in ({name: values[name]} if leaves is None else leaves).items():
-                root, _, rest = leaf.partition(".")
-                _put(data[root] if root in _ROOTS else data[""], rest if root in _ROOTS else leaf, value)
+                root, _, below_root = leaf.partition(".")
+                _put(data[root] if root in _ROOTS else data[""], below_root if root in _ROOTS else leaf, value)
         measured, horizon = data[""].pop("measured", "ideal"), data[""].pop("horizon", self.horizon)
         if data[""]:
             leaf = next(iter(data[""]))
@@ -94,15 +94,17 @@ class Box(Section):
         for key in self.unknowns:
             for share in (0.0, 1.0 - 1e-12):
                 try:
-                    found = self.setting(WristParameters(), dict.fromkeys(self.unknowns, 0.5) | {key: share})
+                    setting = self.setting(WristParameters(), dict.fromkeys(self.unknowns, 0.5) | {key: share})
                 except ValidationError as error:
                     why = error.errors()[0]
                     leaf = ".".join(map(str, why["loc"]))
-                    said = f"there is no leaf {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
-                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": said}) from error
-                if found.measured not in MEASURED or found.horizon > self.horizon:
-                    said = f"measured is one of {', '.join(MEASURED)}, and horizon at most {self.horizon:g} s"
-                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": said})
+                    reason = f"there is no leaf {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
+                    raise PydanticCustomError(
+                        "draw", "cannot draw {key}: {why}", {"key": key, "why": reason}
+                    ) from error
+                if setting.measured not in MEASURED or setting.horizon > self.horizon:
+                    reason = f"measured is one of {', '.join(MEASURED)}, and horizon at most {self.horizon:g} s"
+                    raise PydanticCustomError("draw", "cannot draw {key}: {why}", {"key": key, "why": reason})
         return self
 
 

@@ -1,4 +1,4 @@
-"""What the camera sees and how it is read: markers, gates, the rendered scene, calibration, recordings."""
+"""Vision: markers, gates, the rendered scene, calibration, recordings."""
 
 from typing import Literal, Self
 
@@ -34,7 +34,7 @@ class Markers(Section):
 
 
 class Gates(Section):
-    """What a sighting must pass before its angle is used."""
+    """Gates that a sighting must pass before its angle is used."""
 
     rate: float = quantity(21.0, "rad/s", "largest rate from one used frame to the next",
                            "20,000 steps/s of tendon over its lever", gt=0)  # fmt: skip
@@ -82,7 +82,7 @@ class CharucoBoard(Section):
 
 
 class Device(Section):
-    """What is asked of a camera device, and read back; null leaves it as it is."""
+    """Settings of a camera device, read back after they are set. Null leaves a setting as it is."""
 
     fourcc: str | None = choice(
         None, "pixel format: MJPG gives most webcams their full rate", min_length=4, max_length=4

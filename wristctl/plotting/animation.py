@@ -1,4 +1,4 @@
-"""What the page's animation plays: the wrist's segment angles over time, as logged."""
+"""Data of the page's animation: the wrist's segment angles over time, as logged."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from wristctl.records.run import Run
 if TYPE_CHECKING:
     import numpy as np
 
+# Pictures a second; the page interpolates between them.
 FRAMES = 25.0
-"""Pictures a second; the page interpolates between them."""
+# Angles are whole numbers of 0.1 mrad: an eighth of a pixel at the tip.
 _PLACES = 1e4
-"""Angles are whole numbers of 0.1 mrad: an eighth of a pixel at the tip."""
 
 
 def animation(run: Run) -> dict[str, Any] | None:
@@ -80,17 +80,19 @@ def _single(run: Run) -> tuple[list[Named], np.ndarray]:
         names, *rows = csv.reader(file)
     numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
     table = dict(zip(names, numbers.T, strict=True))
-    own = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
+    angle_columns = [name for name in table if name.removeprefix("theta_").isdigit()] or ["theta"]
     settings = getattr(run.config, run.kind.replace("-", "_"))
     if settings.loop.plant.model != "pcc":
         return [], table["time"]
     gains = settings.gains if isinstance(settings.gains, str) else "own gains"
     name = ("", f"{settings.controller}/{gains}", settings.controller)
-    return [(*name, np.stack([table[each] for each in own], axis=1), table["theta_desired"])], table["time"]
+    return [(*name, np.stack([table[column] for column in angle_columns], axis=1), table["theta_desired"])], table[
+        "time"
+    ]
 
 
 def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
-    """Each whole trial on the control grid: the true segments where known, else the estimate as one segment."""
+    """Complete trials on the control grid: the true segment angles where logged, else the estimate as one segment."""
     import numpy as np
 
     trials, log = run.data("trials"), run.data("log")
@@ -100,9 +102,9 @@ def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
     courses = []
     for row in trials[trials["outcome"] == "ok"].to_dict("records"):
         course = log[log["trial"] == row["trial"]]
-        known = course if truth is None else truth[truth["trial"] == row["trial"]]
-        own = [name for name in known.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
-        bent = np.stack([np.interp(time, known["time"], known[name]) for name in own], axis=-1)
+        angles = course if truth is None else truth[truth["trial"] == row["trial"]]
+        angle_columns = [name for name in angles.columns if name.removeprefix("theta_").isdigit()] or ["theta"]
+        bent = np.stack([np.interp(time, angles["time"], angles[name]) for name in angle_columns], axis=-1)
         wanted = np.interp(time, course["time"], course["theta_desired"])
         group = row["direction"] + (f", pushed with {row['push']:g} N" if row["push"] else "")
         name = f"{row['controller']}/{row['gains']}"
@@ -117,13 +119,13 @@ def _course(group: str, name: str, controller: str, bent: np.ndarray, wanted: np
     from wristctl.plotting.style import colour
 
     shown = bent[::step, ~np.isnan(bent[0])]
-    whole = np.isfinite(shown).all(axis=1) & (np.abs(shown.sum(axis=1)) < np.pi)
-    shown = shown[: len(shown) if whole.all() else int(np.argmin(whole))]
+    drawable = np.isfinite(shown).all(axis=1) & (np.abs(shown.sum(axis=1)) < np.pi)
+    shown = shown[: len(shown) if drawable.all() else int(np.argmin(drawable))]
     return {
         "group": group,
         "name": name,
         "colour": colour(controller),
-        "diverged": not whole.all(),
+        "diverged": not drawable.all(),
         "theta": np.round(_PLACES * shown).astype(int).tolist(),
         "wanted": np.round(_PLACES * wanted[::step]).astype(int).tolist(),
     }

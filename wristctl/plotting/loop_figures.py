@@ -26,12 +26,12 @@ from wristctl.plotting.style import (
 from wristctl.simulation.repetitions import Repeated
 from wristctl.simulation.trajectory import Trajectory
 
+# Errors below this [rad] are not shown on a logarithmic axis.
 _SMALLEST = 1e-8
-"""Errors below this [rad] are not shown on a logarithmic axis."""
+# Samples in the close-up of tensions.
 _LAST = 20
-"""Samples in the close-up of tensions."""
+# Parts of a long course of which each is drawn by its least and its largest value.
 _COLUMNS = 500
-"""Parts of a long course of which each is drawn by its least and its largest value."""
 
 
 def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
@@ -40,17 +40,17 @@ def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     The reference is drawn on its own where it differs from the desired angle (a network's error), and so is what the
     controller sees where that differs from the angle (a camera's delay).
     """
-    made, ((axes,),) = figure(height=3.4)
+    picture, ((axes,),) = figure(height=3.4)
     for course in trajectories:
         axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
-        if (seen := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, np.degrees(seen), label=f"{course.label} as seen", **THIN)
+        if (measured := _apart(course.seen, course.theta)) is not None:
+            axes.plot(course.time, np.degrees(measured), label=f"{course.label} as seen", **THIN)
     draw_desired(axes, trajectories)
     within_half_a_move(axes, trajectories)
     axes.set(xlabel="time [s]", ylabel="bending angle [deg]")
     title(axes, heading)
-    legend_below(made)
-    return made
+    legend_below(picture)
+    return picture
 
 
 def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = False) -> Figure:
@@ -58,12 +58,12 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
 
     Beside it, but not with `log`, the error that the controller sees where that differs (a camera's delay and noise).
     """
-    made, ((axes,),) = figure(height=3.4)
+    picture, ((axes,),) = figure(height=3.4)
     for course in trajectories:
         error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
         axes.plot(course.time, error, label=label(course), **line(course.label))
-        if not log and (seen := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, seen - course.theta_ref, label=f"{course.label} as seen", **THIN)
+        if not log and (measured := _apart(course.seen, course.theta)) is not None:
+            axes.plot(course.time, measured - course.theta_ref, label=f"{course.label} as seen", **THIN)
     if log:
         logarithmic(axes.yaxis)
     else:
@@ -72,8 +72,8 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
         _at_most(axes, -2.0 * size - 0.01, 2.0 * size + 0.01)
     axes.set(xlabel="time [s]", ylabel="|error| [rad]" if log else "error [rad]")
     title(axes, heading)
-    legend_below(made)
-    return made
+    legend_below(picture)
+    return picture
 
 
 def tensions(trajectory: Trajectory) -> Figure:
@@ -82,25 +82,29 @@ def tensions(trajectory: Trajectory) -> Figure:
     Where tensions do not act as they are commanded (lag, steps, elastic tendons) both are drawn.
     On the right the last samples alone, so that tensions which jump at every tick can be told from a filled area.
     """
-    made, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
+    picture, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
     acting = _apart(trajectory.acting, trajectory.tension)
-    largest = max(float(np.nanmax(each)) for each in (trajectory.tension, acting) if each is not None)
+    largest = max(
+        float(np.nanmax(tensions_of_side))
+        for tensions_of_side in (trajectory.tension, acting)
+        if tensions_of_side is not None
+    )
     end = float(trajectory.time[-1])
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
-        for each, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
+        for panel, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
             drawn = envelope(time[part], tension[part])
-            each.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
-        for each, tension in zip(column, () if acting is None else acting.T, strict=False):
-            each.plot(*envelope(time[part], tension[part]), label="acting", **THIN)
+            panel.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
+        for panel, tension in zip(column, () if acting is None else acting.T, strict=False):
+            panel.plot(*envelope(time[part], tension[part]), label="acting", **THIN)
         wanted = {"color": GREY, "label": "wanted by the law"}
-        given = {"color": BLACK, "label": "of the commanded tensions"}
-        for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, given)):
+        acting_style = {"color": BLACK, "label": "of the commanded tensions"}
+        for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, acting_style)):
             column[2].step(*envelope(time[part], torque[part]), linewidth=1.0, where="post", **style)
-    for each, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
-        each.set_ylabel(name)
-    for each in axes[:2, 0]:
-        each.set_ylim(0.0, 1.05 * largest)
+    for panel, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
+        panel.set_ylabel(name)
+    for panel in axes[:2, 0]:
+        panel.set_ylim(0.0, 1.05 * largest)
     size = 2.0 * float(np.nanmax(np.abs(trajectory.torque), initial=1e-3))
     _at_most(axes[2, 0], -size, size)
     axes[2, 0].set_xlabel("time [s]")
@@ -110,25 +114,28 @@ def tensions(trajectory: Trajectory) -> Figure:
     if acting is not None:
         legend(axes[1, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     legend(axes[2, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-    return made
+    return picture
 
 
 def envelope(time: Array, course: Array) -> tuple[Array, Array]:
-    """What a picture can show of a course (T,) that jumps at every sample: each part's least and largest value."""
-    each = len(time) // _COLUMNS
-    if each < 4:
+    """Envelope of a course (T,) that jumps at every sample: the least and largest value of each part."""
+    samples_per_column = len(time) // _COLUMNS
+    if samples_per_column < 4:
         return time, course
-    whole = each * _COLUMNS
-    parts = course[:whole].reshape(_COLUMNS, each)
-    ends = np.stack([parts.argmin(axis=1), parts.argmax(axis=1)], axis=1) + each * np.arange(_COLUMNS)[:, None]
-    kept = np.unique(np.append(ends, np.arange(whole, len(time))))
+    covered = samples_per_column * _COLUMNS
+    parts = course[:covered].reshape(_COLUMNS, samples_per_column)
+    ends = (
+        np.stack([parts.argmin(axis=1), parts.argmax(axis=1)], axis=1)
+        + samples_per_column * np.arange(_COLUMNS)[:, None]
+    )
+    kept = np.unique(np.append(ends, np.arange(covered, len(time))))
     return time[kept], course[kept]
 
 
-def _apart(other: Array | None, known: Array) -> Array | None:
+def _apart(angle: Array | None, true_angle: Array) -> Array | None:
     """The other course if it is not the known one, to a millionth of its size."""
-    size = 1e-6 * float(np.nanmax(np.abs(known), initial=1e-6))
-    return None if other is None or np.allclose(other, known, rtol=0.0, atol=size, equal_nan=True) else other
+    size = 1e-6 * float(np.nanmax(np.abs(true_angle), initial=1e-6))
+    return None if angle is None or np.allclose(angle, true_angle, rtol=0.0, atol=size, equal_nan=True) else angle
 
 
 def label(trajectory: Trajectory) -> str:
@@ -142,7 +149,7 @@ def draw_desired(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     axes.plot(trajectories[0].time, np.degrees(wanted), **WANTED)
     drawn = [wanted]
     for course in trajectories:
-        if not any(np.allclose(course.theta_ref, other, atol=1e-6) for other in drawn):
+        if not any(np.allclose(course.theta_ref, earlier, atol=1e-6) for earlier in drawn):
             drawn.append(course.theta_ref)
             axes.plot(course.time, np.degrees(course.theta_ref), label="reference", **DOTTED)
 
@@ -166,16 +173,16 @@ def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
 
     A repetition that diverged counts as the largest error; with fewer than six there is no band.
     """
-    made, ((axes,),) = figure(height=3.4)
-    for each in repeated:
-        course, errors = each.first.trajectory, np.abs(each.errors)
+    picture, ((axes,),) = figure(height=3.4)
+    for loop in repeated:
+        course, errors = loop.first.trajectory, np.abs(loop.errors)
         median, low, high = spread_over_time(errors)
         style = line(course.label)
-        label = course.label + (f", {each.failed.sum()} failed" if each.failed.any() else "")
+        label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")
         axes.plot(course.time, np.where(np.isfinite(median), median, np.nan), label=label, **style)
         axes.fill_between(course.time, low, high, color=style["color"], alpha=0.25, linewidth=0.0)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     axes.set(xlabel="time [s]", ylabel=f"median |error| of {len(repeated[0].errors)} [rad]")
     title(axes, heading)
-    legend_below(made)
-    return made
+    legend_below(picture)
+    return picture

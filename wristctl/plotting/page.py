@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 _DIGITS = re.compile(r"\.\d{3,}")
 _PATH = re.compile(r'(?<= d=")[^"]*')
+# Characters of an SVG beyond which its PNG is smaller and quicker to show.
 LARGEST = 300_000
-"""Characters of an SVG beyond which its PNG is smaller and quicker to show."""
 
 
 def inline_figure(svg: Path) -> str:
@@ -57,12 +57,12 @@ def lineage_picture(tree: Ancestor) -> str:
     columns = {name: _depth(node) for name, node in nodes.items()}
     rows: dict[str, int] = {}
     for name in sorted(nodes, key=lambda name: (columns[name], name)):
-        rows[name] = sum(columns[other] == columns[name] for other in rows)
+        rows[name] = sum(columns[other_name] == columns[name] for other_name in rows)
     width = (max(columns.values()) + 1) * (_WIDTH + _GAP) - _GAP + 4
     height = (max(rows.values()) + 1) * _ROW
     place = {name: (2 + columns[name] * (_WIDTH + _GAP), 6 + rows[name] * _ROW) for name in nodes}
     parts = [_arrow(place[start], place[end]) for start, end in edges]
-    parts += [_box(node, *place[name], own=name == tree.id) for name, node in nodes.items()]
+    parts += [_box(node, *place[name], is_root=name == tree.id) for name, node in nodes.items()]
     return (
         f'<svg class="lineage" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" '
         f'aria-label="lineage">{"".join(parts)}</svg>'
@@ -71,9 +71,9 @@ def lineage_picture(tree: Ancestor) -> str:
 
 def _collect(node: Ancestor, nodes: dict[str, Ancestor], edges: dict[tuple[str, str], str]) -> None:
     nodes[node.id] = node
-    for each in node.inputs:
-        edges[each.id, node.id] = each.role
-        _collect(each, nodes, edges)
+    for ancestor in node.inputs:
+        edges[ancestor.id, node.id] = ancestor.role
+        _collect(ancestor, nodes, edges)
 
 
 def _depth(node: Ancestor) -> int:
@@ -87,11 +87,11 @@ def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:
     return f'<path class="edge" d="{line}"/><path class="head" d="M{to_x} {to_y}l-8 -4v8z"/>'
 
 
-def _box(node: Ancestor, x: int, y: int, own: bool) -> str:
+def _box(node: Ancestor, x: int, y: int, is_root: bool) -> str:
     kind = escape(_WORDS.get(node.kind, node.kind))
     name = printable(node.id)
     short = escape(name if len(name) <= 26 else f"{name[:16]} … {name[-6:]}")
-    mark = ' class="own"' * own + ' class="odd"' * (not own and node.state != "ok")
+    mark = ' class="own"' * is_root + ' class="odd"' * (not is_root and node.state != "ok")
     state = "" if node.state == "ok" else f" ({escape(node.state)})"
     return (
         f"<g{mark}><title>{escape(name)}</title><rect x='{x}' y='{y}' width='{_WIDTH}' height='{_HEIGHT}' rx='6'/>"
@@ -100,11 +100,11 @@ def _box(node: Ancestor, x: int, y: int, own: bool) -> str:
     )
 
 
+# Headline numbers shown where the command names none.
 _CARDS = 6
-"""Headline numbers shown where the command names none."""
 
+# Figures of a page: name, caption and data URL.
 Figures = list[tuple[str, str, str]]
-"""Name, caption and data URL."""
 
 
 def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
@@ -113,7 +113,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
     `beside` is a folder of figures that were drawn later.
     """
     overview, drawn = read_overview(run.path), figures(run, beside)
-    there = {name for name, *_ in drawn}
+    drawn_names = {name for name, *_ in drawn}
     return render(
         "run.html",
         heading=run.id,
@@ -124,13 +124,13 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
         tables=tables(run),
-        figures=[each for each in drawn if each[0] != overview.figure],
-        first=[each for each in drawn if each[0] == overview.figure],
-        undrawn=[caption or name for name, caption in overview.captions.items() if name not in there],
+        figures=[picture for picture in drawn if picture[0] != overview.figure],
+        first=[picture for picture in drawn if picture[0] == overview.figure],
+        undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
         animation=animation(run),
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
         provenance=_provenance(manifest),
-        files=[(each.path, each.bytes, each.sha256, not each.volatile) for each in manifest.outputs],
+        files=[(output.path, output.bytes, output.sha256, not output.volatile) for output in manifest.outputs],
         config=run.file(CONFIG).read_text(encoding="utf-8", errors="replace"),
     )
 
@@ -145,20 +145,22 @@ def _templates() -> Environment:
     from jinja2 import Environment, FileSystemLoader
 
     folder = Path(__file__).parent / "templates"
-    made = Environment(
+    environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
     )
-    made.filters["cell"] = _cell
-    scripts = [made.get_template(each.name).render().encode() for each in sorted(folder.glob("*.js"))]
+    environment.filters["cell"] = _cell
+    scripts = [environment.get_template(script.name).render().encode() for script in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
-    made.globals["allowed"] = " ".join(f"'sha256-{each}'" for each in hashes)  # no other script runs in a page
-    return made
+    environment.globals["allowed"] = " ".join(
+        f"'sha256-{digest}'" for digest in hashes
+    )  # no other script runs in a page
+    return environment
 
 
 def figures(run: Run, beside: Path | None = None) -> Figures:
     """Name, caption and data URL of each figure of a run, in reading order where the run has one, then by name."""
     captions = read_overview(run.path).captions
-    order = {name: at for at, name in enumerate(captions)}
+    order = {name: position for position, name in enumerate(captions)}
     folders = [run.path / "figures", *([beside] if beside else [])]
     files = [file for folder in folders for file in folder.glob("*.svg") if not file.is_symlink()]
     files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
@@ -166,7 +168,7 @@ def figures(run: Run, beside: Path | None = None) -> Figures:
 
 
 def _shown(value: Any) -> Any:
-    """What stands in a page, which somebody may look at in a terminal: texts without what that obeys."""
+    """Value for a page, with terminal control characters removed from texts."""
     return printable_lines(value) if type(value) is str else value
 
 
@@ -182,15 +184,15 @@ def _cell(value: Any) -> str:
 
 def _headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
     """The metrics that the command chose; where it chose none, the first that may be better or worse."""
-    known = {name: each for name, each in metrics.items() if each["value"] is not None}
-    chosen = [name for name in cards if name in known]
-    chosen = chosen or [name for name, each in known.items() if each.get("better")] or list(known)
-    return [(name, known[name]) for name in chosen[:_CARDS]]
+    with_value = {name: metric for name, metric in metrics.items() if metric["value"] is not None}
+    chosen = [name for name in cards if name in with_value]
+    chosen = chosen or [name for name, metric in with_value.items() if metric.get("better")] or list(with_value)
+    return [(name, with_value[name]) for name in chosen[:_CARDS]]
 
 
 def _metrics(run: Run) -> list[tuple[Any, ...]]:
     kept = ("value", "unit", "better", "n", "meaning")
-    return [(name, *(each.get(key) for key in kept)) for name, each in run.metrics.items()]
+    return [(name, *(metric.get(key) for key in kept)) for name, metric in run.metrics.items()]
 
 
 def tables(run: Run) -> list[dict[str, Any]]:
@@ -199,20 +201,20 @@ def tables(run: Run) -> list[dict[str, Any]]:
         return []
     file = run.file(TABLES)
     try:
-        found = json.loads(file.read_bytes())
+        stored = json.loads(file.read_bytes())
     except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, list) or not all(map(_is_table, found)):
+        stored = None
+    if not isinstance(stored, list) or not all(map(_is_table, stored)):
         again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
         raise UserError("no tables as wristctl writes them", str(file), again)
-    return found
+    return stored
 
 
-def _is_table(found: object) -> bool:
+def _is_table(stored: object) -> bool:
     """Whether a page can show it: a title, names of columns and rows of cells."""
-    if not isinstance(found, dict) or not isinstance(found.get("title"), str):
+    if not isinstance(stored, dict) or not isinstance(stored.get("title"), str):
         return False
-    columns, rows = found.get("columns"), found.get("rows")
+    columns, rows = stored.get("columns"), stored.get("rows")
     if not isinstance(columns, list) or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
         return False
     return not any(isinstance(cell, list | dict) for row in (columns, *rows) for cell in row)
@@ -225,7 +227,7 @@ def _provenance(manifest: Manifest) -> list[tuple[str, str]]:
     return [
         ("command", shlex.join(manifest.argv)),
         ("code", f"wristctl {code.version}{commit}, tree {code.tree_sha256[:12]}"),
-        *((f"input {each.role}", f"{each.run}, result {each.result_sha256[:12]}") for each in manifest.inputs),
+        *((f"input {record.role}", f"{record.run}, result {record.result_sha256[:12]}") for record in manifest.inputs),
         ("configuration", manifest.config_sha256),
         ("fingerprint", manifest.fingerprint),
         ("result", manifest.result_sha256 or ""),
@@ -261,14 +263,14 @@ def several_page(runs: list[Run]) -> str:
 
 def _differences(runs: list[Run]) -> list[dict[str, Any]]:
     """A table for each part that differs: a row per leaf or metric, a column per run."""
-    first, *others = runs
-    found = [vars(difference(first, other)) for other in others]
+    first, *later_runs = runs
+    differences = [vars(difference(first, later_run)) for later_run in later_runs]
     tables = []
     for part, title in _TITLES.items():
-        names = list(dict.fromkeys(change.name for each in found for change in each[part]))
+        names = list(dict.fromkeys(change.name for parts in differences for change in parts[part]))
         rows = []
         for name in names:
-            changes = [next((change for change in each[part] if change.name == name), None) for each in found]
+            changes = [next((change for change in parts[part] if change.name == name), None) for parts in differences]
             before = next(change.before for change in changes if change)
             values = [before, *(change.after if change else before for change in changes)]
             rows.append((name, *(value if part == "metrics" else str(value) for value in values)))
@@ -279,8 +281,8 @@ def _differences(runs: list[Run]) -> list[dict[str, Any]]:
 
 def _pictures(runs: list[Run]) -> list[tuple[str, Figures]]:
     """The figures by name, each with one picture per run that has it."""
-    found: dict[str, Figures] = {}
+    pictures: dict[str, Figures] = {}
     for run in runs:
         for _, caption, picture in figures(run):
-            found.setdefault(caption, []).append((run.id, run.id, picture))
-    return list(found.items())
+            pictures.setdefault(caption, []).append((run.id, run.id, picture))
+    return list(pictures.items())

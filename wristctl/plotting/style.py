@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
+# Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted.
 BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
-"""Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted."""
+# From Tol's muted scheme, for what Okabe and Ito's eight do not reach.
 INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
-"""From Tol's muted scheme, for what Okabe and Ito's eight do not reach."""
 
+# Width of a figure [in]; text is 9 to 10 points.
 WIDTH = 7.0
-"""Width of a figure [in]; text is 9 to 10 points."""
 
 _CONTROLLERS = {
     "smc": BLUE,
@@ -51,10 +51,10 @@ _CONTROLLERS = {
     "smc-dob": "#762a83",
 }
 _OTHERS = (OLIVE, FOREST, ROSE)
+# Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own.
 WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
-"""Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own."""
+# Line style of what differs a little from a line beside it: seen, not so; acting, not commanded.
 THIN: dict[str, Any] = {"color": BLACK, "linewidth": 0.7}
-"""Line style of what differs a little from a line beside it: seen, not so; acting, not commanded."""
 DOTTED: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": ":"}
 SIMULATED: dict[str, Any] = {"linewidth": 1.0, "linestyle": ":"}
 DISTORTED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
@@ -72,10 +72,10 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.4}
 
 
+# Width [in] that figures are drawn for now; None: their own.
 _PAPER: ContextVar[float | None] = ContextVar("_PAPER", default=None)
-"""Width [in] that figures are drawn for now; None: their own."""
+# Scale of letters in a column of a page, and the width [in] below which a figure fills a column.
 _SMALLEST, _PRINTED = 0.72, 6.0
-"""How much smaller letters are in a column, and the width [in] below which that is one."""
 
 
 @contextmanager
@@ -88,24 +88,24 @@ def for_paper(width: float | None) -> Iterator[None]:
         _PAPER.reset(token)
 
 
-def columns_within(wanted: int, each: float) -> int:
-    """How many of the wanted panels stand side by side, where each needs this width [in] beside 1.5 for names."""
-    return max(1, min(wanted, int(((_PAPER.get() or WIDTH) - 1.5) / each)))
+def columns_within(wanted: int, panel_width: float) -> int:
+    """Number of panels side by side, where one panel needs `panel_width` [in] beside 1.5 in for names."""
+    return max(1, min(wanted, int(((_PAPER.get() or WIDTH) - 1.5) / panel_width)))
 
 
-def fit(made: Figure) -> None:
+def fit(picture: Figure) -> None:
     """Give a figure that was laid out for a narrow column letters and marks of that size."""
     width = _PAPER.get()
     if width is None or width >= _PRINTED:
         return
-    for text in made.findobj(Text):
+    for text in picture.findobj(Text):
         text.set_fontsize(_SMALLEST * float(text.get_fontsize()))
-    for axes in made.axes:
+    for axes in picture.axes:
         for axis in (axes.xaxis, axes.yaxis):
             for which in ("major", "minor"):
                 size = axis.get_tick_params(which).get("labelsize", 9.0)
                 axis.set_tick_params(which=which, labelsize=_SMALLEST * float(size))
-    for drawn in made.findobj(Line2D):
+    for drawn in picture.findobj(Line2D):
         drawn.set_linewidth(_SMALLEST * drawn.get_linewidth())
         drawn.set_markersize(_SMALLEST * drawn.get_markersize())
 
@@ -122,11 +122,11 @@ def figure(
     tall = rows * max(1.8, 0.55 * width / cols) if height is None else height
     if paper is not None:
         tall, width = tall * max(0.85, min(1.0, paper / width)), paper
-    made = Figure(figsize=(width, tall), layout="constrained")
-    axes = made.subplots(rows, cols, squeeze=False, **subplots)
-    for each in axes.flat:
-        dress(each)
-    return made, axes
+    picture = Figure(figsize=(width, tall), layout="constrained")
+    axes = picture.subplots(rows, cols, squeeze=False, **subplots)
+    for panel in axes.flat:
+        dress(panel)
+    return picture, axes
 
 
 def dress(axes: Axes) -> None:
@@ -178,8 +178,8 @@ def legend(axes: Axes, **options: Any) -> None:
 
 def legend_below(figure: Figure, columns: int = 3) -> None:
     """One legend for all axes of a figure, below them, each label once."""
-    found = [axes.get_legend_handles_labels() for axes in figure.axes]
-    handles = {label: handle for pair in found for handle, label in zip(*pair, strict=True)}
+    legends = [axes.get_legend_handles_labels() for axes in figure.axes]
+    handles = {label: handle for pair in legends for handle, label in zip(*pair, strict=True)}
     legend_under(figure, list(handles.values()), columns, list(handles))
 
 
@@ -187,7 +187,7 @@ def legend_under(figure: Figure, handles: Sequence[Any], columns: int, labels: S
     """A legend of these below a figure's axes, in as many columns as there is room for."""
     if not handles:
         return
-    names = list(labels) if labels else [str(each.get_label()) for each in handles]
+    names = list(labels) if labels else [str(handle.get_label()) for handle in handles]
     letter = 0.075 * (_SMALLEST if _PAPER.get() is not None and figure.get_figwidth() < _PRINTED else 1.0)
     room = int(figure.get_figwidth() / (letter * (max(map(len, names)) + 8)))
     place = {"loc": "outside lower center", "ncols": max(1, min(columns, len(handles), room))}

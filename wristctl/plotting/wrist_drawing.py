@@ -24,8 +24,8 @@ from wristctl.vision.scene_parts import coil, hand
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
 from wristctl.wrist.shape import Planar, discs, offset_points
 
+# Radius of the drawn discs over that of the circle of tendons.
 RIM = 1.25
-"""Radius of the drawn discs over that of the circle of tendons."""
 
 
 def draw_wrist(
@@ -56,7 +56,7 @@ def draw_wrist(
 
 def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Figure:
     """The wrist bent by `angle` [rad] in the four directions, with the tendons that pull; cross-sections below."""
-    made, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
+    picture, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
     reach = 1e3 * (wrist.length + 2.0 * wrist.hand_offset)
     for direction, above, below in zip(DIRECTIONS.values(), *axes, strict=True):
         theta, (first, second) = direction.sign * angle, direction.tendons
@@ -67,35 +67,35 @@ def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Fig
         _draw_cross_section(below, wrist, direction)
     axes[0, 0].set_ylabel("x [mm]")
     axes[1, 0].set_ylabel("Y [mm], + flexion")
-    return made
+    return picture
 
 
 def stroboscope(trajectory: Trajectory, wrist: WristParameters, count: int = 7, plant: str = "pcc") -> Figure:
     """A move as the wrist at `count` instants, evenly spaced until it rests within 2 % of it, and its tip's path."""
-    made, ((axes,),) = figure(width=5.0, height=4.2)
-    known = np.isfinite(trajectory.theta)
-    time, theta = trajectory.time[known], trajectory.theta[known]
+    picture, ((axes,),) = figure(width=5.0, height=4.2)
+    finite = np.isfinite(trajectory.theta)
+    time, theta = trajectory.time[finite], trajectory.theta[finite]
     moving = np.flatnonzero(np.abs(theta - theta[-1]) > 0.02 * np.abs(theta).max())
     instants = np.linspace(0, moving[-1] if len(moving) else len(time) - 1, count).round().astype(int)
     colours = ScalarMappable(Normalize(0.0, float(time[instants[-1]])), mpl.colormaps["viridis_r"])
     rim, backbone = RIM * wrist.tendon_radius, PLANTS[plant].backbone
-    for at in instants:
-        colour, bent = colours.to_rgba(time[at]), trajectory.segment_theta[at]
+    for sample in instants:
+        colour, bent = colours.to_rgba(time[sample]), trajectory.segment_theta[sample]
         line, _ = backbone(wrist, bent, np.linspace(0.0, wrist.length, 60))
         _line(axes, line, color=colour, linewidth=1.2)
         frames = discs(backbone, bent, wrist)
         for plate in zip(offset_points(frames, -rim), offset_points(frames, rim), strict=True):
             _line(axes, np.array(plate), color=colour, linewidth=2.5)
-    tip, desired = (each[:, 0] + 1j * each[:, 1] for each in (trajectory.tip, trajectory.tip_desired))
+    tip, desired = (path[:, 0] + 1j * path[:, 1] for path in (trajectory.tip, trajectory.tip_desired))
     end: Any = {"markevery": [-1], "markersize": 5.0}
     _line(axes, tip, color=BLACK, linewidth=1.5, marker="o", label="tip", **end)
     _line(axes, desired, color=VERMILLION, linewidth=2.5, linestyle=":", marker="x", label="desired tip", **end)
     _frame(axes)
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
     title(axes, trajectory.label)
-    legend_below(made)
-    made.colorbar(colours, ax=axes, label="time [s]", ticks=time[instants], format="%.2f")
-    return made
+    legend_below(picture)
+    picture.colorbar(colours, ax=axes, label="time [s]", ticks=time[instants], format="%.2f")
+    return picture
 
 
 def _draw_cross_section(axes: Axes, wrist: WristParameters, direction: Direction) -> None:

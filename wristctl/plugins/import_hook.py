@@ -37,8 +37,8 @@ class _Import(NamedTuple):
         self.seen[file] = digest
 
 
+# Imports under way, the innermost last.
 _under_way: list[_Import] = []
-"""The innermost last."""
 _imported: set[Path] = set()
 
 
@@ -57,8 +57,8 @@ def data_file(source: str, name: str) -> Path:
             raise UserError("a law reads data from outside its folder", str(file), f"put it below {root}")
         _under_way[-1].note(file, digest_now(file))
     elif Path(source) in _imported and file not in _imported:
-        what = f"{name} is asked for when {Path(source).name} has been imported, and would not be kept with it"
-        raise UserError(what, source, "call data_file at the top of the file")
+        problem = f"{name} is asked for when {Path(source).name} has been imported, and would not be kept with it"
+        raise UserError(problem, source, "call data_file at the top of the file")
     return file
 
 
@@ -96,15 +96,15 @@ class _Beside:
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: Any = None) -> ModuleSpec | None:
         """The module's, where it stands beside the file or within a package there."""
         if name == self._name and "." not in name:
-            made: ModuleSpec | None = spec_from_loader(name, self._made(name, str(self._file)))
-            return made
+            spec: ModuleSpec | None = spec_from_loader(name, self._made(name, str(self._file)))
+            return spec
         if name.partition(".")[0] in sys.stdlib_module_names:
             return None
         for folder in [str(self._folder)] if path is None else list(path):
             if Path(folder).is_relative_to(self._folder):
-                found = FileFinder(folder, (self._made, [".py"])).find_spec(name)
-                if found is not None and found.loader is not None:
-                    return found
+                spec = FileFinder(folder, (self._made, [".py"])).find_spec(name)
+                if spec is not None and spec.loader is not None:
+                    return spec
         return None
 
 
@@ -127,7 +127,7 @@ def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
     dotted = ".".join(file.relative_to(root).with_suffix("").parts)
     where = hashlib.sha256(str(file).encode()).hexdigest()[:8]  # compiled code that is kept knows it by its name
     name = dotted if "." in dotted else f"{_PREFIX}{dotted}_{where}"
-    others = _set_aside(root, name.partition(".")[0])
+    removed = _set_aside(root, name.partition(".")[0])
     finder = _Beside(name, file, importing)
     sys.meta_path.insert(0, finder)
     _under_way.append(importing)
@@ -136,12 +136,12 @@ def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
     except BaseException as error:
         if isinstance(error, UserError) or from_outside(error):
             raise
-        what = f"{file.name} cannot be loaded: {type(error).__name__}: {error}"
-        raise UserError(what, _place(error, importing.seen), "mend it there; --debug shows the traceback") from error
+        problem = f"{file.name} cannot be loaded: {type(error).__name__}: {error}"
+        raise UserError(problem, _place(error, importing.seen), "mend it there; --debug shows the traceback") from error
     finally:
         _under_way.pop()
         sys.meta_path.remove(finder)
-        sys.modules.update(others)
+        sys.modules.update(removed)
     _imported.update(importing.seen)
     return module, importing.seen
 
@@ -149,23 +149,23 @@ def imported(file: Path) -> tuple[ModuleType, dict[Path, str]]:
 def _set_aside(root: Path, package: str) -> dict[str, ModuleType]:
     """Take modules out of the way that have a name of what stands beside a file and were loaded from elsewhere, or
     before it was changed; of what is installed only the package of which this is a copy. Those to be put back."""
-    names = {each.stem for each in root.iterdir()} - {"wristctl"}
-    installed_at = [sysconfig.get_path(each) for each in ("stdlib", "platstdlib", "purelib", "platlib")]
-    others: dict[str, ModuleType] = {}
-    for known, module in list(sys.modules.items()):
-        top, place = known.partition(".")[0], getattr(module, "__file__", None)
-        there = place and any(Path(place).is_relative_to(each) for each in installed_at)
-        if top == package or (top in names and place and not there):
-            del sys.modules[known]
+    names = {entry.stem for entry in root.iterdir()} - {"wristctl"}
+    installed_at = [sysconfig.get_path(scheme) for scheme in ("stdlib", "platstdlib", "purelib", "platlib")]
+    removed: dict[str, ModuleType] = {}
+    for imported_name, module in list(sys.modules.items()):
+        top, place = imported_name.partition(".")[0], getattr(module, "__file__", None)
+        from_installation = place and any(Path(place).is_relative_to(folder) for folder in installed_at)
+        if top == package or (top in names and place and not from_installation):
+            del sys.modules[imported_name]
             if not isinstance(getattr(module, "__loader__", None), _Source):
-                others[known] = module
-    return others
+                removed[imported_name] = module
+    return removed
 
 
-def _place(error: BaseException, seen: Mapping[Path, str]) -> str:
+def _place(error: BaseException, sources: Mapping[Path, str]) -> str:
     """The line of the sources in which it happened."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{error.filename}:{error.lineno}"
-    places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
-    own = [each for each in places if Path(each.rpartition(":")[0]) in seen]
-    return (own or places)[-1]
+    places = [f"{frame.filename}:{frame.lineno}" for frame in traceback.extract_tb(error.__traceback__)]
+    source_places = [place for place in places if Path(place.rpartition(":")[0]) in sources]
+    return (source_places or places)[-1]

@@ -25,16 +25,16 @@ def placed(value: Any, document: Path | None) -> Any:
     Raises UserError where the document is part of a run and names code that is not.
     """
     if isinstance(value, dict):
-        return {key: placed(each, document) for key, each in value.items()}
+        return {key: placed(entry, document) for key, entry in value.items()}
     if isinstance(value, tuple):
-        return tuple(placed(each, document) for each in value)
+        return tuple(placed(entry, document) for entry in value)
     if not isinstance(value, str) or not is_reference(value):
         return value
     file, attribute = split(value)
-    whole = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
+    full_path = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
     if document:
-        check_within(whole, document)
-    return f"{whole}:{attribute}"
+        check_within(full_path, document)
+    return f"{full_path}:{attribute}"
 
 
 def check_within(named: Path, document: Path) -> None:
@@ -47,8 +47,8 @@ def check_within(named: Path, document: Path) -> None:
 
 def check_trust(leaves: Iterable[Any], document: Path | None = None) -> None:
     """Ask whether the code that the leaves of a document name may be loaded, and load none of it. Raises UserError."""
-    for each in placed(tuple(leaves), document):
-        for name in each if isinstance(each, tuple) else (each,):
+    for leaf in placed(tuple(leaves), document):
+        for name in leaf if isinstance(leaf, tuple) else (leaf,):
             if isinstance(name, str) and is_reference(name):
                 file, _ = split(name)
                 trusted(file, root_of(file))
@@ -63,23 +63,25 @@ def load(reference: str) -> tuple[Any, Foreign]:
     Raises UserError where there is no such file or name, where it cannot be imported, and where it lies in a run and
     nobody has said that it may be loaded.
     """
-    given, attribute = split(reference)
-    file = Path(os.path.abspath(given.expanduser()))
+    path, attribute = split(reference)
+    file = Path(os.path.abspath(path.expanduser()))
     if not file.is_file():
         raise UserError(f"no file {file.name}", str(file), "check the path: it counts from the file that names it")
-    known = _loaded.get(file)
-    if known is None or any(digest_now(each) != digest for each, digest in known[1].items()):
-        known = _loaded[file] = imported(file)
-    module, files = known
+    cached = _loaded.get(file)
+    if cached is None or any(digest_now(source) != digest for source, digest in cached[1].items()):
+        cached = _loaded[file] = imported(file)
+    module, files = cached
     if not hasattr(module, attribute):
-        own = {name: each for name, each in vars(module).items() if not name.startswith("_")}
-        names = [name for name, each in own.items() if not callable(each) and not isinstance(each, ModuleType)]
+        members = {name: member for name, member in vars(module).items() if not name.startswith("_")}
+        names = [
+            name for name, member in members.items() if not callable(member) and not isinstance(member, ModuleType)
+        ]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))
 
 
 @contextmanager
-def contained(what: str, where: str) -> Iterator[None]:
+def contained(activity: str, where: str) -> Iterator[None]:
     """Within the block, which runs code from elsewhere, all that it raises is the user's error: SystemExit too.
 
     Only Ctrl-C passes. `what` failed, at `where` unless the error knows its place.
@@ -89,37 +91,39 @@ def contained(what: str, where: str) -> Iterator[None]:
     except BaseException as error:
         if isinstance(error, UserError) or from_outside(error):
             raise
-        told = f"{what} failed: {type(error).__name__}: {error}".rstrip(": ")
-        raise UserError(told, raised_at(error) or where, "mend it there; --debug shows more") from error
+        problem = f"{activity} failed: {type(error).__name__}: {error}".rstrip(": ")
+        raise UserError(problem, raised_at(error) or where, "mend it there; --debug shows more") from error
 
 
 def raised_at(error: BaseException) -> str:
     """FILE:LINE where code from elsewhere has raised an error: the innermost place that is not the package's."""
-    places = [f"{each.filename}:{each.lineno}" for each in traceback.extract_tb(error.__traceback__)]
-    return next((each for each in places[::-1] if not each.startswith((_PACKAGE, "<"))), "")
+    places = [f"{frame.filename}:{frame.lineno}" for frame in traceback.extract_tb(error.__traceback__)]
+    return next((place for place in places[::-1] if not place.startswith((_PACKAGE, "<"))), "")
 
 
 def installed(module: ModuleType, attribute: str) -> Foreign:
-    """Where an object of an installed package is from: its module, with all that is loaded of the package."""
+    """Origin of an object of an installed package: its module and all loaded modules of the package."""
     package = module.__name__.partition(".")[0]
-    own = [each for name, each in list(sys.modules.items()) if name == package or name.startswith(f"{package}.")]
-    names = [str(getattr(each, "__file__", None)) for each in own]
-    files = [Path(each) for each in names if each.endswith(".py")]
+    loaded_modules = [
+        loaded for name, loaded in list(sys.modules.items()) if name == package or name.startswith(f"{package}.")
+    ]
+    names = [str(getattr(loaded, "__file__", None)) for loaded in loaded_modules]
+    files = [Path(path) for path in names if path.endswith(".py")]
     file = Path(str(module.__file__))
     root = file.parents[module.__name__.count(".") + (file.name == "__init__.py")]
-    return Foreign(file, attribute, {each: digest_now(each) for each in sorted(files)}, root)
+    return Foreign(file, attribute, {source: digest_now(source) for source in sorted(files)}, root)
 
 
 @cache
 def _of(group: str) -> Mapping[str, Sequence[Any]]:
-    """Each name's entry points, which should be one."""
+    """Entry points of a group by name. A name should have one."""
     from importlib.metadata import entry_points
 
-    found: dict[str, list[Any]] = {}
-    for each in entry_points(group=group):
-        if each.value not in [known.value for known in found.setdefault(each.name, [])]:
-            found[each.name].append(each)
-    return found
+    candidates: dict[str, list[Any]] = {}
+    for candidate in entry_points(group=group):
+        if candidate.value not in [previous.value for previous in candidates.setdefault(candidate.name, [])]:
+            candidates[candidate.name].append(candidate)
+    return candidates
 
 
 def entry_point_names(group: str) -> Sequence[str]:
@@ -132,11 +136,15 @@ def entry_point(group: str, name: str) -> tuple[Any, Foreign]:
 
     Raises UserError where several packages have one of this name, and where it cannot be loaded.
     """
-    found = _of(group)[name]
-    if len(found) > 1:
-        where = ", ".join(f"{each.dist.name if each.dist else '?'} ({each.value})" for each in found)
-        raise UserError(f"{len(found)} installed packages have a '{name}' in {group}", where, "uninstall all but one")
-    (only,) = found
+    candidates = _of(group)[name]
+    if len(candidates) > 1:
+        where = ", ".join(
+            f"{candidate.dist.name if candidate.dist else '?'} ({candidate.value})" for candidate in candidates
+        )
+        raise UserError(
+            f"{len(candidates)} installed packages have a '{name}' in {group}", where, "uninstall all but one"
+        )
+    (only,) = candidates
     with contained(f"loading the entry point '{name}'", f"{group}: {only.value}"):
-        made = only.load()
-    return made, installed(sys.modules[only.module], only.attr)
+        target = only.load()
+    return target, installed(sys.modules[only.module], only.attr)

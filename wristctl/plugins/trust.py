@@ -1,4 +1,4 @@
-"""Which code that came with a run may be loaded: none, until a person has seen its files and hashes and said yes."""
+"""Trust in code that came with a run. It is loaded once a person has seen its files and hashes, and agreed."""
 
 import hashlib
 import os
@@ -12,13 +12,13 @@ from wristctl.escape import printable
 from wristctl.sha256sums import SUMS, read_seal
 
 _MANIFEST = "run.json"
+# Files that nothing but a run has, each of which is left where another was lost or taken away.
 _MARKS = (_MANIFEST, SUMS, "code.txt")
-"""Files that nothing but a run has, each of which is left where another was lost or taken away."""
+# Environment variable with the hashes that were agreed to, for the processes that a command starts.
 _AGREED = "WRISTCTL_TRUSTED_CODE"
-"""Environment variable with the hashes that were agreed to, for the processes that a command starts."""
 
+# Shows a text that names files and hashes, and answers whether a person has said yes.
 Ask = Callable[[str], bool]
-"""Shows a text that names files and hashes, and answers whether a person has said yes."""
 
 _ask: list[Ask] = []
 
@@ -39,8 +39,8 @@ def run_around(file: Path) -> Path | None:
     What is left of a run is one still: any of the files that mark it, were they links that lead nowhere, or a
     configuration beside copies of code.
     """
-    for whole in (file.absolute(), file.resolve()):
-        for folder in whole.parents:
+    for path in (file.absolute(), file.resolve()):
+        for folder in path.parents:
             if any(os.path.lexists(folder / name) for name in _MARKS):
                 return folder
             if os.path.lexists(folder / "config.yaml") and os.path.lexists(folder / "code"):
@@ -58,23 +58,23 @@ def trusted(file: Path, root: Path) -> Mapping[Path, str] | None:
         return None
     files = _sources(root)
     _check_seal(home, files)
-    whole = digest_of(root, files)
-    if whole in os.environ.get(_AGREED, "").split(","):
+    whole_digest = digest_of(root, files)
+    if whole_digest in os.environ.get(_AGREED, "").split(","):
         return files
     lines = [printable(line) for line in _listing(root, files)]  # a name may hold what a terminal obeys
     shown = f"{printable(home)} carries code, which would run with all that you may do. In {printable(root)}:\n"
     if not _ask or not _ask[-1](shown + "\n".join(lines)):
         fix = ("read it, then ", Argument("trust_code", metavar=""))
-        where = f"{root}: " + ", ".join(f"{each.name} sha256 {digest}" for each, digest in files.items())
+        where = f"{root}: " + ", ".join(f"{source.name} sha256 {digest}" for source, digest in files.items())
         raise UserError("the run carries code of its own, and nobody has said that it may run", where, fix)
-    agree(whole)
+    agree(whole_digest)
     return files
 
 
 def agree(digest: str) -> None:
     """Take code of this hash as agreed to, here and in processes that are started from here."""
-    known = os.environ.get(_AGREED)
-    os.environ[_AGREED] = f"{known},{digest}" if known else digest
+    agreed = os.environ.get(_AGREED)
+    os.environ[_AGREED] = f"{agreed},{digest}" if agreed else digest
 
 
 def digest_of(root: Path, files: Mapping[Path, str]) -> str:
@@ -84,22 +84,22 @@ def digest_of(root: Path, files: Mapping[Path, str]) -> str:
 
 def _sources(root: Path) -> dict[Path, str]:
     """All below a folder but what Python would load in place of sources, and nothing here ever does."""
-    others = tuple(set(all_suffixes()) - {".py"})
-    found = (each for each in root.rglob("*") if each.is_file() and not each.name.endswith(others))
-    return {each: hashlib.sha256(each.read_bytes()).hexdigest() for each in found}
+    compiled_suffixes = tuple(set(all_suffixes()) - {".py"})
+    sources = (path for path in root.rglob("*") if path.is_file() and not path.name.endswith(compiled_suffixes))
+    return {source: hashlib.sha256(source.read_bytes()).hexdigest() for source in sources}
 
 
 def _listing(root: Path, files: Mapping[Path, str]) -> list[str]:
-    return [f"{digest}  {each.relative_to(root).as_posix()}" for each, digest in sorted(files.items())]
+    return [f"{digest}  {source.relative_to(root).as_posix()}" for source, digest in sorted(files.items())]
 
 
 def _check_seal(home: Path, files: Mapping[Path, str]) -> None:
     sealed = read_seal(home)
     if sealed is None:
         return
-    whole = _MANIFEST in sealed  # else it was cut short, or is a list of other files
+    complete = _MANIFEST in sealed  # else it was cut short, or is a list of other files
     for file, digest in files.items():
         name = file.relative_to(home).as_posix() if file.is_relative_to(home) else str(file)
-        if sealed.get(name, "" if whole else digest) != digest:
-            what = "the run's code is not as it was sealed"
-            raise UserError(what, str(file), "restore the run, or take the law from where you trust it")
+        if sealed.get(name, "" if complete else digest) != digest:
+            problem = "the run's code is not as it was sealed"
+            raise UserError(problem, str(file), "restore the run, or take the law from where you trust it")

@@ -27,11 +27,11 @@ from wristctl.records.run import Run
 from wristctl.sha256sums import read_seal, unreadable
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
+# Most files of an archive: ten times the files of a full study of all laws.
 MOST_FILES = 50_000
-"""Of an archive: ten times what a full study of all laws keeps."""
 _ID = re.compile(r"[A-Za-z0-9_.-]{1,200}")
+# Largest ratio of unpacked to packed size. A higher ratio is no run data.
 _LARGEST_SHARE = 200
-"""How many times its size an archive may hold: what was squeezed more is no data of ours."""
 _LARGEST_LIST = 1 << 20
 _LONGEST_NAME = 1000
 _PIECE = 1 << 20
@@ -39,43 +39,43 @@ _FIX = "ask for it again: this is not what `wristctl runs pack` wrote"
 
 
 def with_ancestors(run: Run) -> list[Run]:
-    """The run and all that it was made from, what was made first first.
+    """The run and all its ancestors, the oldest first.
 
     Raises UserError where one is gone, has not ended, is not as it was sealed, or is not what was read then.
     """
-    found: dict[Path, Run] = {}
+    collected: dict[Path, Run] = {}
 
     def add(one: Run, users: tuple[Path, ...]) -> None:
         one.check()
-        for each in one.manifest.inputs:
-            behind = input_run(one, each)
-            if behind.result_hash != each.result_sha256:
-                what = f"the {each.role} run has another result than the one that was read"
-                raise UserError(what, str(behind.path), "bring back the run that was read", exit_code=3)
+        for record in one.manifest.inputs:
+            behind = input_run(one, record)
+            if behind.result_hash != record.result_sha256:
+                problem = f"the {record.role} run has another result than the one that was read"
+                raise UserError(problem, str(behind.path), "bring back the run that was read", exit_code=3)
             if behind.path not in (one.path, *users):
                 add(behind, (one.path, *users))
-        found.setdefault(one.path, one)
+        collected.setdefault(one.path, one)
 
     add(run, ())
-    return list(found.values())
+    return list(collected.values())
 
 
 def pack(run: Run, file: Path) -> list[Run]:
     """Write the archive; the runs in it. Of each the sealed files, its seal and its signature, by the run's id."""
     runs = with_ancestors(run)
-    if len({each.id for each in runs}) < len(runs):
+    if len({member.id for member in runs}) < len(runs):
         raise UserError("two runs of one id", run.id, "they are copies: keep one")
     if file.exists():
         raise UserError("a file is in the way", str(file), "remove it, or name another with --file")
-    files = [each.path / name for each in runs for name in _packed(each)]
+    files = [member.path / name for member in runs for name in _packed(member)]
     if len(files) >= MOST_FILES:
         raise UserError(f"{len(files)} files, and an archive holds {MOST_FILES}", run.id, "copy the folders themselves")
     with replacing(file, FILE) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        told = {"schema": SCHEMA, "run": run.id, "runs": [each.id for each in runs]}
-        _write(archive, PACK, json.dumps(told, indent=2).encode() + b"\n")
-        for each in runs:
-            for name in _packed(each):
-                _write(archive, f"{each.id}/{name}", (each.path / name).read_bytes())
+        contents = {"schema": SCHEMA, "run": run.id, "runs": [each.id for each in runs]}
+        _write(archive, PACK, json.dumps(contents, indent=2).encode() + b"\n")
+        for member in runs:
+            for name in _packed(member):
+                _write(archive, f"{member.id}/{name}", (member.path / name).read_bytes())
     return runs
 
 
@@ -157,41 +157,41 @@ class _About(NamedTuple):
 
 
 def _contents(archive: zipfile.ZipFile, file: Path) -> tuple[_About, list[zipfile.ZipInfo]]:
-    """Which runs, and their entries; UserError where a name is none of theirs."""
+    """Runs and entries of an archive. Raises UserError for a name that no run may have."""
     entries = archive.infolist()
     if len(entries) > MOST_FILES:
         raise UserError(f"it holds {len(entries)} files, and at most {MOST_FILES} are taken", str(file), _FIX)
-    if sum(each.file_size for each in entries) > _LARGEST_SHARE * max(file.stat().st_size, 1):
+    if sum(entry.file_size for entry in entries) > _LARGEST_SHARE * max(file.stat().st_size, 1):
         raise UserError("it holds far more than its size", str(file), _FIX)
-    names = [each.filename for each in entries]
+    names = [entry.filename for entry in entries]
     if len(set(names)) < len(names) or len({name.casefold() for name in names}) < len(names):
         raise UserError("a name stands there twice", str(file), _FIX)
     if long := next((name for name in names if len(name.encode(errors="replace")) > _LONGEST_NAME), None):
         raise UserError(f"a name of more than {_LONGEST_NAME} bytes: {long[:40]!r}...", str(file), _FIX)
     about = _about(archive, file)
-    folders = {name[:at] for name in names for at, each in enumerate(name) if each == "/"}
-    for each in entries:
-        _check_name(each, about.runs, file)
-        if each.filename in folders:
-            raise UserError(f"a file and a folder of one name: {each.filename!r}", str(file), _FIX)
-    return about, [each for each in entries if each.filename != PACK]
+    folders = {name[:position] for name in names for position, character in enumerate(name) if character == "/"}
+    for entry in entries:
+        _check_name(entry, about.runs, file)
+        if entry.filename in folders:
+            raise UserError(f"a file and a folder of one name: {entry.filename!r}", str(file), _FIX)
+    return about, [entry for entry in entries if entry.filename != PACK]
 
 
 def _about(archive: zipfile.ZipFile, file: Path) -> _About:
     if PACK not in archive.namelist() or archive.getinfo(PACK).file_size > _LARGEST_LIST:
         raise UserError(f"no archive of runs: it has no {PACK}", str(file), _FIX)
     try:
-        told = json.loads(archive.read(PACK))
+        header = json.loads(archive.read(PACK))
     except (ValueError, RecursionError) as error:
         raise UserError(f"{PACK} is not valid JSON", str(file), _FIX) from error
-    runs = told.get("runs") if isinstance(told, Mapping) else None
-    if not isinstance(told, Mapping) or not isinstance(runs, list) or told.get("run") not in runs:
+    runs = header.get("runs") if isinstance(header, Mapping) else None
+    if not isinstance(header, Mapping) or not isinstance(runs, list) or header.get("run") not in runs:
         raise UserError(f"{PACK} names no runs", str(file), _FIX)
-    if told.get("schema") != SCHEMA:
+    if header.get("schema") != SCHEMA:
         raise UserError("packed by another wristctl than this one", str(file), "upgrade wristctl")
-    if not all(isinstance(each, str) and _is_id(each) for each in runs) or len(set(runs)) < len(runs):
+    if not all(isinstance(run_id, str) and _is_id(run_id) for run_id in runs) or len(set(runs)) < len(runs):
         raise UserError("a name that is no run's id", str(file), _FIX)
-    return _About(told["run"], runs)
+    return _About(header["run"], runs)
 
 
 def _is_id(name: str) -> bool:
@@ -236,20 +236,22 @@ def _pieces(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: Path) -> Ite
 
 def _moved(about: _About, scratch: Path, results: Path, file: Path) -> Unpacked:
     """The runs in their place, once all are seen to be what was sealed."""
-    here = {name: results / name for name in about.runs}
+    destinations = {name: results / name for name in about.runs}
     for name in about.runs:
-        for path, what in _problems(scratch / name):
-            raise UserError(f"{path}: {what}", f"{name} in {file}", "ask for it again: nothing was kept", exit_code=3)
-        if lexists(here[name]):
-            _check_same(here[name], scratch / name)
-    new = [name for name in about.runs if not lexists(here[name])]
-    known = [Run(here[name]) for name in about.runs if name not in new]
-    signed = [run for run in known if _signed_too(run.path, scratch / run.id)]
+        for path, problem in _problems(scratch / name):
+            raise UserError(
+                f"{path}: {problem}", f"{name} in {file}", "ask for it again: nothing was kept", exit_code=3
+            )
+        if lexists(destinations[name]):
+            _check_same(destinations[name], scratch / name)
+    new = [name for name in about.runs if not lexists(destinations[name])]
+    present = [Run(destinations[name]) for name in about.runs if name not in new]
+    signed = [run for run in present if _signed_too(run.path, scratch / run.id)]
     with writing(results):
         for name in new:
-            (scratch / name).rename(here[name])
+            (scratch / name).rename(destinations[name])
         sync(results)
-    return Unpacked(Run(here[about.run]), [Run(here[name]) for name in new], known, signed)
+    return Unpacked(Run(destinations[about.run]), [Run(destinations[name]) for name in new], present, signed)
 
 
 def _problems(folder: Path) -> Iterator[tuple[str, str]]:
@@ -259,22 +261,22 @@ def _problems(folder: Path) -> Iterator[tuple[str, str]]:
         yield from Run(folder).problems()
 
 
-def _check_same(here: Path, arrived: Path) -> None:
+def _check_same(existing: Path, arrived: Path) -> None:
     """UserError where what is here under a run's id is another run, or that run and damaged."""
-    if not (here / SUMS).is_file() or (here / SUMS).read_bytes() != (arrived / SUMS).read_bytes():
-        what = "a run of this id is here already, and is another"
-        raise UserError(what, str(here), "another results folder, with --out", exit_code=3)
+    if not (existing / SUMS).is_file() or (existing / SUMS).read_bytes() != (arrived / SUMS).read_bytes():
+        problem = "a run of this id is here already, and is another"
+        raise UserError(problem, str(existing), "another results folder, with --out", exit_code=3)
     try:
-        Run(here).check()
+        Run(existing).check()
     except UserError as error:
-        what = f"the run is here already, and is damaged: {error.what}"
-        raise UserError(what, error.where, "delete that copy, and unpack again", exit_code=3) from error
+        problem = f"the run is here already, and is damaged: {error.what}"
+        raise UserError(problem, error.where, "delete that copy, and unpack again", exit_code=3) from error
 
 
-def _signed_too(here: Path, arrived: Path) -> bool:
+def _signed_too(existing: Path, arrived: Path) -> bool:
     """Give a run its signature of the archive where it has none here; whether that was so."""
-    if lexists(here / SIGNATURE) or not (arrived / SIGNATURE).is_file():
+    if lexists(existing / SIGNATURE) or not (arrived / SIGNATURE).is_file():
         return False
-    with replacing(here / SIGNATURE) as temporary:
+    with replacing(existing / SIGNATURE) as temporary:
         temporary.write_bytes((arrived / SIGNATURE).read_bytes())
     return True

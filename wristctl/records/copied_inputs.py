@@ -1,4 +1,4 @@
-"""What a study names and a run keeps as copies: files, and code from elsewhere."""
+"""Copies that a run keeps of its inputs: files, and code from outside the package."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -13,8 +13,8 @@ from wristctl.plugins.trust import agree, digest_of
 from wristctl.records.files import replacing, sha256_of
 from wristctl.study_files.resolved import sections_read
 
+# Folder of a run that holds the copies.
 INPUTS = "inputs"
-"""The folder of a run in which they stand."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ def sealed_files(study: Study, kind: str) -> SealedFiles:
             contents[names[name]] = content
     if not names:
         return SealedFiles(study)
-    own = {section: with_files(getattr(study, section), names.__getitem__) for section in sections}
-    return SealedFiles(study.model_copy(update=own), contents, names)
+    sections_with_copies = {section: with_files(getattr(study, section), names.__getitem__) for section in sections}
+    return SealedFiles(study.model_copy(update=sections_with_copies), contents, names)
 
 
 def write_files(folder: Path, contents: dict[str, bytes]) -> None:
@@ -65,14 +65,16 @@ def _content(file: Path) -> bytes:
         ) from error
 
 
+# Folder of a run with one subfolder for each code file that a study names.
 FOLDER = "code"
-"""Of a run, with a folder in it for each file that a study names."""
 
 
 def sealed_references(foreign: Sequence[Foreign]) -> dict[str, str]:
-    """What the copies will be called in the run's configuration, by what their originals are called."""
+    """References to the copied code for the run's configuration, by the references of their originals."""
     homes = _homes(foreign)
-    return {each.reference: f"{homes[each.file]}/{_below(each, each.file)}:{each.attribute}" for each in foreign}
+    return {
+        source.reference: f"{homes[source.file]}/{_below(source, source.file)}:{source.attribute}" for source in foreign
+    }
 
 
 def copy_code(path: Path, foreign: Sequence[Foreign]) -> Mapping[str, str]:
@@ -80,20 +82,20 @@ def copy_code(path: Path, foreign: Sequence[Foreign]) -> Mapping[str, str]:
 
     Raises UserError where one is no longer what was loaded.
     """
-    homes, found = _homes(foreign), dict[str, str]()
-    for each in foreign:
-        for file, digest in each.files.items():
-            name = f"{homes[each.file]}/{_below(each, file)}"
+    homes, digests = _homes(foreign), dict[str, str]()
+    for source in foreign:
+        for file, digest in source.files.items():
+            name = f"{homes[source.file]}/{_below(source, file)}"
             (path / name).parent.mkdir(parents=True, exist_ok=True)
             with replacing(path / name) as temporary:
                 temporary.write_bytes(file.read_bytes())
-            found[name] = sha256_of(path / name)
-            if found[name] != digest:
+            digests[name] = sha256_of(path / name)
+            if digests[name] != digest:
                 raise UserError("a source was changed after it was loaded", str(file), "run again")
     for home in set(homes.values()):
-        copies = {path / name: digest for name, digest in found.items() if name.startswith(f"{home}/")}
+        copies = {path / name: digest for name, digest in digests.items() if name.startswith(f"{home}/")}
         agree(digest_of(path / home, copies))  # who named the original need not agree to its copy
-    return dict(sorted(found.items()))
+    return dict(sorted(digests.items()))
 
 
 def _below(foreign: Foreign, file: Path) -> str:
@@ -103,10 +105,10 @@ def _below(foreign: Foreign, file: Path) -> str:
 def _homes(foreign: Sequence[Foreign]) -> dict[Path, str]:
     """The folder of each file that is named, those of the same name numbered."""
     homes: dict[Path, str] = {}
-    for each in foreign:
-        if each.file not in homes:
-            name, number = f"{FOLDER}/{each.file.stem}", 2
+    for source in foreign:
+        if source.file not in homes:
+            name, number = f"{FOLDER}/{source.file.stem}", 2
             while name in homes.values():
-                name, number = f"{FOLDER}/{each.file.stem}-{number}", number + 1
-            homes[each.file] = name
+                name, number = f"{FOLDER}/{source.file.stem}-{number}", number + 1
+            homes[source.file] = name
     return homes

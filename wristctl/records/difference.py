@@ -1,4 +1,4 @@
-"""What differs between two runs, and nothing else."""
+"""Differences between two runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,18 +33,20 @@ class Difference:
 
 def difference(a: Run, b: Run) -> Difference:
     """Compare configuration leaves, metrics, code (its files too), packages and machine, inputs by their results."""
-    inputs = [{each.role: each.result_sha256 for each in run.manifest.inputs} for run in (a, b)]
-    roles = {f"{run.kind}.{each.role}" for run in (a, b) for each in run.manifest.inputs}
-    config = [each for each in changes(leaves_of(a), leaves_of(b)) if each.name not in roles]
-    metrics = changes(*({name: each["value"] for name, each in run.metrics.items()} for run in (a, b)))
+    inputs = [{record.role: record.result_sha256 for record in run.manifest.inputs} for run in (a, b)]
+    roles = {f"{run.kind}.{record.role}" for run in (a, b) for record in run.manifest.inputs}
+    config = [change for change in changes(leaves_of(a), leaves_of(b)) if change.name not in roles]
+    metrics = changes(*({name: metric["value"] for name, metric in run.metrics.items()} for run in (a, b)))
     return Difference(config, metrics, _code(a, b), _environment(a, b), changes(*inputs))
 
 
 def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Change]:
-    """Where two mappings differ, in their order."""
+    """Changed entries of two mappings, in their order."""
     names = dict.fromkeys([*before, *after])
     pairs = (Change(name, before.get(name), after.get(name)) for name in names)
-    return [each for each in pairs if each.before != each.after or type(each.before) is not type(each.after)]
+    return [
+        change for change in pairs if change.before != change.after or type(change.before) is not type(change.after)
+    ]
 
 
 def leaves_of(run: Run) -> dict[str, Any]:
@@ -63,16 +65,20 @@ def _leaves(value: Any, path: str) -> list[tuple[str, Any]]:
 
 def _code(a: Run, b: Run) -> list[Change]:
     foreign = changes(a.manifest.code.foreign, b.manifest.code.foreign)
-    own = [Change(each.name, _short(each.before), _short(each.after)) for each in foreign]
+    foreign_changes = [Change(change.name, _short(change.before), _short(change.after)) for change in foreign]
     if a.manifest.code.tree_sha256 == b.manifest.code.tree_sha256:
-        return own
+        return foreign_changes
     facts = []
     for run in (a, b):
         code = run.manifest.code
         commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
         facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
     files = changes(*(_listing(run.path / SOURCES, "  ", 1) for run in (a, b)))
-    return [*own, *changes(*facts), *(Change(each.name, _short(each.before), _short(each.after)) for each in files)]
+    return [
+        *foreign_changes,
+        *changes(*facts),
+        *(Change(change.name, _short(change.before), _short(change.after)) for change in files),
+    ]
 
 
 def _environment(a: Run, b: Run) -> list[Change]:

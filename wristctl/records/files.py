@@ -11,11 +11,11 @@ from pathlib import Path
 
 from wristctl.errors import OUT, Phrase, UserError, writing
 
+# End of the hidden name of a file that is being written.
 PART = ".part"
-"""End of the hidden name of a file that is being written."""
 LINK, NOT_PLAIN = "is a link, and a run holds files only", "is no plain file"
+# Files whose way to the disk is waited for at the same time.
 _AT_ONCE = 16
-"""Files whose way to the disk is waited for at the same time."""
 
 
 @contextmanager
@@ -65,8 +65,8 @@ def check_plain(path: Path) -> None:
     """UserError for a link, a pipe or a device where a run has a file; nothing is opened. OSError where it is gone."""
     mode = path.lstat().st_mode
     if not stat.S_ISREG(mode):
-        what = LINK if stat.S_ISLNK(mode) else NOT_PLAIN
-        raise UserError(what, str(path), "put a copy of its content in its place", exit_code=3)
+        problem = LINK if stat.S_ISLNK(mode) else NOT_PLAIN
+        raise UserError(problem, str(path), "put a copy of its content in its place", exit_code=3)
 
 
 def sync_all(paths: Iterable[Path]) -> None:
@@ -89,5 +89,5 @@ def sha256_of_list(items: list[tuple[str, str]]) -> str:
 
 def files_below(directory: Path) -> list[str]:
     """Relative POSIX paths of all files below, hidden ones left out, sorted."""
-    found = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
-    return sorted(path.as_posix() for path in found if not any(part.startswith(".") for part in path.parts))
+    paths = (path.relative_to(directory) for path in directory.rglob("*") if path.is_file())
+    return sorted(path.as_posix() for path in paths if not any(part.startswith(".") for part in path.parts))

@@ -64,11 +64,13 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
 def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
     """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError."""
     run = open_run(ref, results)
-    found = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
-    if kind not in (None, found):
-        raise UserError(f"a {found} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}")
+    actual_kind = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
+    if kind not in (None, actual_kind):
+        raise UserError(
+            f"a {actual_kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
+        )
     if run.state != "ok":
-        again = ("run `", Call(command_of(found)), "` again")
+        again = ("run `", Call(command_of(actual_kind)), "` again")
         raise UserError(f"run is {run.state}, not ok", str(run.path), again)
     run.check()
     return run
@@ -87,10 +89,10 @@ def _latest(ref: str, results: Path) -> Run:
     ended = [run for run in entries if run.state == "ok"]
     fitting = [run for run in ended if run.kind == kind and label in ("", run.label)]
     latest = max(fitting, key=lambda run: run.started, default=None)
-    for run in (Run(results / each.id) for each in entries if each.state == "broken"):
-        stamp, _, rest = run.id.partition("-")
+    for run in (Run(results / entry.id) for entry in entries if entry.state == "broken"):
+        stamp, _, name = run.id.partition("-")
         if (
-            rest.startswith(f"{kind}-{label}")
+            name.startswith(f"{kind}-{label}")
             and run.sealed
             and (latest is None or stamp >= latest.id.partition("-")[0])
         ):
@@ -111,11 +113,11 @@ _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
 def entries(results: Path = RESULTS) -> list[IndexEntry]:
     """All runs of a results folder, oldest first, with their tags."""
     tags = known_tags(results)
-    return [replace(each, tags=tags[each.id]) if each.id in tags else each for each in indexed(results)]
+    return [replace(entry, tags=tags[entry.id]) if entry.id in tags else entry for entry in indexed(results)]
 
 
 def select(
-    found: Iterable[IndexEntry],
+    listed: Iterable[IndexEntry],
     kind: str | None = None,
     label: str | None = None,
     state: str | None = None,
@@ -127,49 +129,49 @@ def select(
     """The entries that meet every condition: `where` like "rmse<1e-3", ages like 30m, 12h, 2d; kind and label may be
     patterns with *. Raises UserError for a condition that cannot be read, or a metric that no run has."""
     chosen = [
-        each
-        for each in found
-        if fnmatchcase(each.kind, kind or "*")
-        and fnmatchcase(each.label, label or "*")
-        and state in (None, each.state)
-        and (tag is None or tag in each.tags)
+        entry
+        for entry in listed
+        if fnmatchcase(entry.kind, kind or "*")
+        and fnmatchcase(entry.label, label or "*")
+        and state in (None, entry.state)
+        and (tag is None or tag in entry.tags)
     ]
     for text in where:
         name, compare, bound = _condition(text)
         _check_metric(name, chosen, text)
-        chosen = [each for each in chosen if _is_number(each.value(name)) and compare(each.value(name), bound)]
+        chosen = [entry for entry in chosen if _is_number(entry.value(name)) and compare(entry.value(name), bound)]
     if newer:
         since = _time_ago(newer, "newer")
-        chosen = [each for each in chosen if each.started and each.started >= since]
+        chosen = [entry for entry in chosen if entry.started and entry.started >= since]
     if older:
         until = _time_ago(older, "older")
-        chosen = [each for each in chosen if each.started and each.started < until]
+        chosen = [entry for entry in chosen if entry.started and entry.started < until]
     return chosen
 
 
-def in_order(found: Sequence[IndexEntry], by: str) -> list[IndexEntry]:
+def in_order(listed: Sequence[IndexEntry], by: str) -> list[IndexEntry]:
     """Sorted by a field or metric; runs that have none come last."""
-    _check_metric(by, found, Argument("sort", by))
+    _check_metric(by, listed, Argument("sort", by))
 
-    def sort_key(each: IndexEntry) -> tuple[bool, Any]:
-        value = each.value(by)
+    def sort_key(entry: IndexEntry) -> tuple[bool, Any]:
+        value = entry.value(by)
         return (True, "") if value in (None, "") else (False, value)
 
-    return sorted(found, key=sort_key)
+    return sorted(listed, key=sort_key)
 
 
-def _check_metric(name: str, found: Sequence[IndexEntry], where: Phrase) -> None:
-    own = {"id", "kind", "label", "state", "started", "wall_s"}
-    names = {metric for each in found for metric in each.metrics} | own
-    if found and name not in names:
+def _check_metric(name: str, listed: Sequence[IndexEntry], where: Phrase) -> None:
+    entry_fields = {"id", "kind", "label", "state", "started", "wall_s"}
+    names = {metric for entry in listed for metric in entry.metrics} | entry_fields
+    if listed and name not in names:
         raise UserError(f"no run has a metric {name!r}", where, meant(name, sorted(names)))
 
 
 def _condition(text: str) -> tuple[str, Any, float]:
-    found = re.fullmatch(r"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*([^<>=!]+)", text)
+    match = re.fullmatch(r"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*([^<>=!]+)", text)
     try:
-        if found:
-            return found[1], _COMPARISONS[found[2]], float(found[3])
+        if match:
+            return match[1], _COMPARISONS[match[2]], float(match[3])
     except ValueError:
         pass
     example = Argument("where", "rmse<1e-3", quoted=True)
@@ -177,10 +179,10 @@ def _condition(text: str) -> tuple[str, Any, float]:
 
 
 def _time_ago(age: str, option: str) -> str:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)([smhdw])", age, re.ASCII)
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([smhdw])", age, re.ASCII)
     try:
-        if found:
-            instant = datetime.now(UTC) - timedelta(seconds=float(found[1]) * _SECONDS[found[2]])
+        if match:
+            instant = datetime.now(UTC) - timedelta(seconds=float(match[1]) * _SECONDS[match[2]])
             return instant.isoformat(timespec="microseconds")
     except OverflowError:  # before the calendar begins
         pass

@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     Columns = pd.DataFrame | Mapping[str, np.ndarray]
 
 
+# Table lines written at a time. Python's numbers take ten times the memory of an array.
 _LINES = 50_000
-"""Of a table, made at a time: as Python's numbers they take ten times the memory."""
+# Largest ratio of unpacked to packed size. Runs store their arrays uncompressed.
 _LARGEST_SHARE = 100
-"""How many times its size an archive may hold: ours are stored as they are."""
 
 
 def write_table(path: Path, columns: Columns) -> None:
     """Columns as CSV under their names; floats are written so that they read back exactly, nan as nothing."""
     import numpy as np
 
-    arrays = [np.asarray(each) for _, each in columns.items()]
+    arrays = [np.asarray(column) for _, column in columns.items()]
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns.keys())
         for begin in range(0, max(map(len, arrays), default=0), _LINES):
-            parts = (each[begin : begin + _LINES].tolist() for each in arrays)
+            parts = (array[begin : begin + _LINES].tolist() for array in arrays)
             cells = ([None if cell != cell else cell for cell in part] for part in parts)
             writer.writerows(zip(*cells, strict=True))
 
@@ -64,7 +64,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
     try:
         with path.open("rb") as file, zipfile.ZipFile(file) as archive:
-            if sum(each.file_size for each in archive.infolist()) > _LARGEST_SHARE * path.stat().st_size:
+            if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_SHARE * path.stat().st_size:
                 raise ValueError("what it holds is far larger than the file")
             for entry in archive.infolist():
                 _check_header(archive, entry)
@@ -91,14 +91,14 @@ def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300) -> None:
     """A figure made without pyplot in the format that the file's name ends with, as large as it was laid out."""
     import matplotlib as mpl
 
-    known: dict[str, dict[str, Any]] = {
+    metadata: dict[str, dict[str, Any]] = {
         ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
         ".svg": {"Date": None, "Creator": None},
         ".png": {"Software": None},
     }
     fixed: Any = {"svg.hashsalt": file.stem, "agg.path.chunksize": 500, "pdf.fonttype": 42}
     with mpl.rc_context(fixed), replacing(file) as temporary:
-        figure.savefig(temporary, format=file.suffix[1:], dpi=dpi, metadata=known[file.suffix])
+        figure.savefig(temporary, format=file.suffix[1:], dpi=dpi, metadata=metadata[file.suffix])
 
 
 def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
@@ -115,6 +115,6 @@ def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
     }
     # in one piece, a line that chatters takes seconds to draw
     with mpl.rc_context({"svg.hashsalt": stem.name, "agg.path.chunksize": 500}):
-        for suffix, given in options.items():
+        for suffix, keywords in options.items():
             with replacing(stem.with_name(f"{stem.name}.{suffix}")) as temporary:
-                figure.savefig(temporary, format=suffix, dpi=dpi, **given)
+                figure.savefig(temporary, format=suffix, dpi=dpi, **keywords)

@@ -16,8 +16,8 @@ from wristctl.records.run import Run
 
 RESULTS = Path("results")
 INDEX, TEMPORARY = ".index.json", ".index-"
+# Start of the name of a folder with figures drawn after their run was sealed.
 DRAWN = "figures-"
-"""How folders begin that hold figures of a run which were drawn after it was sealed."""
 _SCHEMA = "wristctl.index/1"
 
 
@@ -47,8 +47,8 @@ class IndexEntry:
 def run_names(results: Path) -> list[str]:
     """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
     try:
-        with os.scandir(results) as found:
-            return sorted(each.name for each in found if each.is_dir() and not each.name.startswith((".", DRAWN)))
+        with os.scandir(results) as listing:
+            return sorted(item.name for item in listing if item.is_dir() and not item.name.startswith((".", DRAWN)))
     except FileNotFoundError:
         return []
     except OSError as error:
@@ -64,11 +64,11 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
     entry counts as long as the run's manifest and seal have the dates and sizes it was made from. `renew` writes the
     index anew where it was not up to date.
     """
-    known = _read_index(results)
+    remembered = _read_index(results)
     current: dict[str, Any] = {}
-    found = []
+    entries = []
     for name in run_names(results):
-        stamp, old = _stamp(f"{results}/{name}"), known.get(name)
+        stamp, old = _stamp(f"{results}/{name}"), remembered.get(name)
         entry = _remembered(old, name) if stamp and isinstance(old, list) and old[:1] == [stamp] else None
         if entry:
             current[name] = old
@@ -76,21 +76,21 @@ def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
             entry = _entry(Run(results / name))
             if stamp and entry.state not in ("running", "broken", "crashed"):
                 current[name] = [stamp, asdict(entry)]
-        found.append(entry)
-    if renew and current != known:
+        entries.append(entry)
+    if renew and current != remembered:
         _write_index(results, current)
-    return found
+    return entries
 
 
 def _remembered(old: list[Any], name: str) -> IndexEntry | None:
-    """What the index says of a run, None where that cannot be."""
+    """Entry of a run as the index remembers it. None where that entry is invalid."""
     try:
         entry = IndexEntry(**old[1])
         texts = (entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note, entry.about, entry.chief)
         lists = [*entry.inputs, *entry.tags, *entry.metrics]
-        numbers = [each for each in (entry.wall_s, *entry.metrics.values()) if each is not None]
-        fits = all(isinstance(each, str) for each in (*texts, *lists)) and entry.id == name
-        return entry if fits and all(isinstance(each, int | float) for each in numbers) else None
+        numbers = [value for value in (entry.wall_s, *entry.metrics.values()) if value is not None]
+        fits = all(isinstance(text, str) for text in (*texts, *lists)) and entry.id == name
+        return entry if fits and all(isinstance(value, int | float) for value in numbers) else None
     except (TypeError, AttributeError, IndexError):
         return None
 
@@ -99,11 +99,11 @@ def _entry(run: Run) -> IndexEntry:
     state = run.state
     try:
         manifest = run.manifest
-        metrics = {name: each.get("value") for name, each in run.metrics.items()} if state != "broken" else {}
+        metrics = {name: metric.get("value") for name, metric in run.metrics.items()} if state != "broken" else {}
     except UserError as error:
         return IndexEntry(run.id, "-", "", "broken", dated(run.id), None, error.what)
     note = manifest.error.what if manifest.error else ""
-    timing, inputs = manifest.timing, [each.run for each in manifest.inputs]
+    timing, inputs = manifest.timing, [record.run for record in manifest.inputs]
     return IndexEntry(
         run.id,
         manifest.kind,
@@ -128,7 +128,7 @@ def dated(name: str) -> str:
 
 
 def _stamp(path: str) -> list[int] | None:
-    """What tells a sealed run from any other under its name; None where it is not sealed."""
+    """Stamp that identifies a sealed run among others of its name. None for a run without a seal."""
     try:
         manifest, sums = os.stat(f"{path}/{MANIFEST}"), os.stat(f"{path}/{SUMS}")
     except OSError:

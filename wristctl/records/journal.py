@@ -1,4 +1,4 @@
-"""What happens during a run as lines: events.jsonl for programs, console.log for people."""
+"""Events of a run as lines: events.jsonl for programs, console.log for people."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Where a run comes from and what was built on it, read from the manifests."""
+"""Ancestors and descendants of a run, read from the manifests."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Ancestor:
         """The tree as text, the run itself first."""
         role = f"{self.role}: " if self.role else ""
         yield f"{first_indent}{role}{self.id} ({self.state})"
-        for number, each in enumerate(self.inputs, 1):
+        for number, ancestor in enumerate(self.inputs, 1):
             last = number == len(self.inputs)
-            yield from each.lines(indent + ("└─ " if last else "├─ "), indent + ("   " if last else "│  "))
+            yield from ancestor.lines(indent + ("└─ " if last else "├─ "), indent + ("   " if last else "│  "))
 
 
 def ancestry(run: Run, role: str = "", state: str = "", users: tuple[Path, ...] = ()) -> Ancestor:
@@ -37,18 +37,18 @@ def ancestry(run: Run, role: str = "", state: str = "", users: tuple[Path, ...] 
     `users` are the runs on the way here: one that is its own ancestor, which only a damaged manifest says, ends there.
     """
     inputs = []
-    for each in run.manifest.inputs:
+    for record in run.manifest.inputs:
         try:
-            found = input_run(run, each)
-            if found.path in (run.path, *users):
-                inputs.append(Ancestor(each.run, each.kind, "its own ancestor: that cannot be", each.role))
+            ancestor = input_run(run, record)
+            if ancestor.path in (run.path, *users):
+                inputs.append(Ancestor(record.run, record.kind, "its own ancestor: that cannot be", record.role))
                 continue
-            changed = found.result_hash != each.result_sha256
+            changed = ancestor.result_hash != record.result_sha256
             state_then = "another result than was read" if changed else ""
-            inputs.append(ancestry(found, each.role, state_then, (run.path, *users)))
+            inputs.append(ancestry(ancestor, record.role, state_then, (run.path, *users)))
         except UserError:
-            state_now = "broken" if _path_of(run, each) else "gone"
-            inputs.append(Ancestor(each.run, each.kind, state_now, each.role))
+            state_now = "broken" if _path_of(run, record) else "gone"
+            inputs.append(Ancestor(record.run, record.kind, state_now, record.role))
     return Ancestor(run.id, run.kind, state or run.state, role, tuple(inputs))
 
 
@@ -60,9 +60,9 @@ def input_run(run: Run, record: Input) -> Run:
     path = _path_of(run, record)
     if path is None:
         raise UserError(f"the {record.role} run is gone", record.path, "bring it back beside the run that read it")
-    found = Run(path)
-    found.manifest  # noqa: B018 - reading it tells a run from a foreign folder
-    return found
+    ancestor = Run(path)
+    ancestor.manifest  # noqa: B018 - reading it tells a run from a foreign folder
+    return ancestor
 
 
 def _path_of(run: Run, record: Input) -> Path | None:
@@ -73,4 +73,4 @@ def _path_of(run: Run, record: Input) -> Path | None:
 
 def dependents(run: Run, results: Path) -> list[str]:
     """Ids of the runs in `results` that read this one."""
-    return [each.id for each in indexed(results) if run.id in each.inputs]
+    return [entry.id for entry in indexed(results) if run.id in entry.inputs]

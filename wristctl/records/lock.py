@@ -100,11 +100,11 @@ def delete_folder(directory: Path) -> None:
 def _empty(directory: Path) -> None:
     """Delete all but the lock, which goes last: who takes it then finds nothing, or a folder that is gone."""
     with suppress(FileNotFoundError):
-        for each in sorted(directory.iterdir()):
-            if each.is_dir() and not each.is_symlink():
-                shutil.rmtree(each, onerror=_unless_another_did)
-            elif each.name != LOCK:
-                each.unlink(missing_ok=True)
+        for item in sorted(directory.iterdir()):
+            if item.is_dir() and not item.is_symlink():
+                shutil.rmtree(item, onerror=_unless_another_did)
+            elif item.name != LOCK:
+                item.unlink(missing_ok=True)
 
 
 def _unless_another_did(function: Any, path: str, raised: Any) -> None:

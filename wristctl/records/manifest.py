@@ -14,14 +14,14 @@ MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml
 SIGNATURE = "SHA256SUMS.sig"
 README, EVENTS, CONSOLE = "README.md", "events.jsonl", "console.log"
 SOURCES, PATCH, PACKAGES = "code.txt", "code.patch", "environment.txt"
+# Files with the printed tables, for report.html. They may hold wall times, so the result hash leaves them out.
 TABLES, OVERVIEW = "tables.json", "overview.json"
-"""What the command printed, for report.html; outside the result hash because it may hold wall times."""
 
+# Commands that make runs.
 KINDS = (
     "gen-data", "train", "tune", "compare", "study", "simulate", "analyse", "hysteresis", "audit", "hw-run", "identify",
     "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
-"""What commands make runs."""
 
 EndState = Literal["running", "ok", "failed", "interrupted"]
 
@@ -38,8 +38,8 @@ def _inside(name: str) -> str:
     return name
 
 
+# Name of a run directory. It begins with the UTC time of the start of the run.
 RunId = Annotated[str, Field(pattern=r"^[0-9]{8}T[0-9]{6}Z-[A-Za-z0-9_.-]{1,200}$")]
-"""It begins with the UTC time at which the run began."""
 _Kind = Annotated[str, Field(pattern=r"^[a-z]{1,20}(-[a-z]{1,20}){0,3}$")]
 _Role = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,40}(\[[0-9]{1,4}\])?$")]
 _Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -141,8 +141,8 @@ class Error(ManifestPart):
     fix: str = ""
 
 
+# Schema of written manifests. Its number grows where an older wristctl could not understand a newer run.
 SCHEMA = "wristctl.run/1"
-"""Of the manifests that are written. Its number grows where an older wristctl could not understand a newer run."""
 
 
 class Manifest(ManifestPart):
@@ -184,7 +184,7 @@ class Overview:
     cards: list[str] = field(default_factory=list)
     """Names of metrics."""
     captions: dict[str, str] = field(default_factory=dict)
-    """What each figure shows, by its name and in reading order; also of those that were not drawn."""
+    """Caption of each figure by name, in reading order. It includes figures that were not drawn."""
     marks: list[str] = field(default_factory=list)
     """Why a run that was done is no good, in a word or two each; empty where it is sound."""
 
@@ -194,23 +194,23 @@ class Overview:
 
 
 def read_overview(folder: Path) -> Overview:
-    """Of a run directory; an empty one where there is none, or none that can be read: it is an order, and no result."""
+    """Overview of a run directory. It is empty where the file is missing or unreadable, for it holds no result."""
     file = folder / OVERVIEW
     try:
-        found: Any = {} if file.is_symlink() else json.loads(file.read_bytes())
+        overview: Any = {} if file.is_symlink() else json.loads(file.read_bytes())
     except (OSError, ValueError, RecursionError):
-        found = {}
-    if not isinstance(found, dict):
+        overview = {}
+    if not isinstance(overview, dict):
         return Overview()
-    answer, cards, captions, marks = (found.get(name) for name in ("answer", "cards", "captions", "marks"))
+    answer, cards, captions, marks = (overview.get(name) for name in ("answer", "cards", "captions", "marks"))
     return Overview(
         _texts(answer),
-        found["figure"] if isinstance(found.get("figure"), str) else "",
+        overview["figure"] if isinstance(overview.get("figure"), str) else "",
         _texts(cards),
         {name: text for name, text in captions.items() if isinstance(text, str)} if isinstance(captions, dict) else {},
         _texts(marks),
     )
 
 
-def _texts(found: Any) -> list[str]:
-    return [each for each in found if isinstance(each, str)] if isinstance(found, list) else []
+def _texts(value: Any) -> list[str]:
+    return [text for text in value if isinstance(text, str)] if isinstance(value, list) else []

@@ -21,8 +21,8 @@ from wristctl.records.run import Run
 
 _HEAD = re.compile(r"\s*(\w+)\s*(?:\[\s*([^]]*?)\s*\])?\s*")
 
+# Columns that there may be, and of each the units that it may have, with their factor to SI.
 Units = Mapping[str, Mapping[str, float]]
-"""Columns that there may be, and of each the units that it may have, with their factor to SI."""
 
 TIME: Mapping[str, float] = {"s": 1.0, "ms": 1e-3}
 ANGLE: Mapping[str, float] = {"deg": math.pi / 180.0, "rad": 1.0}
@@ -39,13 +39,13 @@ class MeasuredTable:
     lines: Sequence[int]
 
     def at(self, sample: int) -> str:
-        """Where a sample stands."""
+        """File and line of a sample, for messages."""
         return f"{self.file}:{self.lines[sample]}"
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a table is, for who wrote it: a name for it, its columns, those it must have, and a header as an example."""
+    """Description of a table for its author: name, columns, required columns, and a header as an example."""
 
     what: str
     units: Units
@@ -63,47 +63,47 @@ class Expected:
         scales = self._scales(heads, where)
         rows = [(_cells(line, len(heads), f"{file}:{number}"), f"{file}:{number}") for number, line in lines[1:]]
         columns = {
-            name: scale * np.array([_value(row[at], name, where) for row, where in rows])
-            for at, (name, scale) in scales.items()
+            name: scale * np.array([_value(row[column], name, where) for row, where in rows])
+            for column, (name, scale) in scales.items()
         }
         return MeasuredTable(file, columns, [number for number, _ in lines[1:]])
 
     def text(self, file: Path) -> str:
-        """What the file says, with units in the header where it is a table of a run."""
+        """Text of the file, with units in the header where it is a table of a run."""
         try:
             text = file.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
-            told = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
-            what = f"cannot read the {self.what}: {told}"
-            raise UserError(what, str(file), f"a CSV file with a header such as {self.example}") from error
+            reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+            problem = f"cannot read the {self.what}: {reason}"
+            raise UserError(problem, str(file), f"a CSV file with a header such as {self.example}") from error
         return with_units(text, file)
 
     def _scales(self, heads: Iterable[str], where: str) -> dict[int, tuple[str, float]]:
         """Name and factor of the columns that are read, by their place in a line."""
-        found: dict[int, tuple[str, float]] = {}
-        for at, cell in enumerate(heads):
+        scales: dict[int, tuple[str, float]] = {}
+        for column, cell in enumerate(heads):
             match = _HEAD.fullmatch(cell)
             name, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
             if name not in self.units:
                 if self.others:
                     continue
                 if match is None or match[2] is None:
-                    what = f"column {name!r} is no name with a unit"
-                    raise UserError(what, where, f"name [unit], as in {self.example}")
+                    problem = f"column {name!r} is no name with a unit"
+                    raise UserError(problem, where, f"name [unit], as in {self.example}")
                 raise UserError(f"unknown column {name!r}", where, f"{meant(name, self.units)} Else leave it out")
             units = self.units[name]
             if not unit and "" not in units:
-                what = f"column {name!r} is no name with a unit"
-                raise UserError(what, where, f"{name} [{'] or ['.join(units)}], as in {self.example}")
+                problem = f"column {name!r} is no name with a unit"
+                raise UserError(problem, where, f"{name} [{'] or ['.join(units)}], as in {self.example}")
             if unit not in units:
                 raise UserError(f"{name} is in {unit!r}", where, f"{name} [{'] or ['.join(units)}]")
-            if name in (known for known, _ in found.values()):
+            if name in (listed for listed, _ in scales.values()):
                 raise UserError(f"column {name} stands there twice", where, "leave one out")
-            found[at] = name, units[unit]
+            scales[column] = name, units[unit]
         for name in self.needed:
-            if name not in (known for known, _ in found.values()):
+            if name not in (listed for listed, _ in scales.values()):
                 raise UserError(f"no column {name}", where, f"a header such as {self.example}")
-        return found
+        return scales
 
 
 def _cells(line: str, count: int, where: str) -> list[str]:
@@ -125,21 +125,21 @@ def _value(cell: str, name: str, where: str) -> float:
 
 def with_units(text: str, file: Path) -> str:
     """The text of a table; of one that a run wrote, and that is as sealed, with units in its header."""
-    head, end, rest = text.partition("\n")
+    head, end, body = text.partition("\n")
     if "[" in head or (units := _units_in_run(file)) is None:
         return text
     names = next(csv.reader([head]), [])
-    return ",".join(f"{name} [{units[name]}]" if units.get(name) else name for name in names) + end + rest
+    return ",".join(f"{name} [{units[name]}]" if units.get(name) else name for name in names) + end + body
 
 
 def _units_in_run(file: Path) -> dict[str, str] | None:
     """The units of a run's table by column, None where the file is none of a run, or no longer what it wrote."""
-    whole = file.absolute()
-    folder = next((each for each in whole.parents[:3] if (each / MANIFEST).is_file()), None)
+    full_path = file.absolute()
+    folder = next((parent for parent in full_path.parents[:3] if (parent / MANIFEST).is_file()), None)
     if folder is None:
         return None
-    name = whole.relative_to(folder).as_posix()
-    outputs = [each for each in Run(folder).manifest.outputs if each.path == name and each.columns]
-    if not outputs or outputs[0].sha256 != sha256_of(whole):
+    name = full_path.relative_to(folder).as_posix()
+    outputs = [output for output in Run(folder).manifest.outputs if output.path == name and output.columns]
+    if not outputs or outputs[0].sha256 != sha256_of(full_path):
         return None
-    return {each.name: each.unit for each in outputs[0].columns}
+    return {column.name: column.unit for column in outputs[0].columns}

@@ -1,4 +1,4 @@
-"""Which code ran, and on which machine with which packages."""
+"""Provenance of a run: code, machine and packages."""
 
 import hashlib
 import os
@@ -61,28 +61,28 @@ def _git(*arguments: str, index: Path | None = None) -> bytes | None:
     if index:
         environment["GIT_INDEX_FILE"] = str(index)
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             ["git", "-C", str(_PACKAGE), *arguments], capture_output=True, env=environment, timeout=30
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return done.stdout if done.returncode == 0 else None
+    return process.stdout if process.returncode == 0 else None
 
 
 _NUMERICAL = ("numpy", "scipy", "numba", "llvmlite", "torch", "pandas", "matplotlib")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# Settings of libraries that choose between ways of computing which may differ in the last bit.
 _CODE_PATHS = (
     "OPENBLAS_CORETYPE", "MKL_CBWR", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "NPY_DISABLE_CPU_FEATURES",
     "NPY_ENABLE_CPU_FEATURES", "ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA",
 )  # fmt: skip
-"""Settings of libraries that choose between ways of computing which may differ in the last bit."""
 
 
 def environment_state() -> tuple[Environment, str]:
     """The environment, and every installed distribution as `name==version` lines."""
-    described = [each.metadata for each in metadata.distributions()]  # read anew at every mention
-    found = [((each["Name"] or "").lower(), each["Version"]) for each in described]
-    installed = dict(reversed(found))  # the first on the path is the one that is imported
+    described = [distribution.metadata for distribution in metadata.distributions()]  # read anew at every mention
+    versions = [((package["Name"] or "").lower(), package["Version"]) for package in described]
+    installed = dict(reversed(versions))  # the first on the path is the one that is imported
     listing = "".join(f"{name}=={version}\n" for name, version in sorted(installed.items()))
     environment = Environment(
         python=platform.python_version(),
@@ -117,4 +117,4 @@ def _features() -> list[str]:
     except OSError:
         return []
     flags = next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
-    return sorted(each for each in flags if each in ("fma", "asimd", "sve") or each.startswith(("sse4", "avx")))
+    return sorted(flag for flag in flags if flag in ("fma", "asimd", "sve") or flag.startswith(("sse4", "avx")))

@@ -21,8 +21,8 @@ from wristctl.records.seal import SIGNING, added
 from wristctl.records.tags import LOCK_OF_TAGS, TAGS, change_tags, known_tags
 from wristctl.sha256sums import read_seal
 
+# End of the hidden name under which a run is deleted.
 REMOVED = ".removed"
-"""End of the hidden name under which a run is deleted."""
 
 
 def removable(runs: Sequence[Run], force: bool = False) -> list[Run]:
@@ -72,8 +72,11 @@ def _held_by_others(folder: Path) -> Path | None:
     """A folder of the run out of which nothing can be deleted: found before a run is torn to pieces."""
     if folder.is_symlink() or os.statvfs(folder).f_flag & os.ST_RDONLY:  # that is told in other words
         return None
-    folders = [folder, *(each for each in folder.rglob("*") if each.is_dir() and not each.is_symlink())]
-    return next((each for each in folders if not os.access(each, os.W_OK | os.X_OK)), None)
+    folders = [
+        folder,
+        *(subfolder for subfolder in folder.rglob("*") if subfolder.is_dir() and not subfolder.is_symlink()),
+    ]
+    return next((subfolder for subfolder in folders if not os.access(subfolder, os.W_OK | os.X_OK)), None)
 
 
 def _free(path: Path) -> Path:
@@ -84,11 +87,11 @@ def _free(path: Path) -> Path:
     return path
 
 
+# All that a run may have written before its manifest.
 _BEGINNING = {CONFIG, CONSOLE, EVENTS, PACKAGES, PATCH, SOURCES, RESERVE, LOCK, INPUTS}
-"""All that a run may have written before its manifest."""
 
+# Beginning of the name of a scratch folder; its lock is gone once the repetition has ended.
 SCRATCH = "wristctl-replay-"
-"""Beginning of the name of a scratch folder; its lock is gone once the repetition has ended."""
 
 
 class Leftover(NamedTuple):
@@ -120,38 +123,38 @@ def _left_in(run: Path) -> list[Leftover]:
         return []
     if _began_no_run(run):
         return [Leftover(run, "a run that was killed before it began", _size(run))]
-    sealed, found = (run / SUMS).exists(), []
+    sealed, left_behind = (run / SUMS).exists(), []
     for path in sorted(run.rglob(".*")):
         unfinished = not sealed and (path.name == RESERVE or path.name.endswith(PART))
         if unfinished or path in (run / LOCK, run / SIGNING):
-            found.append(Leftover(path, "left by a run that was killed", _size(path)))
-    return found
+            left_behind.append(Leftover(path, "left by a run that was killed", _size(path)))
+    return left_behind
 
 
 def lost_repetitions() -> Iterator[Leftover]:
     """Scratch folders of your replays that were killed."""
     for folder in sorted(Path(tempfile.gettempdir()).glob(f"{SCRATCH}*")):
-        found = folder.lstat()
-        yours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+        status = folder.lstat()
+        yours = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
         if yours and (folder / LOCK).exists() and not is_locked(folder):
             yield Leftover(folder, "of a replay that was killed", _size(folder))
 
 
 def lost_tags(results: Path) -> dict[str, list[str]]:
     """Tags of runs that are gone."""
-    there = set(run_names(results))
-    return {run: tags for run, tags in known_tags(results).items() if run not in there}
+    present = set(run_names(results))
+    return {run: tags for run, tags in known_tags(results).items() if run not in present}
 
 
-def clear(found: Leftover) -> None:
+def clear(leftover: Leftover) -> None:
     """Delete it."""
-    if found.path.is_dir() and not found.path.is_symlink():
-        delete_folder(found.path)
-    elif found.path.name == f".{TAGS}{PART}":
-        with locked(found.path.parent / LOCK_OF_TAGS):  # whoever writes tags has it
-            found.path.unlink(missing_ok=True)
+    if leftover.path.is_dir() and not leftover.path.is_symlink():
+        delete_folder(leftover.path)
+    elif leftover.path.name == f".{TAGS}{PART}":
+        with locked(leftover.path.parent / LOCK_OF_TAGS):  # whoever writes tags has it
+            leftover.path.unlink(missing_ok=True)
     else:
-        found.path.unlink(missing_ok=True)
+        leftover.path.unlink(missing_ok=True)
 
 
 def clear_tags(results: Path, lost: dict[str, list[str]]) -> None:
@@ -162,12 +165,12 @@ def clear_tags(results: Path, lost: dict[str, list[str]]) -> None:
 
 def _began_no_run(folder: Path) -> bool:
     """Whether a folder holds only what a run writes before its manifest: anything else is somebody's."""
-    names = {each.name for each in folder.iterdir()}
+    names = {item.name for item in folder.iterdir()}
     begun = {name for name in names if name in _BEGINNING or (name.startswith(".") and name.endswith(PART))}
-    folders = {each.name for each in folder.iterdir() if each.is_dir()}
+    folders = {item.name for item in folder.iterdir() if item.is_dir()}
     return names == begun and dated(folder.name) != "" and folders <= {INPUTS}
 
 
 def _size(path: Path) -> int:
     files = [path] if not path.is_dir() or path.is_symlink() else path.rglob("*")
-    return sum(each.lstat().st_size for each in files if each.is_symlink() or each.is_file())
+    return sum(item.lstat().st_size for item in files if item.is_symlink() or item.is_file())

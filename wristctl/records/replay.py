@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Numbers alike: |now - before| <= ABSOLUTE + RELATIVE |before|; other processors and libraries round differently.
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
-"""Numbers alike: |now - before| <= ABSOLUTE + RELATIVE |before|; other processors and libraries round differently."""
+# Pictures alike: mean difference of their pixels, of 1.
 _PIXELS = 0.02
-"""Pictures alike: mean difference of their pixels, of 1."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -74,7 +74,7 @@ def _size(frame: pd.DataFrame) -> str:
 
 
 def _compare_arrays(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> FileComparison:
-    shapes = [{name: array.shape for name, array in each.items()} for each in (a, b)]
+    shapes = [{name: array.shape for name, array in arrays.items()} for arrays in (a, b)]
     if shapes[0] != shapes[1]:
         unlike = sorted(name for name in shapes[0] | shapes[1] if shapes[0].get(name) != shapes[1].get(name))
         return FileComparison(
@@ -83,7 +83,7 @@ def _compare_arrays(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> FileC
     return _first_difference({name: (a[name], b[name]) for name in a}, a.get("time"), "array")
 
 
-def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -> FileComparison:
+def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, kind: str) -> FileComparison:
     """The earliest place at which any pair of arrays differs; the first of the pairs where several do."""
     import numpy as np
 
@@ -97,14 +97,14 @@ def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, what: str) -
         else:
             alike = (a == b) | ((a != a) & (b != b))
         if not np.all(alike):
-            at = tuple(int(k) for k in np.argwhere(~np.atleast_1d(alike))[0])
-            known = time is not None and (time.shape == a.shape or time.shape == a.shape[:1])
-            instant = float(time[at] if known and time.shape == a.shape else time[at[0]]) if known else math.inf
-            row = at[0] if len(at) == 1 else list(at)
-            places.append((instant, at, f"{what} {name} from " + (f"time {instant:g} s" if known else f"row {row}")))
+            index = tuple(int(k) for k in np.argwhere(~np.atleast_1d(alike))[0])
+            timed = time is not None and (time.shape == a.shape or time.shape == a.shape[:1])
+            instant = float(time[index] if timed and time.shape == a.shape else time[index[0]]) if timed else math.inf
+            row = index[0] if len(index) == 1 else list(index)
+            places.append((instant, index, f"{kind} {name} from " + (f"time {instant:g} s" if timed else f"row {row}")))
     if not places:
         return FileComparison("within tolerance", f"largest difference {largest:.2g}")
-    *_, place = min(places, key=lambda found: found[:2])
+    *_, place = min(places, key=lambda place: place[:2])
     return FileComparison("differs", f"{place}; largest difference {largest:.2g}")
 
 
@@ -135,7 +135,7 @@ def _compare_texts(a: str, b: str) -> FileComparison:
 
 
 class ReplayVerdict(NamedTuple):
-    """What became of one file; volatile ones (wall times) are not compared."""
+    """Verdict on one file of a repetition. Volatile files (wall times) are not compared."""
 
     path: str
     verdict: Literal["identical", "within tolerance", "differs", "missing", "added", "volatile"]
@@ -144,54 +144,54 @@ class ReplayVerdict(NamedTuple):
 
 def verdicts(original: Run, again: Run) -> list[ReplayVerdict]:
     """A verdict on each output of either run."""
-    before = {each.path: each for each in original.manifest.outputs}
-    after = {each.path: each for each in again.manifest.outputs}
-    found = []
+    before = {output.path: output for output in original.manifest.outputs}
+    after = {output.path: output for output in again.manifest.outputs}
+    compared = []
     for path in dict.fromkeys([*before, *after]):
         if (before.get(path) or after[path]).volatile:
-            found.append(ReplayVerdict(path, "volatile", "not compared"))
+            compared.append(ReplayVerdict(path, "volatile", "not compared"))
         elif path not in after:
-            found.append(ReplayVerdict(path, "missing", "not written this time"))
+            compared.append(ReplayVerdict(path, "missing", "not written this time"))
         elif path not in before:
-            found.append(ReplayVerdict(path, "added", "not written then"))
+            compared.append(ReplayVerdict(path, "added", "not written then"))
         else:
-            found.append(ReplayVerdict(path, *compare_files(original.path / path, again.path / path)))
-    return found
+            compared.append(ReplayVerdict(path, *compare_files(original.path / path, again.path / path)))
+    return compared
 
 
 def changed_inputs(run: Run) -> list[str]:
-    """What is wrong with the inputs as they are now; empty where each is sealed as it was read."""
-    found = []
-    for each in run.manifest.inputs:
+    """Faults of the inputs as they are now. Empty where every input is sealed as it was read."""
+    faults = []
+    for record in run.manifest.inputs:
         try:
-            now = input_run(run, each)
+            now = input_run(run, record)
             problems = now.problems()
         except UserError as error:
-            found.append(f"input: {each.role}: {error.what} ({error.where})")
+            faults.append(f"input: {record.role}: {error.what} ({error.where})")
             continue
         readable = (MANIFEST, CHANGED) not in problems
-        if readable and now.result_hash != each.result_sha256:
-            found.append(f"input: {each.role}: another result than was read ({now.path})")
-        found += [f"input: {each.role}: {what} ({now.path / path})" for path, what in problems]
-    return found
+        if readable and now.result_hash != record.result_sha256:
+            faults.append(f"input: {record.role}: another result than was read ({now.path})")
+        faults += [f"input: {record.role}: {problem} ({now.path / path})" for path, problem in problems]
+    return faults
 
 
 def causes(original: Run, again: Run) -> list[str]:
-    """What differs between the run and its repetition, as likely causes; nondeterminism where nothing does."""
+    """Likely causes of a difference between a run and its repetition. Nondeterminism where everything else is equal."""
     changed = difference(original, again)
-    found = [f"input: {each.name}" for each in changed.inputs]
-    found += [f"config: {_change_text(each)}" for each in changed.config]
+    likely = [f"input: {change.name}" for change in changed.inputs]
+    likely += [f"config: {_change_text(change)}" for change in changed.config]
     if any(path == CONFIG for path, _ in original.problems()):
-        found.append("config: config.yaml was changed after the run")
-    found += _causes_of("code", changed.code)
-    found += _causes_of("environment", changed.environment)
-    return found or ["nondeterminism: configuration, code, inputs and environment are the same"]
+        likely.append("config: config.yaml was changed after the run")
+    likely += _causes_of("code", changed.code)
+    likely += _causes_of("environment", changed.environment)
+    return likely or ["nondeterminism: configuration, code, inputs and environment are the same"]
 
 
-def _causes_of(what: str, changed: list[Change], most: int = 6) -> list[str]:
+def _causes_of(origin: str, changed: list[Change], most: int = 6) -> list[str]:
     """The first of what changed, one line each, and how many more there are."""
-    more = [f"{what}: and {len(changed) - most} more"] if len(changed) > most else []
-    return [f"{what}: {_change_text(each)}" for each in changed[:most]] + more
+    more = [f"{origin}: and {len(changed) - most} more"] if len(changed) > most else []
+    return [f"{origin}: {_change_text(change)}" for change in changed[:most]] + more
 
 
 def _change_text(change: Change) -> str:

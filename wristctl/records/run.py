@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
+# Advice to a user where there is no run.
 NAME_A_RUN = ("name a run that `", Call("runs ls"), "` shows")
-"""What to do where there is no run."""
 _RESTORE = "restore it or name another run"
 
 RunState = Literal["running", "ok", "failed", "interrupted", "crashed", "broken"]
@@ -43,8 +43,8 @@ class Run:
     """An existing run directory, read when asked; every error is a UserError that names the file."""
 
     def __init__(self, path: Path) -> None:
-        whole = Path(os.path.abspath(path))
-        self.path = whole.parent.resolve() / whole.name  # a link stays one: what is deleted is the link
+        full_path = Path(os.path.abspath(path))
+        self.path = full_path.parent.resolve() / full_path.name  # a link stays one: what is deleted is the link
 
     @property
     def id(self) -> str:
@@ -87,7 +87,7 @@ class Run:
 
     @property
     def state(self) -> RunState:
-        """How it ended: `crashed` if running by its word but without a lock, `broken` without the manifest it wrote."""
+        """State of the run. `crashed`: the manifest says running, but nobody holds the lock. `broken`: no manifest."""
         if is_locked(self.path):
             return "running"
         self.__dict__.pop("manifest", None)
@@ -108,12 +108,12 @@ class Run:
         file = self.path / METRICS
         again = ("run `", Call(command_of(self.kind)), "` again")
         try:
-            found = json.loads(file.read_bytes()) if file.is_file() else {}
+            content = json.loads(file.read_bytes()) if file.is_file() else {}
         except (ValueError, RecursionError) as error:
             raise UserError("not valid JSON", str(file), again) from error
-        if not isinstance(found, dict) or not all(map(_is_metric, found.values())):
+        if not isinstance(content, dict) or not all(map(_is_metric, content.values())):
             raise UserError("no table of metrics", str(file), again)
-        return found
+        return content
 
     @property
     def result_hash(self) -> str:
@@ -131,7 +131,7 @@ class Run:
     def file(self, name: str) -> Path:
         """The path of one of its files; UserError where there is none, or a link, which may lead anywhere."""
         path = self.path / name
-        if any(each.is_symlink() for each in (path, *path.parents[: len(Path(name).parts) - 1])):
+        if any(part.is_symlink() for part in (path, *path.parents[: len(Path(name).parts) - 1])):
             raise UserError(LINK, str(path), _RESTORE)
         if not path.is_file():
             raise UserError(f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path)))
@@ -141,36 +141,36 @@ class Run:
         """Hash every file again; UserError naming run.json, or else the first that is missing or not as sealed."""
         self.__dict__.pop("manifest", None)
         again = ("restore it or run `", Call(command_of(self.kind)), "` again")
-        for path, what in self.problems():
-            if what not in (ADDED, ADDED_FOLDER):
-                raise UserError(what, str(self.path / path), again)
+        for path, problem in self.problems():
+            if problem not in (ADDED, ADDED_FOLDER):
+                raise UserError(problem, str(self.path / path), again)
 
     def problems(self) -> list[tuple[str, str]]:
-        """Each file that is not as it was sealed, and what is wrong with it; UserError if the run is not sealed.
+        """Files that differ from the seal, each with its fault. Raises UserError if the run is not sealed.
 
-        Where all files are, it is also asked whether manifest and seal are of one mind.
+        Where no file differs, the manifest is compared with the seal as well.
         """
         sums = read_seal(self.path)
         if sums is None:
             raise UserError("run is not sealed", str(self.path), "use a run that has ended")
-        found = faults_of_files(self.path, sums)
-        if any(name == MANIFEST for name, _ in found):
-            return found
+        faults = faults_of_files(self.path, sums)
+        if any(name == MANIFEST for name, _ in faults):
+            return faults
         self.__dict__.pop("manifest", None)
         try:
-            return sorted(found + faults_of_manifest(self.path, sums, self.manifest))
+            return sorted(faults + faults_of_manifest(self.path, sums, self.manifest))
         except UserError as error:
-            return sorted([*found, (MANIFEST, error.what)])
+            return sorted([*faults, (MANIFEST, error.what)])
 
 
-def _is_metric(found: object) -> bool:
+def _is_metric(value: object) -> bool:
     """Whether this is an entry of metrics.json, as far as others rely on it."""
-    if not isinstance(found, dict) or not _is_number(found.get("value")):
+    if not isinstance(value, dict) or not _is_number(value.get("value")):
         return False
-    interval = found.get("interval")
+    interval = value.get("interval")
     pair = interval is None or (isinstance(interval, list) and len(interval) == 2 and all(map(_is_number, interval)))
-    return pair and all(isinstance(found.get(name) or "", str) for name in ("unit", "better", "meaning"))
+    return pair and all(isinstance(value.get(name) or "", str) for name in ("unit", "better", "meaning"))
 
 
-def _is_number(found: object) -> bool:
-    return found is None or isinstance(found, int | float)
+def _is_number(value: object) -> bool:
+    return value is None or isinstance(value, int | float)

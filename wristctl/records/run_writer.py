@@ -51,15 +51,15 @@ def readme(manifest: Manifest, summary: str) -> str:
         f"`{shlex.join(manifest.argv)}`: {manifest.state}, wristctl {manifest.code.version}, "
         f"seed {manifest.seed}, started {manifest.timing.started}, {manifest.timing.wall_s or 0:.1f} s.",
         *(
-            f"\nInput `{each.role}`: {each.kind} run {each.run} (result {each.result_sha256[:12]})."
-            for each in manifest.inputs
+            f"\nInput `{record.role}`: {record.kind} run {record.run} (result {record.result_sha256[:12]})."
+            for record in manifest.inputs
         ),
         *([_taken_over(manifest.units)] if manifest.units else []),
         *([f"\nError: {manifest.error.what} {manifest.error.where}".rstrip()] if manifest.error else []),
         *(["", "## Result", "", summary.strip()] if summary else []),
         *(["", "## Files", ""] if manifest.outputs else []),
     ]
-    units = [each for each in manifest.outputs if each.path.startswith("units/")]
+    units = [output for output in manifest.outputs if output.path.startswith("units/")]
     if units:
         lines.append(
             f"- `units/` (outside the result hash): {len(units)} units of work, for a run that goes on from here"
@@ -89,16 +89,16 @@ def readme(manifest: Manifest, summary: str) -> str:
 
 
 def _taken_over(units: TakenOver) -> str:
-    """How much of a run was computed in another one."""
+    """Count of units that a run took over from an earlier run, as text."""
     text = f"\n{units.taken_over} units of work were computed in run {units.run}, which this one goes on from"
     return f"{text}; {units.computed_again} more of its units were computed again here, and gave the same."
 
 
+# Makes report.html of a run directory and its finished manifest.
 Page = Callable[[Path, Manifest], str]
-"""Makes report.html of a run directory and its finished manifest."""
 
+# Space kept from the start, so that a run on a full disk can still say that it failed.
 RESERVE, _RESERVED = ".reserve", 512 * 1024
-"""Space kept from the start, so that a run on a full disk can still say that it failed."""
 _RESULTS = ("data", "models", "figures")
 _PROVENANCE = (CONFIG, PACKAGES, PATCH, SOURCES)
 _RECORDS = {MANIFEST, SUMS, CONFIG, EVENTS, CONSOLE, PACKAGES, PATCH, SOURCES, README, REPORT}
@@ -151,19 +151,19 @@ class LiveRun:
         formats.write_table(self.file(name), columns)
         units, meaning = units or {}, meaning or {}
         names = map(str, columns.keys())
-        self.columns(name, {each: (units.get(each, ""), meaning.get(each, "")) for each in names})
+        self.columns(name, {name: (units.get(name, ""), meaning.get(name, "")) for name in names})
 
     def columns(self, name: str, columns: Mapping[str, tuple[str, str]]) -> None:
         """Note unit and meaning of each column of a table, which may be written otherwise than by `table`."""
         named = columns.items()
-        self._columns[name] = [Column(name=each, unit=unit, meaning=meaning) for each, (unit, meaning) in named]
+        self._columns[name] = [Column(name=name, unit=unit, meaning=meaning) for name, (unit, meaning) in named]
 
     def arrays(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Write arrays as npz."""
         formats.write_arrays(self.file(name), arrays)
 
     def file(self, name: str) -> Path:
-        """Where to write an output of any format; it becomes part of the run when the run ends."""
+        """Path for an output of any format. It becomes part of the run when the run ends."""
         relative = PurePosixPath(name)
         if relative.is_absolute() or ".." in relative.parts or name in _RECORDS:
             raise ValueError(f"{name!r} is no name for an output of a run")
@@ -230,7 +230,7 @@ class LiveRun:
         plain = (name for name in files_below(self.path) if not (self.path / name).is_symlink())
         manifest.outputs = [self._output(name) for name in plain if name not in recorded]
         if state == "ok":
-            self._nothing_lost({each.path for each in manifest.outputs})
+            self._nothing_lost({output.path for output in manifest.outputs})
         manifest.result_sha256 = result_hash(manifest)
         wall, cpu = self._began
         manifest.timing.ended = now()
@@ -244,10 +244,10 @@ class LiveRun:
         for left in (reserve, *self.path.rglob(RESERVE)):  # also what a part of the run kept for itself
             left.unlink(missing_ok=True)
         self._still_there()
-        for folder in sorted(each for each in self.path.rglob("*") if each.is_dir())[::-1]:
+        for folder in sorted(item for item in self.path.rglob("*") if item.is_dir())[::-1]:
             if not any(folder.iterdir()):
                 folder.rmdir()
-        write_seal(self.path, {each.path: each.sha256 for each in manifest.outputs})
+        write_seal(self.path, {output.path: output.sha256 for output in manifest.outputs})
         return manifest
 
     def close(self) -> None:
@@ -257,12 +257,15 @@ class LiveRun:
     def _still_there(self) -> None:
         """UserError where the folder is no longer the one that the run began with."""
         try:
-            there = self.path.stat()
+            folder_status = self.path.stat()
         except OSError:
-            there = None
-        if there is None or (there.st_dev, there.st_ino) != (self._home.st_dev, self._home.st_ino):
-            what = "the run's folder was removed, moved or replaced while it ran"
-            raise UserError(what, str(self.path), "leave it where it is, and run again")
+            folder_status = None
+        if folder_status is None or (folder_status.st_dev, folder_status.st_ino) != (
+            self._home.st_dev,
+            self._home.st_ino,
+        ):
+            problem = "the run's folder was removed, moved or replaced while it ran"
+            raise UserError(problem, str(self.path), "leave it where it is, and run again")
 
     def _only_files(self) -> None:
         """UserError where something in the run is no plain file: it could not be sealed."""

@@ -13,31 +13,31 @@ from wristctl.records.files import LINK, NOT_PLAIN, PART, files_below, sha256_of
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, SIGNATURE, SOURCES, SUMS, Manifest
 
+# Files that every run has.
 REQUIRED = (MANIFEST, CONFIG, PACKAGES, SOURCES)
-"""Files that every run has."""
 
 CHANGED, MISSING = "hash does not match what was sealed", "sealed file is missing"
 ADDED, ADDED_FOLDER = "file was added after sealing", "folder was added after sealing"
+# File that remains after a killed `runs sign`.
 SIGNING = f".{SIGNATURE}{PART}"
-"""What stays where `runs sign` was killed."""
+# Files of a run outside its seal. A lock remains where a process was killed at the very end.
 _BESIDE = (SUMS, SIGNATURE, SIGNING, LOCK)
-"""What stands beside the files that are sealed; a lock stays where a process was killed at the very end."""
 
+# A path in the run directory, and what is wrong with it.
 Fault = tuple[str, str]
-"""A path in the run directory, and what is wrong with it."""
 
 
-def write_seal(folder: Path, known: dict[str, str]) -> None:
+def write_seal(folder: Path, digests: dict[str, str]) -> None:
     """Seal a directory as it is, all on the disk before; `known` are hashes of files that are on the disk already."""
-    found = {}
+    sums = {}
     for name in files_below(folder):
         if name not in _BESIDE and not (folder / name).is_symlink():
-            if name not in known:
+            if name not in digests:
                 sync(folder / name)
-            found[name] = known.get(name) or sha256_of(folder / name)
-    for below in sorted({(folder / name).parent for name in found}):
+            sums[name] = digests.get(name) or sha256_of(folder / name)
+    for below in sorted({(folder / name).parent for name in sums}):
         sync(below)
-    write_text(folder / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sorted(found.items())))
+    write_text(folder / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))
 
 
 def entries(folder: Path) -> Iterator[tuple[str, str]]:
@@ -45,13 +45,13 @@ def entries(folder: Path) -> Iterator[tuple[str, str]]:
     waiting = [""]
     while waiting:
         below = waiting.pop()
-        with os.scandir(folder / below) as found:
-            inside = sorted(found, key=lambda each: each.name)
+        with os.scandir(folder / below) as listing:
+            inside = sorted(listing, key=lambda item: item.name)
         if below and not inside:
             yield below, "folder"
-        for each in inside:
-            name = f"{below}/{each.name}" if below else each.name
-            mode = each.stat(follow_symlinks=False).st_mode
+        for item in inside:
+            name = f"{below}/{item.name}" if below else item.name
+            mode = item.stat(follow_symlinks=False).st_mode
             if stat.S_ISDIR(mode):
                 waiting.append(name)
             else:
@@ -59,47 +59,47 @@ def entries(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def added(folder: Path, sums: dict[str, str]) -> list[str]:
-    """Whatever stands in a sealed run and is not the run's, by name; nothing is hashed."""
+    """Names of files in a sealed run that are not part of it. Hashes nothing."""
     return sorted(name for name, _ in entries(folder) if name not in sums and name not in _BESIDE)
 
 
 def faults_of_files(folder: Path, sums: dict[str, str]) -> list[Fault]:
-    """Each file that is not as it was sealed."""
-    found, there = [], set()
+    """Files that differ from the seal, each with its fault."""
+    faults, present = [], set()
     for name, kind in entries(folder):
-        there.add(name)
+        present.add(name)
         if kind in ("link", "odd"):
-            found.append((name, LINK if kind == "link" else NOT_PLAIN))
+            faults.append((name, LINK if kind == "link" else NOT_PLAIN))
         elif name in sums:
             if kind == "folder":
-                found.append((name, NOT_PLAIN))
+                faults.append((name, NOT_PLAIN))
             elif sha256_of(folder / name) != sums[name]:
-                found.append((name, CHANGED))
+                faults.append((name, CHANGED))
         elif name not in _BESIDE:
-            found.append((name, ADDED_FOLDER if kind == "folder" else ADDED))
-    found += [(name, MISSING) for name in sums if name not in there]
-    found += [(name, "is not among what was sealed") for name in REQUIRED if name not in sums]
-    return sorted(found)
+            faults.append((name, ADDED_FOLDER if kind == "folder" else ADDED))
+    faults += [(name, MISSING) for name in sums if name not in present]
+    faults += [(name, "is not among what was sealed") for name in REQUIRED if name not in sums]
+    return sorted(faults)
 
 
 def faults_of_manifest(folder: Path, sums: dict[str, str], manifest: Manifest) -> list[Fault]:
-    """Where the seal and the manifest, which has the hashes of outputs and result, are not of one mind."""
-    found = []
+    """Contradictions between the seal and the hashes of outputs and result in the manifest."""
+    faults = []
     if manifest.id != folder.name:
-        found.append((MANIFEST, f"is that of run {manifest.id}, and stands in the folder {folder.name}"))
-    for each in manifest.outputs:
-        if each.path not in sums:
-            found.append((each.path, f"is an output of {MANIFEST}, and not in {SUMS}"))
-        elif each.sha256 != sums[each.path]:
-            found.append((each.path, f"hash in {SUMS} is not that in {MANIFEST}"))
+        faults.append((MANIFEST, f"is that of run {manifest.id}, and stands in the folder {folder.name}"))
+    for output in manifest.outputs:
+        if output.path not in sums:
+            faults.append((output.path, f"is an output of {MANIFEST}, and not in {SUMS}"))
+        elif output.sha256 != sums[output.path]:
+            faults.append((output.path, f"hash in {SUMS} is not that in {MANIFEST}"))
     for name, digest in manifest.code.foreign.items():
         if sums.get(name) != digest:
-            found.append((name, f"hash in {SUMS} is not that in {MANIFEST}"))
+            faults.append((name, f"hash in {SUMS} is not that in {MANIFEST}"))
     if manifest.result_sha256 != result_hash(manifest):
-        found.append((MANIFEST, "result_sha256 is not that of the outputs"))
-    return found
+        faults.append((MANIFEST, "result_sha256 is not that of the outputs"))
+    return faults
 
 
 def result_hash(manifest: Manifest) -> str:
     """One hash over the outputs that are results."""
-    return sha256_of_list([(each.path, each.sha256) for each in manifest.outputs if not each.volatile])
+    return sha256_of_list([(output.path, output.sha256) for output in manifest.outputs if not output.volatile])

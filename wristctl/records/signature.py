@@ -16,12 +16,12 @@ from wristctl.records.files import write_text
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
 
+# A signature made for another purpose does not count.
 NAMESPACE = "wristctl-run"
-"""A signature made for another purpose does not count."""
 
 
 class RunSignature(NamedTuple):
-    """What is known of the signature of a run: `signer` is empty where the key is nobody's that is known."""
+    """Signature of a run. `signer` is empty where the key belongs to no allowed signer."""
 
     signer: str
     key: str
@@ -34,12 +34,12 @@ def sign(run: Run, key: Path) -> RunSignature:
     UserError where that is not so, or ssh-keygen refuses.
     """
     run.check()
-    done = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=_content(run.path / SUMS))
-    if done.returncode != 0:
+    process = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=_content(run.path / SUMS))
+    if process.returncode != 0:
         raise UserError(
-            f"cannot sign: {_told(done)}", str(key), "name a private SSH key: ssh-keygen -t ed25519 makes one"
+            f"cannot sign: {_error_text(process)}", str(key), "name a private SSH key: ssh-keygen -t ed25519 makes one"
         )
-    write_text(run.path / SIGNATURE, done.stdout.decode())
+    write_text(run.path / SIGNATURE, process.stdout.decode())
     return signature(run, None)
 
 
@@ -50,16 +50,16 @@ def is_signed(run: Run) -> bool:
 
 
 def signature(run: Run, signers: Path | None) -> RunSignature:
-    """Whose signature a run has. UserError where it has none, or the allowed signers cannot be read."""
+    """Signer of a run. Raises UserError where the run is unsigned, or the allowed signers cannot be read."""
     file = run.path / SIGNATURE
     if not is_signed(run):
         raise UserError("run is not signed", str(run.path), ("ask whoever made it to run `", Call("runs sign"), "`"))
     content = _content(run.path / SUMS)
     valid = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(file), content=content)
-    found = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))
-    if valid.returncode != 0 or not found:
-        return RunSignature("", "", f"the signature is not of this {SUMS}: {_told(valid)}")
-    key = found[1]
+    match = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))
+    if valid.returncode != 0 or not match:
+        return RunSignature("", "", f"the signature is not of this {SUMS}: {_error_text(valid)}")
+    key = match[1]
     if signers is None:
         return RunSignature("", key)
     _content(signers)
@@ -71,12 +71,12 @@ def signature(run: Run, signers: Path | None) -> RunSignature:
     return RunSignature("", key, f"the key {key} is nobody's in {signers}")
 
 
-def _ssh_keygen(what: str, *options: str, content: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+def _ssh_keygen(action: str, *options: str, content: bytes = b"") -> subprocess.CompletedProcess[bytes]:
     program = shutil.which("ssh-keygen")
     if program is None:
         raise UserError("signatures need OpenSSH", "ssh-keygen", "install openssh-client")
     plain = {**os.environ, "LC_ALL": "C"}
-    return subprocess.run([program, "-Y", what, *options], input=content, capture_output=True, env=plain)
+    return subprocess.run([program, "-Y", action, *options], input=content, capture_output=True, env=plain)
 
 
 def _content(file: Path) -> bytes:
@@ -86,6 +86,6 @@ def _content(file: Path) -> bytes:
         raise (error_of_the_system(error, file) or error) from error
 
 
-def _told(done: subprocess.CompletedProcess[bytes]) -> str:
-    lines = done.stderr.decode(errors="replace").split("\n")
-    return next((line.strip() for line in lines if line.strip()), f"ssh-keygen ended with {done.returncode}")
+def _error_text(process: subprocess.CompletedProcess[bytes]) -> str:
+    lines = process.stderr.decode(errors="replace").split("\n")
+    return next((line.strip() for line in lines if line.strip()), f"ssh-keygen ended with {process.returncode}")

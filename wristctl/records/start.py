@@ -67,10 +67,10 @@ def start_run(
     files = sealed_files(study, kind)
     digest = config_hash(files.study, kind)
     path, lock = None, None
-    with interrupts() as seen:
+    with interrupts() as interrupt:
         try:
             with deferred():
-                if seen.asked:  # and swallowed by a library
+                if interrupt.asked:  # and swallowed by a library
                     raise KeyboardInterrupt
                 path = _new_directory(out, kind, label, digest)
                 while lock is None:
@@ -93,7 +93,7 @@ def start_run(
             with undisturbed():
                 run.end("ok", run.exit_code)
         except BaseException as error:
-            outcome = KeyboardInterrupt() if seen.asked else _refused(error, path)
+            outcome = KeyboardInterrupt() if interrupt.asked else _refused(error, path)
             with undisturbed():
                 _end_failed(run, outcome)
             if outcome is not error:
@@ -127,8 +127,8 @@ def _new_directory(out: Path, kind: str, label: str, digest: str) -> Path:
                 ) from None
             attempt += 1
         except OSError as error:
-            what = f"cannot create a run directory: {error.strerror}"
-            raise UserError(what, str(out), ("choose a folder you can write to with ", OUT)) from error
+            problem = f"cannot create a run directory: {error.strerror}"
+            raise UserError(problem, str(out), ("choose a folder you can write to with ", OUT)) from error
 
 
 def _keep(path: Path) -> None:
@@ -165,13 +165,13 @@ def _begin(
         code.patch_sha256 = sha256_of(path / PATCH)
     records = [
         Input(
-            role=each.role,
-            kind=each.run.kind,
-            run=each.run.manifest.id,
-            path=str(each.run.path),
-            result_sha256=each.run.result_hash,
+            role=source.role,
+            kind=source.run.kind,
+            run=source.run.manifest.id,
+            path=str(source.run.path),
+            result_sha256=source.run.result_hash,
         )
-        for each in inputs
+        for source in inputs
     ]
     return LiveRun(
         path,
@@ -187,7 +187,9 @@ def _begin(
             environment=environment,
             inputs=records,
             timing=Timing(started=now()),
-            fingerprint=fingerprint(digest, code, environment, {each.role: each.result_sha256 for each in records}),
+            fingerprint=fingerprint(
+                digest, code, environment, {record.role: record.result_sha256 for record in records}
+            ),
         ),
         page,
         files.names,
@@ -209,8 +211,8 @@ def _refused(error: BaseException, path: Path) -> BaseException:
     """The user's error behind one of the disk or the system, wherever it was met; any other error as it is."""
     if not isinstance(error, Exception | KeyboardInterrupt):  # SystemExit above all, which would end in silence
         return RuntimeError(f"{type(error).__name__} was raised: {error}".rstrip(": "))
-    known = None if isinstance(error, FileNotFoundError) else error_of_the_system(error, path)
-    return known or error
+    reported = None if isinstance(error, FileNotFoundError) else error_of_the_system(error, path)
+    return reported or error
 
 
 def _end_failed(run: LiveRun, error: BaseException) -> None:

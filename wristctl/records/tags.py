@@ -18,13 +18,13 @@ _log = logging.getLogger(__name__)
 def read_tags(results: Path) -> dict[str, list[str]]:
     """Tags by run id; UserError where the file is damaged."""
     try:
-        found = json.loads((results / TAGS).read_bytes())
+        content = json.loads((results / TAGS).read_bytes())
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"cannot read the tags: {error}", str(results / TAGS), "mend or delete it") from error
-    if isinstance(found, dict) and all(_is_list_of_tags(tags) for tags in found.values()):
-        return found
+    if isinstance(content, dict) and all(_is_list_of_tags(tags) for tags in content.values()):
+        return content
     raise UserError("the tags are no lists by run id", str(results / TAGS), "mend or delete it")
 
 

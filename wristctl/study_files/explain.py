@@ -19,15 +19,15 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> User
     """The most telling of the errors found; `origins` says the file and line (or override) of each key."""
     details = error.errors(include_url=False)
     unknown = [detail for detail in details if detail["type"] == "extra_forbidden"]
-    detail: Any = unknown[0] if unknown else max(details, key=lambda each: len(each["loc"]))
+    detail: Any = unknown[0] if unknown else max(details, key=lambda entry: len(entry["loc"]))
     path: KeyPath = ()
-    whole: KeyPath = ()
+    section_path: KeyPath = ()
     for key in _location(detail):  # a location also names the alternatives of a union, which no file does
         if (*path, key) in origins:
-            path = whole = (*path, key)
-        elif path and (isinstance(key, int) or field_at((*whole, key))[1] is not field_at(whole)[1]):
-            whole = (*whole, key)
-    where = (origins[path], f": {'.'.join(map(str, whole))}") if path else ""
+            path = section_path = (*path, key)
+        elif path and (isinstance(key, int) or field_at((*section_path, key))[1] is not field_at(section_path)[1]):
+            section_path = (*section_path, key)
+    where = (origins[path], f": {'.'.join(map(str, section_path))}") if path else ""
     return UserError(_what(detail), where, _fix(detail))
 
 
@@ -35,15 +35,15 @@ def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     """The error with the file and line (or override) of the key path that it names; as it is where it names none."""
     path: KeyPath = ()
     for key in error.where.split("."):
-        at = (*path, int(key) if key.isdigit() else key)
-        if at not in origins:
+        deeper = (*path, int(key) if key.isdigit() else key)
+        if deeper not in origins:
             break
-        path = at
+        path = deeper
     return error.at((origins[path], f": {error.where}")) if path else error
 
 
 def _location(detail: Any) -> KeyPath:
-    """Where it is wrong; of what an open section does not know, the key is told beside the section."""
+    """Key path of an error. For an unknown key of an open section, the path ends at the section."""
     return (*detail["loc"], *[key for key in [detail.get("ctx", {}).get("key")] if key is not None])
 
 
@@ -62,8 +62,8 @@ def _what(detail: Any) -> str:
         key = next(iter(detail["input"]))
         return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
     if detail["type"] == "too_short":
-        given = "[]" if value == "()" else value
-        return f"{given} is too few: at least {detail['ctx']['min_length']}"
+        written = "[]" if value == "()" else value
+        return f"{written} is too few: at least {detail['ctx']['min_length']}"
     message: str = detail["msg"].replace("tuple", "list")
     return message.replace("Input", value, 1) if message.startswith("Input") else f"{value}: {message}"
 
@@ -75,12 +75,12 @@ def _fix(detail: Any) -> str:
     if detail["type"] == "literal_error":
         return meant(str(detail["input"]), re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
     if _as_keys(detail):
-        known = keys_of(field_at((*path, 0))[0])
-        items = "{" + ", ".join(f"{key}: ..." for key in known) + "}" if known else "..."
+        allowed = keys_of(field_at((*path, 0))[0])
+        items = "{" + ", ".join(f"{key}: ..." for key in allowed) + "}" if allowed else "..."
         below = [key for value in detail["input"].values() if isinstance(value, dict) for key in value]
-        unknown = next((key for key in below if known and key not in known), None)
-        whole = f"{'.'.join(map(str, path))}=[{items}]"
-        return f"{whole}; for {unknown!r} {meant(unknown, known)}" if unknown else whole
+        unknown = next((key for key in below if allowed and key not in allowed), None)
+        example = f"{'.'.join(map(str, path))}=[{items}]"
+        return f"{example}; for {unknown!r} {meant(unknown, allowed)}" if unknown else example
     if detail["type"] == "value_error":
         return str(getattr(detail["ctx"]["error"], "fix", ""))
     _, field = field_at(path)
@@ -96,13 +96,13 @@ def _as_keys(detail: Any) -> bool:
     return detail["type"] == "tuple_type" and isinstance(detail["input"], dict) and bool(detail["input"])
 
 
+# Beyond so many times the default a length is asked about.
 _TIMES = 20.0
-"""Beyond so many times the default a length is asked about."""
 _BELIEVED = WristParameters.model_fields | Actuator.model_fields
 
 
+# Sizes of leaves that are no lengths, beyond which they are asked about; in their units.
 _SENSIBLE = {"stiffness": (1e-3, 1e3), "force": (0.0, 1e3), "load": (0.0, 1e3), "tension_limit": (0.1, 1e4)}
-"""Sizes of leaves that are no lengths, beyond which they are asked about; in their units."""
 
 
 def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
@@ -114,8 +114,8 @@ def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
         value = _at(study, path) if field is not None and unit_of(field) else None
         if isinstance(value, float | int) and value != 0.0 and not low <= abs(value) <= high:
             assert field is not None
-            what = f"{value:g} {unit_of(field)} is not between {low:g} and {high:g}"
-            raise UserError(what, (where, f": {'.'.join(map(str, path))}"), "is that meant? go on with --force")
+            problem = f"{value:g} {unit_of(field)} is not between {low:g} and {high:g}"
+            raise UserError(problem, (where, f": {'.'.join(map(str, path))}"), "is that meant? go on with --force")
 
 
 def check_lengths(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
@@ -143,13 +143,15 @@ def _meant(value: float, usual: float, override: bool) -> str:
 
 
 def _at(study: Study, path: KeyPath) -> Any:
-    found: Any = study
+    node: Any = study
     for key in path:
-        if isinstance(found, Mapping | tuple | list):
-            found = found[key]  # type: ignore[index]
+        if isinstance(node, Mapping | tuple | list):
+            node = node[key]  # type: ignore[index]
         else:
-            names = {known: name for name, known in zip(type(found).model_fields, keys_of(type(found)), strict=True)}
+            names = {
+                yaml_key: name for name, yaml_key in zip(type(node).model_fields, keys_of(type(node)), strict=True)
+            }
             if key not in names:
                 return None
-            found = getattr(found, names[str(key)])
-    return found
+            node = getattr(node, names[str(key)])
+    return node

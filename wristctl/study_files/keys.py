@@ -1,4 +1,4 @@
-"""Which keys a study file may hold, and what stands behind each."""
+"""Keys of a study file, with the field of each key."""
 
 from collections.abc import Sequence
 from types import NoneType, UnionType
@@ -23,8 +23,8 @@ def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
     kind: Any = Study
     field: FieldInfo | None = None
     for key in path:
-        if known := keys_of(kind):
-            field = known.get(str(key))
+        if fields := keys_of(kind):
+            field = fields.get(str(key))
             kind = _given(field.annotation) if field else None
         else:
             items = [item for item in get_args(kind) if item is not ...]
@@ -34,12 +34,12 @@ def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
 
 def _given(annotation: Any) -> Any:
     """The annotation of a leaf that is given: `X | None` is X."""
-    others = [each for each in get_args(annotation) if each is not NoneType]
-    return others[0] if isinstance(annotation, UnionType) and len(others) == 1 else annotation
+    kinds = [kind for kind in get_args(annotation) if kind is not NoneType]
+    return kinds[0] if isinstance(annotation, UnionType) and len(kinds) == 1 else annotation
 
 
+# Commands that work on what another command's section describes: its keys are theirs too.
 SUBJECTS = {"analyse": "simulate"}
-"""Commands that work on what another command's section describes: its keys are theirs too."""
 
 
 def section_keys(command: str | None) -> dict[str, FieldInfo]:
@@ -60,17 +60,17 @@ def unit_of(field: FieldInfo) -> str:
 
 def choices_of(field: FieldInfo) -> Sequence[str]:
     """The names that a leaf may have, where they are few and known: those of a table, or of a Literal."""
-    tables = [each.table for each in field.metadata if isinstance(each, OneOf)]
+    tables = [marker.table for marker in field.metadata if isinstance(marker, OneOf)]
     if tables:
         return tuple(name for name in tables[0] if tables[0].belongs(name))
     return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
 
 
 def source_of(field: FieldInfo) -> str:
-    """Where a leaf's default comes from, empty where that is not said."""
+    """Source of a leaf's default, empty where none is declared."""
     return _declared(field, "source")
 
 
-def _declared(field: FieldInfo, what: str) -> str:
+def _declared(field: FieldInfo, name: str) -> str:
     extra = field.json_schema_extra
-    return str(extra.get(what, "")) if isinstance(extra, dict) else ""
+    return str(extra.get(name, "")) if isinstance(extra, dict) else ""

@@ -20,38 +20,38 @@ from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
 
 log = logging.getLogger(__name__)
 
+# The end of a key path, and what has come in its place.
 FORMER = {
     ("sensor", "seed"): "a camera's noise now comes from `seed`, the root of every random stream (--seed)",
     ("claims", "exact"): "each loop has a verdict of its own now, and `sense` says how a value is meant",
 }
-"""The end of a key path, and what has come in its place."""
 
 
 def leave_out_former(data: dict[str, Any], origins: Mapping[KeyPath, Phrase]) -> None:
     """Take former keys out of what files say; a warning names each kind of them once, with its first place."""
-    found: dict[tuple[str, str], KeyPath] = {}
-    _take_out(data, (), found)
-    for former, path in found.items():
+    removed: dict[tuple[str, str], KeyPath] = {}
+    _take_out(data, (), removed)
+    for former, path in removed.items():
         where = f"{worded(origins[path])}: " if path in origins else ""
         log.warning("%s%s is no longer a setting: %s", where, ".".join(map(str, path)), FORMER[former])
 
 
-def _take_out(node: Any, path: KeyPath, found: dict[tuple[str, str], KeyPath]) -> None:
+def _take_out(node: Any, path: KeyPath, removed: dict[tuple[str, str], KeyPath]) -> None:
     if isinstance(node, dict):
         for key in list(node):
-            former = (next((each for each in reversed(path) if isinstance(each, str)), ""), str(key))
+            former = (next((part for part in reversed(path) if isinstance(part, str)), ""), str(key))
             if former in FORMER:
                 del node[key]
-                found.setdefault(former, (*path, key))
+                removed.setdefault(former, (*path, key))
             else:
-                _take_out(node[key], (*path, key), found)
+                _take_out(node[key], (*path, key), removed)
     elif isinstance(node, list | tuple):
-        for at, each in enumerate(node):
-            _take_out(each, (*path, at), found)
+        for position, item in enumerate(node):
+            _take_out(item, (*path, position), removed)
 
 
+# The key of a study file that names others, which are read before it.
 INCLUDE = "include"
-"""The key of a study file that names others, which are read before it."""
 
 
 def load_study(
@@ -79,11 +79,11 @@ def read_study(
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
     for file in files:
-        found = study_file(file)
-        if found is None:
-            what = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
-            raise UserError(what, str(file), meant(shipped_name(file), shipped_names()))
-        _merge_file(data, found, origins, ())
+        path = study_file(file)
+        if path is None:
+            problem = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
+            raise UserError(problem, str(file), meant(shipped_name(file), shipped_names()))
+        _merge_file(data, path, origins, ())
     leave_out_former(data, origins)
     for override in overrides:
         _merge(data, _whole(_override(override, command), None), Setting(override), origins)
@@ -99,14 +99,14 @@ def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase]
     content = dict(document.data or {})
     included = content.pop(INCLUDE, ())
     where = f"{file}:{document.lines.get((INCLUDE,), 1)}"
-    if not isinstance(included, tuple) or not all(isinstance(each, str) for each in included):
+    if not isinstance(included, tuple) or not all(isinstance(name, str) for name in included):
         raise UserError(f"{INCLUDE} should be a list of study files", where, f"{INCLUDE}: [scenarios/camera.yaml]")
     for name in included:
         inner = study_file(Path(name), file.parent)
         if inner is None or not inner.is_file():
-            what = f"there is no {file.parent / name} to include, nor such an experiment of wristctl"
-            raise UserError(what, where, "paths are from the file that includes")
-        if inner.resolve() in [each.resolve() for each in (*outer, file)]:
+            problem = f"there is no {file.parent / name} to include, nor such an experiment of wristctl"
+            raise UserError(problem, where, "paths are from the file that includes")
+        if inner.resolve() in [outer_file.resolve() for outer_file in (*outer, file)]:
             raise UserError(f"{inner} includes itself", where, "leave one of them out")
         check_within(inner, file)
         _merge_file(data, inner, origins, (*outer, file))
@@ -147,9 +147,9 @@ def _override(text: str, command: str | None) -> Document:
     if not equals or not dotted:
         raise UserError("an override is key=value", where, ("for example ", Setting("wrist.length=0.09")))
     keys = whole_key(dotted, command).split(".")
-    own, top = section_keys(command), keys_of(Study)
+    command_keys, top = section_keys(command), keys_of(Study)
     if keys[0] not in top:
-        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*own, *top])))
+        raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*command_keys, *top])))
     try:
         data = parse_yaml(value, "").data
     except UserError as error:
@@ -160,15 +160,15 @@ def _override(text: str, command: str | None) -> Document:
 
 
 def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:
-    """What was read, with the files that it names as they are meant from a folder."""
+    """Data of a study file, with its file names resolved against a folder."""
     if isinstance(data, dict):
-        return {key: _found_from(each, folder, (*path, key)) for key, each in data.items()}
+        return {key: _found_from(item, folder, (*path, key)) for key, item in data.items()}
     if not isinstance(data, str | tuple):
         return data
     if names_a_file(field_at(path)[1]):
         return beside(folder, data)
     return (
-        tuple(_found_from(each, folder, (*path, at)) for at, each in enumerate(data))
+        tuple(_found_from(each, folder, (*path, position)) for position, each in enumerate(data))
         if isinstance(data, tuple)
         else data
     )
@@ -177,15 +177,15 @@ def _found_from(data: Any, folder: Path, path: KeyPath = ()) -> Any:
 def _merge(data: dict[str, Any], document: Document, source: Phrase, origins: dict[KeyPath, Phrase]) -> None:
     def into(target: dict[str, Any], mapping: Mapping[str, Any], path: KeyPath) -> None:
         for key, value in mapping.items():
-            at = (*path, key)
-            origins[at] = source
+            deeper = (*path, key)
+            origins[deeper] = source
             if isinstance(value, dict):
                 if not isinstance(target.get(key), dict):
                     target[key] = {}
-                into(target[key], value, at)
+                into(target[key], value, deeper)
             else:
                 target[key] = value
-                for beneath in [old for old in origins if old[: len(at)] == at != old]:
+                for beneath in [old for old in origins if old[: len(deeper)] == deeper != old]:
                     del origins[beneath]
 
     into(data, document.data or {}, ())

@@ -33,7 +33,7 @@ def sections_read(command: str) -> tuple[str, ...]:
 
 
 def resolved_yaml(study: Study, command: str) -> str:
-    """What `command` reads of the study (seed, wrist, sections) as YAML that gives the same study."""
+    """Part of a study that `command` reads (seed, wrist, sections), as YAML that gives the same study."""
     entries = [entry for entry in _entries(study) if entry[0] in _keys(command)]
     return "\n".join(_mapping(entries, "")) + "\n"
 
@@ -80,9 +80,9 @@ def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
         elif isinstance(value, tuple) and any(isinstance(item, Section) for item in value):
             yield f"{pad}{_scalar(key)}:{remark}"
             for item in value:
-                first, *others = _mapping(_entries(item), pad + "    ")
+                first, *further = _mapping(_entries(item), pad + "    ")
                 yield f"{pad}  - {first.lstrip()}"
-                yield from others
+                yield from further
         else:
             yield f"{pad}{_scalar(key)}: {_flow(value)}{remark}"
 

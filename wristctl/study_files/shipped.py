@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
+# Folder of the shipped experiments: in an installed package, beside the package in a clone, and as copied by `init`.
 EXPERIMENTS = "experiments"
-"""Their folder: within an installed package, beside the package in a clone, and where `init` lays them out."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -16,31 +16,31 @@ def shipped() -> Path:
 
 
 def shipped_names() -> list[str]:
-    """What a study file may be called without a path: quick, scenarios/camera."""
+    """Names of shipped study files without a path: quick, scenarios/camera."""
     folder = shipped()
     return sorted(file.relative_to(folder).with_suffix("").as_posix() for file in folder.rglob("*.yaml"))
 
 
-def study_file(given: Path, folder: Path = Path()) -> Path | None:
+def study_file(path: Path, folder: Path = Path()) -> Path | None:
     """The file that is meant in a folder: of that path, else the experiment of that name.
 
     Experiments of the folder come before those of wristctl; quick, quick.yaml and experiments/quick.yaml are the same
     one. A path from the root names none, and is given back. None where there is neither.
     """
-    file, name = folder / given, shipped_name(given)
-    there = os.path.exists(file)
-    if given.is_absolute() or (there and not os.path.isdir(file)):
+    file, name = folder / path, shipped_name(path)
+    exists = os.path.exists(file)
+    if path.is_absolute() or (exists and not os.path.isdir(file)):
         return file
-    if ".." not in given.parts:
-        own = folder / EXPERIMENTS / f"{name}.yaml"
-        if own.is_file():
-            return own
+    if ".." not in path.parts:
+        shipped_copy = folder / EXPERIMENTS / f"{name}.yaml"
+        if shipped_copy.is_file():
+            return shipped_copy
         if name in shipped_names():
             return shipped() / f"{name}.yaml"
-    return file if there else None
+    return file if exists else None
 
 
-def shipped_name(given: Path) -> str:
-    """What an experiment of that path is called."""
-    parts = given.parts[1:] if given.parts[:1] == (EXPERIMENTS,) else given.parts
+def shipped_name(path: Path) -> str:
+    """Name of the experiment at a path."""
+    parts = path.parts[1:] if path.parts[:1] == (EXPERIMENTS,) else path.parts
     return "/".join(parts).removesuffix(".yaml")

@@ -29,7 +29,7 @@ _PLAIN_TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("str", "seq", "map")}
 
 @dataclass(frozen=True)
 class Document:
-    """What a YAML text says, sequences as tuples, and the line of each key and item."""
+    """Content of a YAML text, sequences as tuples, and the line of each key and item."""
 
     data: Any
     lines: Mapping[KeyPath, int]

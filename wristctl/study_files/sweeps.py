@@ -47,37 +47,37 @@ class SweepAxis(NamedTuple):
 
 def axes_of(study: Study, command: str) -> list[SweepAxis]:
     """The axes of the study's `sweep`. UserError for one that cannot be read, and for more points than MOST_POINTS."""
-    found, counted = list[SweepAxis](), list[tuple[str, int, bool]]()
+    axes, counted = list[SweepAxis](), list[tuple[str, int, bool]]()
     for text in study.sweep:
-        key, equals, given = text.partition("=")
-        if not equals or not key.strip() or not given.strip():
+        key, equals, values = text.partition("=")
+        if not equals or not key.strip() or not values.strip():
             raise UserError("a sweep is KEY=VALUES", Argument("sweep", text), _EXAMPLE)
         parts = key.strip().split(".")
         if parts[0] in section_keys(command):
             parts.insert(0, home_of(command, parts[0]))
         name = ".".join(parts)
-        if name in [each.key for each in found]:
+        if name in [axis.key for axis in axes]:
             raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
-        counted.append((text, *_count(text, given)))
+        counted.append((text, *_count(text, values)))
         if _points([(many, drawn) for _, many, drawn in counted], text) > MOST_POINTS:
             many = _points([(many, drawn) for _, many, drawn in counted], text)
-            what = f"a sweep of {many:.3g} points is more than {MOST_POINTS:g}"
-            raise UserError(what, Argument("sweep", text), "fewer values, or drawn ones with ~ in place of all")
-        found.append(SweepAxis(name, _values(text, given, name, study.seed), counted[-1][2], text))
-    return found
+            problem = f"a sweep of {many:.3g} points is more than {MOST_POINTS:g}"
+            raise UserError(problem, Argument("sweep", text), "fewer values, or drawn ones with ~ in place of all")
+        axes.append(SweepAxis(name, _values(text, values, name, study.seed), counted[-1][2], text))
+    return axes
 
 
 def points_of(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
     """The values of all axes at every point: drawn ones together, all others multiplied, the last the fastest."""
-    grids = [each for each in axes if not each.drawn]
-    drawn = [each for each in axes if each.drawn]
-    together = list(zip(*(each.values for each in drawn), strict=True)) if drawn else [()]
-    found = []
-    for grid in product(*(each.values for each in grids)):
-        for at in together:
-            values = {each.key: value for each, value in zip([*grids, *drawn], [*grid, *at], strict=True)}
-            found.append(tuple(values[each.key] for each in axes))
-    return found
+    grids = [axis for axis in axes if not axis.drawn]
+    drawn = [axis for axis in axes if axis.drawn]
+    together = list(zip(*(axis.values for axis in drawn), strict=True)) if drawn else [()]
+    points = []
+    for grid in product(*(axis.values for axis in grids)):
+        for drawn_values in together:
+            values = {axis.key: value for axis, value in zip([*grids, *drawn], [*grid, *drawn_values], strict=True)}
+            points.append(tuple(values[axis.key] for axis in axes))
+    return points
 
 
 def study_at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any]) -> Study:
@@ -108,31 +108,33 @@ def unit_at(begin: Section, path: Sequence[str]) -> str:
 
 def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -> Any:
     """The section with a leaf at another value; only what lies on the way to it is made anew, and checked."""
-    head, *rest = path
+    head, *below_head = path
     if isinstance(section, Section):
         fields = _names(type(section))
         extra = section.model_extra or {}
         if head not in fields and head not in extra and not (hasattr(section, "added") and head in section.added()):
             raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, fields))
         name = fields.get(head, head)
-        own = getattr(section, name, None)
-        new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
-        if not rest and isinstance(own, Section):
-            raise UserError(f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(own)))}")
-        if rest and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
+        current = getattr(section, name, None)
+        new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
+        if not below_head and isinstance(current, Section):
+            raise UserError(
+                f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(current)))}"
+            )
+        if below_head and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
             return section.model_copy(update={name: new})
         # all that it has, since what is left out would be a default, copied deeply
-        made = type(section).model_validate({**section.__dict__, **extra, name: new}, by_name=True)
-        object.__setattr__(made, "__pydantic_fields_set__", section.model_fields_set | {name})
-        return made
-    if isinstance(section, Mapping) and (head in section or rest):
+        copy = type(section).model_validate({**section.__dict__, **extra, name: new}, by_name=True)
+        object.__setattr__(copy, "__pydantic_fields_set__", section.model_fields_set | {name})
+        return copy
+    if isinstance(section, Mapping) and (head in section or below_head):
         if head not in section:
             raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, map(str, section)))
-        new = _changed(section[head], tuple(rest), value, axis) if rest else _alike(section[head], value)
+        new = _changed(section[head], tuple(below_head), value, axis) if below_head else _alike(section[head], value)
         return {**section, head: new}
     if isinstance(section, tuple) and head.isdigit() and int(head) < len(section):
-        own = section[int(head)]
-        new = _changed(own, tuple(rest), value, axis) if rest else _alike(own, value)
+        current = section[int(head)]
+        new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
         return (*section[: int(head)], new, *section[int(head) + 1 :])
     raise UserError(f"there is no leaf {axis.key}", axis.where, "one that `--dry-run` shows")
 
@@ -143,39 +145,39 @@ def _names(kind: type[Section]) -> dict[str, str]:
     return {field.alias or name: name for name, field in kind.model_fields.items()}
 
 
-def _alike(known: Any, value: Any) -> Any:
+def _alike(current: Any, value: Any) -> Any:
     """A whole number where the leaf holds one, and a number with a point where it holds such."""
-    if isinstance(known, float) and isinstance(value, int) and not isinstance(value, bool):
+    if isinstance(current, float) and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
-    if isinstance(known, int) and not isinstance(known, bool) and isinstance(value, float) and value.is_integer():
+    if isinstance(current, int) and not isinstance(current, bool) and isinstance(value, float) and value.is_integer():
         return int(value)
     return value
 
 
-def _count(text: str, given: str) -> tuple[int, bool]:
-    """How many values, and whether they are drawn."""
-    found = _COUNTED.fullmatch(given.strip())
-    if found is None:
-        return len(_listed(text, given)), False
-    many = int(found[3])
+def _count(text: str, values: str) -> tuple[int, bool]:
+    """Number of values of an axis, and whether they are drawn."""
+    match = _COUNTED.fullmatch(values.strip())
+    if match is None:
+        return len(_listed(text, values)), False
+    many = int(match[3])
     if many < 1:
         raise UserError("a sweep of no values", Argument("sweep", text), _EXAMPLE)
-    return many, bool(found[1])
+    return many, bool(match[1])
 
 
 def _points(counts: Sequence[tuple[int, bool]], text: str) -> int:
     drawn = {many for many, drawn in counts if drawn}
     if len(drawn) > 1:
-        what = f"drawn leaves go together, and {' and '.join(map(str, sorted(drawn)))} values do not"
-        raise UserError(what, Argument("sweep", text), "the same number of each")
+        problem = f"drawn leaves go together, and {' and '.join(map(str, sorted(drawn)))} values do not"
+        raise UserError(problem, Argument("sweep", text), "the same number of each")
     return math.prod([many for many, drawn in counts if not drawn]) * (drawn.pop() if drawn else 1)
 
 
-def _values(text: str, given: str, key: str, seed: int) -> tuple[Any, ...]:
-    found = _COUNTED.fullmatch(given.strip())
-    if found is None:
-        return _listed(text, given)
-    drawn, source, many = bool(found[1]), found[2], int(found[3])
+def _values(text: str, values: str, key: str, seed: int) -> tuple[Any, ...]:
+    match = _COUNTED.fullmatch(values.strip())
+    if match is None:
+        return _listed(text, values)
+    drawn, source, many = bool(match[1]), match[2], int(match[3])
     shares: Any
     import numpy as np
 
@@ -194,13 +196,13 @@ def _values(text: str, given: str, key: str, seed: int) -> tuple[Any, ...]:
     return tuple(between.at(float(share)) for share in shares)
 
 
-def _listed(text: str, given: str) -> tuple[Any, ...]:
-    if ".." in given:
+def _listed(text: str, values: str) -> tuple[Any, ...]:
+    if ".." in values:
         raise UserError("a range says how many values it has", Argument("sweep", text), _EXAMPLE)
     try:
-        found = tuple(parse_yaml(each.strip(), "").data for each in given.split(","))
+        items = tuple(parse_yaml(item.strip(), "").data for item in values.split(","))
     except UserError as error:
         raise error.at(Argument("sweep", text)) from error
-    if any(each is None for each in found):
+    if any(item is None for item in items):
         raise UserError("a value is missing", Argument("sweep", text), _EXAMPLE)
-    return found
+    return items

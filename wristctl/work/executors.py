@@ -1,4 +1,4 @@
-"""Where units are worked at: here, in processes of this machine, on a Dask cluster, or by an executor of one's own."""
+"""Executors of units: this process, processes of this machine, a Dask cluster, or an executor of one's own."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ KINDS = "serial, processes, processes:N, dask://host:port or module:factory"
 _PROCESSES = re.compile(r"processes(?::([0-9]+))?")
 _PLACE = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 _CLUSTER = "pip install 'wristctl[cluster]'"
+# Seconds in which a scheduler answers.
 _ANSWERS = 10.0
-"""Seconds in which a scheduler answers."""
 
 
 class Here(Executor):
@@ -46,16 +46,16 @@ class Pool:
 
     executor: Executor
     width: Callable[[], int]
-    """How many units it can have at once, by now."""
+    """Number of units that the pool can work at now."""
     lost: Callable[[], str] = lambda: ""
-    """Where it is gone for good, what is; else empty."""
+    """Description of a pool that is lost for good, else empty."""
     apart: bool = True
     """Whether its workers are other processes, which must show that they compute the same."""
 
 
 @dataclass(frozen=True)
 class Workers:
-    """What an `--executor` names; `opened` makes a pool of it, and another where one has broken."""
+    """Workers that an `--executor` names. `opened` makes a pool of them, and another after one has broken."""
 
     named: str
     many: int
@@ -68,8 +68,8 @@ class Workers:
         """UserError for what names no executor."""
         if named == "serial":
             return cls(named, 1, _here)
-        if found := _PROCESSES.fullmatch(named):
-            many = int(found[1]) if found[1] else cores()
+        if match := _PROCESSES.fullmatch(named):
+            many = int(match[1]) if match[1] else cores()
             if not 1 <= many <= 1024:
                 raise UserError(f"{many} processes", EXECUTOR, "1 to 1024")
             return cls(named, many, lambda: _processes(many))
@@ -116,9 +116,9 @@ def _dask(address: str) -> Iterator[Pool]:
     try:
         client: Any = Client(f"tcp://{address}", timeout=_ANSWERS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        what = f"no Dask scheduler answers at tcp://{address}"
+        problem = f"no Dask scheduler answers at tcp://{address}"
         fix = ("start one (`dask scheduler`), or another ", EXECUTOR)
-        raise UserError(what, EXECUTOR, fix) from error
+        raise UserError(problem, EXECUTOR, fix) from error
     try:
         yield _of_client(client, address)
     finally:
@@ -142,23 +142,23 @@ def _of_client(client: Any, address: str) -> Pool:
 
 def _factory(named: str) -> Callable[[], Any]:
     module, _, name = named.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:  # a factory stands beside the study, and takes nobody's place there
-        sys.path.append(here)
+    directory = str(Path.cwd())
+    if directory not in sys.path:  # a factory stands beside the study, and takes nobody's place there
+        sys.path.append(directory)
     try:
-        found: Callable[[], Any] = getattr(import_module(module), name)
+        factory: Callable[[], Any] = getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
         raise UserError(f"no executor at {named}: {error}", EXECUTOR, KINDS) from error
-    return found
+    return factory
 
 
 @contextmanager
 def _of_factory(named: str, factory: Callable[[], Any]) -> Iterator[Pool]:
     with safe_path():
-        made = factory()
-        if not callable(getattr(made, "submit", None)):
-            what = f"{named} gives {type(made).__name__}, and no concurrent.futures.Executor"
-            raise UserError(what, EXECUTOR, "a factory that returns one")
-        many = int(getattr(made, "_max_workers", 0) or cores())
-        with made:
-            yield Pool(made, lambda: many)
+        executor = factory()
+        if not callable(getattr(executor, "submit", None)):
+            problem = f"{named} gives {type(executor).__name__}, and no concurrent.futures.Executor"
+            raise UserError(problem, EXECUTOR, "a factory that returns one")
+        many = int(getattr(executor, "_max_workers", 0) or cores())
+        with executor:
+            yield Pool(executor, lambda: many)

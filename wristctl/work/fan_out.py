@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     import numpy as np
 
 _TRIES = 3
+# Characters of an error that a table has room for.
 _TOLD = 300
-"""Characters of an error that a table has room for."""
+# Errors after which no worker is risked again: several have died of it, since Dask tries by itself.
 _FINAL = ("KilledWorker",)
-"""Errors after which no worker is risked again: several have died of it, since Dask tries by itself."""
+# Seconds between two looks at whether the cluster is still there.
 _LOOK = 0.5
-"""Seconds between two looks at whether the cluster is still there."""
 RESUMED = Argument("resume")
 RESUME = ("go on with ", Argument("resume", "RUN"), ": what is done is kept")
 
@@ -54,7 +54,7 @@ class Poisoned(NamedTuple):
 
 @dataclass
 class UnitsDone:
-    """What units gave, in their order; None of those that failed."""
+    """Results of units, in their order. None for a failed unit."""
 
     arrays: list[dict[str, np.ndarray] | None]
     poisoned: list[Poisoned] = field(default_factory=list)
@@ -65,12 +65,12 @@ class UnitsDone:
     tried_again: Unit | None = None
     """One more of the earlier run's, drawn at random, that was computed here and gave the same."""
     seconds: float = 0.0
-    """That workers have spent on units here, all together."""
+    """Time that workers have spent on units in this command, summed [s]."""
     processor: float = 0.0
 
 
+# Called with each unit that is done; None: it was there already, or in the earlier run.
 Told = Callable[[Unit, Computed | None], None]
-"""Called with each unit that is done; None: it was there already, or in the earlier run."""
 
 
 def perform_units(
@@ -79,7 +79,7 @@ def perform_units(
     golden: Golden | None = None,
     folder: Path | None = None,
     earlier: Path | None = None,
-    told: Told = lambda unit, computed: None,
+    report: Told = lambda unit, computed: None,
     furnish: Furnish | None = None,
 ) -> UnitsDone:
     """Compute units, those left out that are in `folder` or in the folder of an `earlier` run, which are copied.
@@ -90,14 +90,14 @@ def perform_units(
     UserError, with exit code 3, where that unit differs, and then none of the earlier run's is kept; where one of them
     is no plain file; and where the workers compute other numbers or are gone; all that was done by then is in `folder`.
     """
-    done = UnitsDone([None] * len(units))
+    outcome = UnitsDone([None] * len(units))
     waiting = deque[int]()
     earlier_ones: dict[int, dict[str, np.ndarray]] = {}
     for number, unit in enumerate(units):
-        done.arrays[number] = read_unit(folder, unit.key) if folder else None
-        if done.arrays[number] is not None:
-            done.found += 1
-            told(unit, None)
+        outcome.arrays[number] = read_unit(folder, unit.key) if folder else None
+        if outcome.arrays[number] is not None:
+            outcome.found += 1
+            report(unit, None)
         elif earlier is not None and (arrays := read_unit(earlier, unit.key)) is not None:
             earlier_ones[number] = arrays
         else:
@@ -107,14 +107,14 @@ def perform_units(
     for number, arrays in earlier_ones.items():
         if folder is not None:
             write_unit(folder, units[number].key, arrays)
-        done.arrays[number] = arrays
-        done.taken_over.append(units[number])
-        told(units[number], None)
+        outcome.arrays[number] = arrays
+        outcome.taken_over.append(units[number])
+        report(units[number], None)
     if drawn is not None:
         waiting.appendleft(drawn)
     if waiting:
-        _Fan(units, workers, golden, folder, told, done, waiting, furnish, drawn, expected).run()
-    return done
+        _Fan(units, workers, golden, folder, report, outcome, waiting, furnish, drawn, expected).run()
+    return outcome
 
 
 @dataclass
@@ -131,14 +131,14 @@ class _Fan:
     furnish: Furnish | None
     drawn: int | None = None
     expected: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """What the earlier run has for the unit that was `drawn`."""
+    """Arrays of the earlier run for the `drawn` unit."""
     alone: deque[int] = field(default_factory=deque)
     """Units that were under way when a worker died."""
     failures: Counter[int] = field(default_factory=Counter)
     running: dict[Future[Any], int] = field(default_factory=dict)
 
     breaks: int = 0
-    """Of pools in which nothing was under way."""
+    """Number of pools that broke with no unit under way."""
 
     def run(self) -> None:
         """Until all are done or poisoned, with a new pool where one breaks."""
@@ -146,7 +146,7 @@ class _Fan:
             with self.workers.open() as pool:
                 while (self.waiting or self.alone or self.running) and not self._broken(pool):
                     pass
-        self.done.poisoned.sort(key=lambda each: self.units.index(each.unit))
+        self.done.poisoned.sort(key=lambda failure: self.units.index(failure.unit))
 
     def _broken(self, pool: Pool) -> bool:
         """Hand out what there is room for and take what is done; whether the pool broke meanwhile."""
@@ -155,8 +155,8 @@ class _Fan:
         except BrokenProcessPool:
             return self._blame([])
         ended, _ = wait(self.running, timeout=_LOOK, return_when=FIRST_COMPLETED)
-        if what := pool.lost():
-            raise UserError(what, EXECUTOR, RESUME, exit_code=3)
+        if loss := pool.lost():
+            raise UserError(loss, EXECUTOR, RESUME, exit_code=3)
         numbers = [(future, self.running.pop(future)) for future in ended]
         died = [number for future, number in numbers if not self._take(future, number, pool)]
         return bool(died) and self._blame(died)
@@ -181,8 +181,8 @@ class _Fan:
         except BrokenProcessPool:
             return False
         except CancelledError as error:
-            what = pool.lost() or "the executor has dropped a unit"
-            raise UserError(what, EXECUTOR, RESUME, exit_code=3) from error
+            loss = pool.lost() or "the executor has dropped a unit"
+            raise UserError(loss, EXECUTOR, RESUME, exit_code=3) from error
         except Exception as error:
             notes = " ".join(getattr(error, "__notes__", ()))
             self._failed(number, f"{type(error).__name__}: {error} {notes}", type(error).__name__ in _FINAL)
@@ -203,10 +203,10 @@ class _Fan:
             self.done.tried_again = unit
             return
         if self.folder is not None:
-            for each in self.done.taken_over:
-                file_of(self.folder, each.key).unlink(missing_ok=True)
-        what = f"{unit.name or unit.key[:12]} gives other numbers here than the run to resume has"
-        raise UserError(what, RESUMED, "begin anew, without it: somebody has changed its units", exit_code=3)
+            for resumed in self.done.taken_over:
+                file_of(self.folder, resumed.key).unlink(missing_ok=True)
+        problem = f"{unit.name or unit.key[:12]} gives other numbers here than the run to resume has"
+        raise UserError(problem, RESUMED, "begin anew, without it: somebody has changed its units", exit_code=3)
 
     def _failed(self, number: int, why: str, final: bool = False) -> None:
         self.failures[number] += 1
@@ -216,7 +216,7 @@ class _Fan:
             self.done.poisoned.append(Poisoned(self.units[number], shorten(why, _TOLD, placeholder=" ...")))
 
     def _blame(self, died: Sequence[int]) -> bool:
-        """Of the units that were under way when a worker died: one alone has failed, several are tried alone."""
+        """Mark the unit that was under way when a worker died as failed. Several units are tried one by one."""
         suspects = sorted({*died, *self.running.values()})
         self.running.clear()
         if len(suspects) == 1:

@@ -1,4 +1,4 @@
-"""What a worker does, wherever it is: it shows once that it computes the same as the others, then does units."""
+"""Work of a worker: show once that it computes the same as the others, then compute units."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     import numpy as np
 
 
+# Folder of a run that holds its units.
 UNITS = "units"
-"""The folder of a run that holds them."""
+# Array in a unit's file that names the unit.
 _KEY = "key"
-"""The array of a unit's file that says whose it is."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Unit:
     name: str = ""
     """In words, for people."""
     size: int = 1
-    """How much work it is beside others, for the progress."""
+    """Weight of the unit in the progress."""
 
     @cached_property
     def key(self) -> str:
@@ -63,12 +63,12 @@ def code_digest() -> str:
 def function_at(place: str) -> Callable[..., Any]:
     """The function at `package.module:name`."""
     module, _, name = place.partition(":")
-    found: Callable[..., Any] = getattr(import_module(module), name)
-    return found
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
 
 
 def file_of(folder: Path, key: str) -> Path:
-    """Where the unit of this key is kept."""
+    """File of the unit with this key."""
     return folder / f"{key}.npz"
 
 
@@ -80,7 +80,7 @@ def write_unit(folder: Path, key: str, arrays: Mapping[str, np.ndarray]) -> None
 
 
 def read_unit(folder: Path, key: str) -> dict[str, np.ndarray] | None:
-    """What a unit gave; None where it is not there, damaged (a zip has a checksum of each array), or another's.
+    """Arrays of a unit. None if its file is missing, damaged (zip checksum of each array) or of another unit.
 
     UserError where a link or something else that is no plain file stands in its place.
     """
@@ -92,13 +92,13 @@ def read_unit(folder: Path, key: str) -> dict[str, np.ndarray] | None:
         arrays = read_arrays(file)
     except (OSError, UserError):
         return None
-    known = arrays.pop(_KEY, None)
-    return arrays if known is not None and str(known) == key else None
+    stored_key = arrays.pop(_KEY, None)
+    return arrays if stored_key is not None and str(stored_key) == key else None
 
 
-def same_arrays(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> bool:
+def same_arrays(one: Mapping[str, np.ndarray], another: Mapping[str, np.ndarray]) -> bool:
     """Whether two sets of arrays are the same, to the bit."""
-    return one.keys() == other.keys() and all(_bits(one[name]) == _bits(other[name]) for name in one)
+    return one.keys() == another.keys() and all(_bits(one[name]) == _bits(another[name]) for name in one)
 
 
 def _bits(array: np.ndarray) -> tuple[str, tuple[int, ...], bytes]:
@@ -107,8 +107,8 @@ def _bits(array: np.ndarray) -> tuple[str, tuple[int, ...], bytes]:
     return array.dtype.str, np.shape(array), np.ascontiguousarray(array).tobytes()
 
 
+# Lock under which threads of a worker compile one after the other.
 _ONE = threading.Lock()
-"""Threads of a worker compile one after the other."""
 _passed: set[tuple[str, str]] = set()
 
 
@@ -131,14 +131,14 @@ class Golden(NamedTuple):
 
 
 class Furnish(NamedTuple):
-    """What a worker does once before all units, such as loading laws that are not the package's."""
+    """Preparation of a worker before all units, such as loading laws from outside the package."""
 
     does: str
     spec: Mapping[str, Any]
 
 
 class Computed(NamedTuple):
-    """What a unit gave, where, and how long that took [s], by the clock and of the processor."""
+    """Arrays of a unit, its host, and its wall time and processor time [s]."""
 
     arrays: dict[str, np.ndarray]
     host: str
@@ -169,11 +169,11 @@ def compute(does: str, spec: Mapping[str, Any], golden: Golden | None, furnish: 
 
 def _furnish(furnish: Furnish) -> None:
     """Once in a process."""
-    known = furnish.does, json.dumps(furnish.spec, sort_keys=True)
+    job = furnish.does, json.dumps(furnish.spec, sort_keys=True)
     with _ONE:
-        if known not in _passed:
+        if job not in _passed:
             function_at(furnish.does)(furnish.spec)
-            _passed.add(known)
+            _passed.add(job)
 
 
 def _check(golden: Golden, host: str) -> None:
@@ -182,12 +182,12 @@ def _check(golden: Golden, host: str) -> None:
         same = "of the same number and other files" if golden.version == __version__ else f"{golden.version} here"
         raise WorkerDiffers(f"the worker on {host} runs wristctl {__version__}, {same}")
     try:
-        found = str(function_at(golden.does)(golden.spec))
+        digest = str(function_at(golden.does)(golden.spec))
     except Exception as error:  # a full disk, say: whatever it did would fail, and be blamed on the units
-        what = f"the worker on {host} cannot compute the golden rollout: {type(error).__name__}: {error}"
-        raise WorkerDiffers(what) from error
-    if found != golden.expected:
-        numbers = f"its golden rollout is {found[:12]} and not {golden.expected[:12]}"
+        problem = f"the worker on {host} cannot compute the golden rollout: {type(error).__name__}: {error}"
+        raise WorkerDiffers(problem) from error
+    if digest != golden.expected:
+        numbers = f"its golden rollout is {digest[:12]} and not {golden.expected[:12]}"
         raise WorkerDiffers(f"the worker on {host} ({platform.machine()}) computes other numbers: {numbers}")
     _passed.add((golden.expected, golden.code))
 

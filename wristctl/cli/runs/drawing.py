@@ -33,13 +33,13 @@ def draw_later(run: Run, quiet: bool) -> Path:
 
     folder = run.path.parent / f"{DRAWN}{run.id}"
     with listening(quiet, False) as console:
-        found = redrawn(run, partial(progress, console, quiet=quiet)).figures
-        left = [name for name in found if not (run.path / "figures" / f"{name}.svg").exists()]
+        drawn = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        left = [name for name in drawn if not (run.path / "figures" / f"{name}.svg").exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        with progress(console, no_event, "drawing", len(left), "figures", quiet) as done:
+        with progress(console, no_event, "drawing", len(left), "figures", quiet) as advance:
             for count, name in enumerate(left, start=1):
-                write_figure(folder / name, found[name])
-                done(count)
+                write_figure(folder / name, drawn[name])
+                advance(count)
     return folder
 
 
@@ -78,7 +78,7 @@ def report(
 
 
 class FigureFormat(StrEnum):
-    """What a figure is written as."""
+    """File format of a figure."""
 
     pdf, svg, png = "pdf", "svg", "png"
 
@@ -109,32 +109,32 @@ def figures(
     _check_names(names or (), read_overview(run.path).captions, run)
     trust = asking(partial(asked_to_trust, trust_code))
     with listening(quiet, False) as console, for_paper(inches), trust:
-        found = redrawn(run, partial(progress, console, quiet=quiet)).figures
-        _check_names(names or (), found, run)
-        chosen = list(names or found)
+        drawn = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        _check_names(names or (), drawn, run)
+        chosen = list(names or drawn)
         with writing(folder, TO):
             folder.mkdir(parents=True, exist_ok=True)
-        with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as done:
+        with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as advance:
             for count, name in enumerate(chosen, start=1):
-                made = found[name]
-                fit(made)
-                write_figure_for_paper(folder / f"{name}.{format_.value}", made)
-                done(count)
+                picture = drawn[name]
+                fit(picture)
+                write_figure_for_paper(folder / f"{name}.{format_.value}", picture)
+                advance(count)
     say(folder)
 
 
-def _check_names(names: Iterable[str], known: Collection[str], run: Run) -> None:
+def _check_names(names: Iterable[str], available: Collection[str], run: Run) -> None:
     for name in names:
-        if known and name not in known:
-            raise UserError(f"no figure {name!r}", str(run.path), meant(name, known))
+        if available and name not in available:
+            raise UserError(f"no figure {name!r}", str(run.path), meant(name, available))
 
 
 def _inches(text: str) -> float:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(mm|cm|in)", text.strip())
-    size = float(found[1]) / {"mm": 25.4, "cm": 2.54, "in": 1.0}[found[2]] if found else 0.0
+    match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(mm|cm|in)", text.strip())
+    size = float(match[1]) / {"mm": 25.4, "cm": 2.54, "in": 1.0}[match[2]] if match else 0.0
     if not 1.5 <= size <= 40.0:
-        what = "no width of a figure" if found is None else "a figure is 4 to 100 cm wide"
-        raise UserError(what, Argument("width", text), "for example --width 88mm")
+        problem = "no width of a figure" if match is None else "a figure is 4 to 100 cm wide"
+        raise UserError(problem, Argument("width", text), "for example --width 88mm")
     return size
 
 
@@ -152,14 +152,14 @@ def table(
     from wristctl.plotting.page import tables
 
     run = open_run(ref, out)
-    found = [Table(each["title"], each["columns"], each["rows"]) for each in tables(run)]
-    if not found:
+    run_tables = [Table(content["title"], content["columns"], content["rows"]) for content in tables(run)]
+    if not run_tables:
         raise UserError(f"run {run.id} has no tables", str(run.path), "its data are in data/")
-    for each in number or ():
-        if not 1 <= each <= len(found):
-            raise UserError(f"no table {each}", str(run.path), f"1 to {len(found)}")
-    chosen = [found[each - 1] for each in number] if number else found
-    print("\n\n".join(latex_table(each) if latex else each.text() for each in chosen))
+    for position in number or ():
+        if not 1 <= position <= len(run_tables):
+            raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
+    chosen = [run_tables[position - 1] for position in number] if number else run_tables
+    print("\n\n".join(latex_table(chosen_table) if latex else chosen_table.text() for chosen_table in chosen))
 
 
 def export(

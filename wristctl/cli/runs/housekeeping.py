@@ -31,10 +31,10 @@ def rm(
     """Delete runs, after asking. Refuses to delete one that others were made from, unless --force."""
     runs = removable([open_run(ref, out) for ref in refs], force)
     for run in runs:
-        others = foreign(run)
+        foreign_files = foreign(run)
         say(f"{run.path}  (a link: what it leads to stays)" if run.path.is_symlink() else run.path)
-        if others:
-            say(f"  and in it, added by others: {', '.join(others)}")
+        if foreign_files:
+            say(f"  and in it, added by others: {', '.join(foreign_files)}")
     if not yes and not typer.confirm(f"Delete {len(runs)} run{'s' * (len(runs) > 1)}?", err=True):
         raise UserError("nothing was deleted", ", ".join(refs), "answer y, or give --yes")
     for run in removable(runs, force):  # asked again: an answer may take a while
@@ -47,28 +47,28 @@ def gc(
     debug: Debug = False,
 ) -> None:
     """Clear away what killed processes have left, after asking: no run that began is touched."""
-    found, tags = [*leftovers(out), *lost_repetitions()], lost_tags(out)
-    for each in found:
-        say(f"{each.path}  {each.what}, {each.size / 1e6:.1f} MB")
+    leftover_files, tags = [*leftovers(out), *lost_repetitions()], lost_tags(out)
+    for leftover in leftover_files:
+        say(f"{leftover.path}  {leftover.what}, {leftover.size / 1e6:.1f} MB")
     for run, names in tags.items():
         say(f"{out / 'tags.json'}  tags of {run}, which is gone: {', '.join(names)}")
-    if not found and not tags:
+    if not leftover_files and not tags:
         say(f"nothing is left over in {out}")
         return
-    if not yes and not typer.confirm(f"Delete {len(found) + len(tags)} leftovers?", err=True):
+    if not yes and not typer.confirm(f"Delete {len(leftover_files) + len(tags)} leftovers?", err=True):
         raise UserError("nothing was deleted", str(out), "answer y, or give --yes")
     still = {*leftovers(out), *lost_repetitions()}
     refused = []
-    for each in found:
-        if each in still:  # not meanwhile the beginning of a run
+    for leftover in leftover_files:
+        if leftover in still:  # not meanwhile the beginning of a run
             try:
-                clear(each)
+                clear(leftover)
             except PermissionError as error:  # another user's; the others can still go
-                refused.append(error.filename or str(each.path))
+                refused.append(error.filename or str(leftover.path))
     clear_tags(out, tags)
     if refused:
-        what = f"{len(refused)} of {len(found)} leftovers are not yours to delete"
-        raise UserError(what, refused[0], "ask their owner, or an administrator")
+        problem = f"{len(refused)} of {len(leftover_files)} leftovers are not yours to delete"
+        raise UserError(problem, refused[0], "ask their owner, or an administrator")
 
 
 def pack(
@@ -84,8 +84,8 @@ def pack(
 
     run = open_run(ref, out)
     path = file or Path(f"{run.id}.zip")
-    for each in write(run, path):
-        say(each.id)
+    for packed in write(run, path):
+        say(packed.id)
     say(path)
 
 
@@ -101,9 +101,9 @@ def unpack(
     """
     from wristctl.records.archive import unpack as read
 
-    found = read(file, out)
-    for each in found.known:
-        say(f"{each.id}  was here" + ", and has its signature now" * (each in found.signed))
-    for each in found.new:
-        say(f"{each.id}  as sealed")
-    say(found.run.path)
+    unpacked = read(file, out)
+    for member in unpacked.known:
+        say(f"{member.id}  was here" + ", and has its signature now" * (member in unpacked.signed))
+    for member in unpacked.new:
+        say(f"{member.id}  as sealed")
+    say(unpacked.run.path)

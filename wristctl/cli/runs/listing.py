@@ -47,50 +47,57 @@ def ls(
 ) -> None:
     """List runs, oldest first: what each was about, and the metric that heads its page."""
     where = where or []
-    known = entries(out)
-    _check_choice("kind", kind, {each.kind for each in known})
+    indexed = entries(out)
+    _check_choice("kind", kind, {entry.kind for entry in indexed})
     _check_choice("state", state, get_args(RunState))
-    found = in_order(select(known, kind, label, state, tagged, where, newer, older), sort)
-    found = found[::-1] if reverse else found
+    listed = in_order(select(indexed, kind, label, state, tagged, where, newer, older), sort)
+    listed = listed[::-1] if reverse else listed
     if as_json:
-        print(json.dumps(jsonable({"schema": "wristctl.runs/1", "runs": list(map(asdict, found))}), indent=2))
-    elif found:
-        print((_chosen(found, columns) if columns else _table(found, [sort, *where])).text())
+        print(json.dumps(jsonable({"schema": "wristctl.runs/1", "runs": list(map(asdict, listed))}), indent=2))
+    elif listed:
+        print((_chosen(listed, columns) if columns else _table(listed, [sort, *where])).text())
     else:
         say(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
 
 
-def _table(found: list[IndexEntry], asked: list[str]) -> Table:
+def _table(listed: list[IndexEntry], asked: list[str]) -> Table:
     """The listing, with the metrics that were asked for and the columns that hold something."""
-    metrics = sorted({name for each in found for name in each.metrics if any(text.startswith(name) for text in asked)})
-    held = [name for name in ("about", "chief") if any(getattr(each, name) for each in found)]
+    metrics = sorted(
+        {name for entry in listed for name in entry.metrics if any(text.startswith(name) for text in asked)}
+    )
+    held = [name for name in ("about", "chief") if any(getattr(entry, name) for entry in listed)]
     columns = ["id", "kind", "state", "wall_s", *held, *metrics]
-    columns += [name for name in ("tags", "note") if any(getattr(each, name) for each in found)]
+    columns += [name for name in ("tags", "note") if any(getattr(entry, name) for entry in listed)]
     heads = [_LISTED_HEADS.get(name, name) for name in columns]
-    return Table("", heads, [[_cell(each, name) for name in columns] for each in found])
+    return Table("", heads, [[_cell(entry, name) for name in columns] for entry in listed])
 
 
-def _chosen(found: list[IndexEntry], columns: str) -> Table:
+def _chosen(listed: list[IndexEntry], columns: str) -> Table:
     """The columns that were named."""
     names = [name.strip() for name in columns.split(",") if name.strip()]
-    known = {*(field.name for field in fields(IndexEntry)), *(metric for each in found for metric in each.metrics)}
+    available = {
+        *(field.name for field in fields(IndexEntry)),
+        *(metric for entry in listed for metric in entry.metrics),
+    }
     for name in names:
-        _check_choice("columns", name, known)
+        _check_choice("columns", name, available)
     return Table(
-        "", [_LISTED_HEADS.get(name, name) for name in names], [[_cell(each, name) for name in names] for each in found]
+        "",
+        [_LISTED_HEADS.get(name, name) for name in names],
+        [[_cell(entry, name) for name in names] for entry in listed],
     )
 
 
-def _check_choice(option: str, given: str | None, known: Collection[str]) -> None:
-    if given is not None and known and "*" not in given and given not in known:
-        raise UserError(f"unknown {option.removesuffix('s')} {given!r}", Argument(option, given), meant(given, known))
+def _check_choice(option: str, value: str | None, allowed: Collection[str]) -> None:
+    if value is not None and allowed and "*" not in value and value not in allowed:
+        raise UserError(f"unknown {option.removesuffix('s')} {value!r}", Argument(option, value), meant(value, allowed))
 
 
-def _cell(each: IndexEntry, name: str) -> Any:
+def _cell(entry: IndexEntry, name: str) -> Any:
     if name == "chief":
-        value = each.metrics.get(each.chief)
-        return f"{each.chief} {number(value)}" if isinstance(value, int | float) else ""
-    value = each.value(name)
+        value = entry.metrics.get(entry.chief)
+        return f"{entry.chief} {number(value)}" if isinstance(value, int | float) else ""
+    value = entry.value(name)
     return ", ".join(value) if isinstance(value, list) else value
 
 
@@ -119,11 +126,13 @@ def _run_tables(run: Run, tags: list[str]) -> list[Table]:
         ("code", " ".join(part for part in (manifest.code.version, commit, dirty) if part)),
         *([("tags", ", ".join(tags))] if tags else []),
         ("result hash", manifest.result_sha256 or "-"),
-        *((f"input {each.role}", f"{each.kind} run {each.run}") for each in manifest.inputs),
+        *((f"input {record.role}", f"{record.kind} run {record.run}") for record in manifest.inputs),
         *([("error", manifest.error.what)] if manifest.error else []),
     ]
-    metrics = [(name, each["value"], each["unit"], each["better"], each["n"]) for name, each in run.metrics.items()]
-    files = [(each.path, each.bytes, each.sha256[:12]) for each in manifest.outputs]
+    metrics = [
+        (name, metric["value"], metric["unit"], metric["better"], metric["n"]) for name, metric in run.metrics.items()
+    ]
+    files = [(output.path, output.bytes, output.sha256[:12]) for output in manifest.outputs]
     return [
         Table("", ("run", run.id), facts),
         *([Table("Metrics", ("metric", "value", "unit", "better", "n"), metrics)] if metrics else []),
@@ -143,27 +152,30 @@ def diff(
 ) -> None:
     """Show what differs between two runs: configuration, metrics, code, environment, inputs."""
     a, b = open_run(before, out), open_run(after, out)
-    found = difference(a, b)
+    differences = difference(a, b)
     if as_json:
         changed = {
-            name: {each.name: {"before": each.before, "after": each.after} for each in changes}
-            for name, changes in vars(found).items()
+            name: {change.name: {"before": change.before, "after": change.after} for change in changes}
+            for name, changes in vars(differences).items()
         }
         print(json.dumps(jsonable({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
         return
     say(f"before  {a.id}")
     say(f"after   {b.id}")
     print()
-    print("\n\n".join(table.text() for table in _diff_tables(found)) or "nothing differs")
+    print("\n\n".join(table.text() for table in _diff_tables(differences)) or "nothing differs")
 
 
-def _diff_tables(found: Difference) -> Iterator[Table]:
+def _diff_tables(differences: Difference) -> Iterator[Table]:
     for name, title in _DIFF_TITLES.items():
-        if name == "code" and found.metrics:
-            rows = [(each.name, each.before, each.after, *_change(each.before, each.after)) for each in found.metrics]
+        if name == "code" and differences.metrics:
+            rows = [
+                (change.name, change.before, change.after, *_change(change.before, change.after))
+                for change in differences.metrics
+            ]
             yield Table("Metrics", ("metric", "before", "after", "change", "change [%]"), rows)
-        if changes := getattr(found, name):
-            changed = [(each.name, _text(each.before), _text(each.after)) for each in changes]
+        if changes := getattr(differences, name):
+            changed = [(change.name, _text(change.before), _text(change.after)) for change in changes]
             yield Table(title, ("what", "before", "after"), changed)
 
 

@@ -36,18 +36,18 @@ from wristctl.records.signature import sign as sign_run
 from wristctl.sha256sums import UNREADABLE, unreadable
 from wristctl.study_files.load import read_study
 
+# Number of runs from which progress is shown.
 _SHOWN = 50
-"""Runs from which on it is shown how far it has come."""
 
 
 class Verified(NamedTuple):
-    """What is wrong with a run, and whose signature it has, where that was asked."""
+    """Faults of a run, and its signer where a signature was asked for."""
 
     problems: list[tuple[str, str]]
     signed: str = ""
 
     running: bool = False
-    """It goes on, and nothing of it is sealed yet."""
+    """The run is still running, and nothing of it is sealed yet."""
 
     @property
     def said(self) -> str:
@@ -56,7 +56,9 @@ class Verified(NamedTuple):
             return "is running"
         if all(file == SIGNATURE for file, _ in self.problems):
             return f"as sealed{', but nobody vouches for it' if self.problems else self.signed}"
-        return "could not be checked" if any(what.startswith(UNREADABLE) for _, what in self.problems) else "changed"
+        return (
+            "could not be checked" if any(problem.startswith(UNREADABLE) for _, problem in self.problems) else "changed"
+        )
 
     def fails(self, must_be_signed: bool) -> bool:
         """Whether it is not what was asked for."""
@@ -84,32 +86,33 @@ def verify(
     """
     must = signed or signers is not None
     paths = [run.path for run in ([open_run(ref, out) for ref in refs] if refs else list_runs(out))]
-    found: dict[str, Verified] = {}
+    checked: dict[str, Verified] = {}
     quiet = len(paths) < _SHOWN
     with (
         listening(quiet, False) as console,
-        progress(console, no_event, "verifying", len(paths), "runs", quiet) as done,
+        progress(console, no_event, "verifying", len(paths), "runs", quiet) as advance,
     ):
         for count, path in enumerate(paths, start=1):
             run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
-            found[str(path) if run.id in found else run.id] = _verified(run, must, signers)
-            done(count, changed=sum(each.fails(must) for each in found.values()))
+            checked[str(path) if run.id in checked else run.id] = _verified(run, must, signers)
+            advance(count, changed=sum(verdict.fails(must) for verdict in checked.values()))
     if as_json:
         shown = {
-            name: [{"file": file, "problem": what} for file, what in each.problems] for name, each in found.items()
+            name: [{"file": file, "problem": problem} for file, problem in verdict.problems]
+            for name, verdict in checked.items()
         }
         print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
     else:
-        for name, each in found.items():
-            say(f"{name}  {each.said}")
-            for file, what in () if each.running else each.problems:
-                say(f"  {file}: {what}")
-    changed = sum(each.fails(must) for each in found.values())
+        for name, verdict in checked.items():
+            say(f"{name}  {verdict.said}")
+            for file, problem in () if verdict.running else verdict.problems:
+                say(f"  {file}: {problem}")
+    changed = sum(verdict.fails(must) for verdict in checked.values())
     if changed:
         fix = "restore the files named, or run the command again"
         asked = " and signed" if must else ""
         raise UserError(
-            f"{changed} of {len(found)} runs are not as they were sealed{asked}", str(out), fix, exit_code=3
+            f"{changed} of {len(checked)} runs are not as they were sealed{asked}", str(out), fix, exit_code=3
         )
 
 
@@ -133,13 +136,13 @@ def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
     return Verified([*problems, (SIGNATURE, by.fault)] if by.fault else problems, _by(by))
 
 
-def _by(found: RunSignature) -> str:
+def _by(run_signature: RunSignature) -> str:
     """Who signed a run, as far as that is known."""
-    if not found.key:
+    if not run_signature.key:
         return ""
-    if found.signer:
-        return f", signed by {found.signer} with {found.key}"
-    return f", signed with {found.key}; --signers says whose it is"
+    if run_signature.signer:
+        return f", signed by {run_signature.signer} with {run_signature.key}"
+    return f", signed with {run_signature.key}; --signers says whose it is"
 
 
 KEY = Path("~/.ssh/id_ed25519")
@@ -155,8 +158,8 @@ def sign(
 ) -> None:
     """Sign a run: with your SSH key, over the hashes of all its files. `verify --signed` checks it."""
     run = open_run(ref, out)
-    made = sign_run(run, key.expanduser())
-    say(f"{run.id}  signed with {made.key}")
+    run_signature = sign_run(run, key.expanduser())
+    say(f"{run.id}  signed with {run_signature.key}")
 
 
 _SAME = ("identical", "within tolerance", "volatile")
@@ -204,24 +207,24 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     ended = list_runs(scratch)
     if code or not ended:
         why = causes(run, ended[0]) if ended else []
-        said = f"the repetition ended with exit code {code} ({scratch})"
-        return _conclude(run, scratch, [], [said, *why], as_json)
-    found = verdicts(run, ended[0])
-    alike = all(each.verdict in _SAME for each in found)
-    _conclude(run, scratch, found, [] if alike else causes(run, ended[0]), as_json)
+        failure = f"the repetition ended with exit code {code} ({scratch})"
+        return _conclude(run, scratch, [], [failure, *why], as_json)
+    compared = verdicts(run, ended[0])
+    alike = all(verdict.verdict in _SAME for verdict in compared)
+    _conclude(run, scratch, compared, [] if alike else causes(run, ended[0]), as_json)
 
 
 def _named(run: Run, inputs: Mapping[str, Input | list[Input]]) -> Iterator[str]:
-    """What names a run's inputs where they are now, as overrides."""
+    """Overrides that name the inputs of a run at their present paths."""
     for leaf, named in inputs.items():
-        paths = [str(input_run(run, each).path) for each in (named if isinstance(named, list) else [named])]
+        paths = [str(input_run(run, record).path) for record in (named if isinstance(named, list) else [named])]
         yield f"{procedure_of(run).subject}.{leaf}={json.dumps(paths if isinstance(named, list) else paths[0])}"
 
 
 def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
     """The same command on the same configuration, in a process of its own; its messages pass through.
 
-    Whatever its configuration says, it opens no board and no camera.
+    It opens no board and no camera, for any configuration.
     """
     options = [part for text in settings for part in ("--set", text)]
     again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
@@ -230,23 +233,23 @@ def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
     return subprocess.run(command, stdout=subprocess.DEVNULL, env=alone, preexec_fn=end_with_parent).returncode
 
 
-def _conclude(run: Run, scratch: Path | None, found: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
+def _conclude(run: Run, scratch: Path | None, compared: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
     """Print the verdicts; where there is a cause to name, fail and keep the scratch folder."""
     if as_json:
-        files = [each._asdict() for each in found]
+        files = [verdict._asdict() for verdict in compared]
         kept = str(scratch) if why and scratch else None
         shown: dict[str, Any] = {"schema": "wristctl.replay/1", "run": run.id, "same": not why, "causes": why}
         print(json.dumps({**shown, "files": files, "scratch": kept}, indent=2))
     else:
-        if found:
-            print(Table("", ("file", "verdict", "where"), found).text(), end="\n\n")
+        if compared:
+            print(Table("", ("file", "verdict", "where"), compared).text(), end="\n\n")
         for cause in why:
             say(f"cause: {cause}")
     if why:
         kept = f"the repetition is in {scratch}" if scratch else "mend the input, or run its command again"
-        raise UserError("the repetition differs" if found else "the run was not repeated", run.id, kept, exit_code=3)
+        raise UserError("the repetition differs" if compared else "the run was not repeated", run.id, kept, exit_code=3)
     if scratch:
         shutil.rmtree(scratch)
     if not as_json:
-        exact = all(each.verdict in ("identical", "volatile") for each in found)
+        exact = all(verdict.verdict in ("identical", "volatile") for verdict in compared)
         say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

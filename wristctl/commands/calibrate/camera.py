@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Seconds in which the board must be seen lying in the bending plane.
 _PATIENCE = 20.0
-"""Seconds in which the board must be seen lying in the bending plane."""
 
 
 def look(session: Session) -> Album:
@@ -53,18 +53,18 @@ def look(session: Session) -> Album:
         names = [file.name for file in frames.files] if isinstance(frames, FolderCamera) else []
         album = Album(settings.board, None if names else settings.views)
     name = ""
-    with session.progress("views", None if not names else len(names)) as done:
+    with session.progress("views", None if not names else len(names)) as advance:
         for frame in frames:
             name = names[frame.number] if names else f"frame {frame.number}"
             if album.look(frame, name) and live:  # nothing else has these pictures
                 _keep(findings.file(f"data/views/{len(album.views):03}.png"), frame.image)
-            done(frame.number + 1, views=len(album.views))
+            advance(frame.number + 1, views=len(album.views))
     if album.last is None or album.last_picture is None:
         fix = "show it sharp, well lit and whole; is it the board of hw calibrate board-pdf (calibrate-camera.board)?"
         raise UserError(f"no board in {album.pictures} pictures", source, fix, exit_code=3)
     if names and settings.in_plane and album.last.name != name:
-        what = "the last picture does not show the board, which should lie in the bending plane there"
-        raise UserError(what, name, "add such a picture, or go without: --set in_plane=false", exit_code=3)
+        problem = "the last picture does not show the board, which should lie in the bending plane there"
+        raise UserError(problem, name, "add such a picture, or go without: --set in_plane=false", exit_code=3)
     if live and settings.in_plane:
         _keep(findings.file("data/views/plane.png"), album.last_picture)
     return album
@@ -146,7 +146,7 @@ class CameraCalibrated(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """Where the views come from."""
+    """Plan of a calibration: the source of its views."""
     settings = study.calibrate_camera
     source = "rendered pictures (no camera is named)" if settings.camera is None else settings.camera
     last = "; the last view is the board in the bending plane" if settings.in_plane else ""
@@ -170,60 +170,64 @@ def calibrate_camera(session: Session) -> CameraCalibrated:
     findings, settings = session.findings, session.study.calibrate_camera
     album = look(session)
     lying = album.last if settings.in_plane else None
-    found = calibrate(album.views, lying, album.size or (1, 1), settings)
-    tilt = plane_tilt(found.view) if lying is not None else math.nan
+    calibration = calibrate(album.views, lying, album.size or (1, 1), settings)
+    tilt = plane_tilt(calibration.view) if lying is not None else math.nan
 
     units = dict.fromkeys(("x", "y", "off_x", "off_y"), "px")
-    findings.table("data/corners.csv", _corners(album, found), units, _MEANING)
-    deviation = dict(zip((name for name, _ in _LENS), found.deviation.tolist(), strict=True))
-    known = {"reprojection_px": found.error, "views": len(album.views), "coverage": found.coverage}
+    findings.table("data/corners.csv", _corners(album, calibration), units, _MEANING)
+    deviation = dict(zip((name for name, _ in _LENS), calibration.deviation.tolist(), strict=True))
+    quality = {"reprojection_px": calibration.error, "views": len(album.views), "coverage": calibration.coverage}
     if file := findings.file(FILE):
-        found.view.save(file, deviation=deviation, in_plane=settings.in_plane, **known)
+        calibration.view.save(file, deviation=deviation, in_plane=settings.in_plane, **quality)
     findings.metric(
-        "reprojection", found.error, "px", "lower", len(album.views), meaning="RMS of corners less expected"
+        "reprojection", calibration.error, "px", "lower", len(album.views), meaning="RMS of corners less expected"
     )
-    findings.metric("coverage", found.coverage, "", "higher", meaning="share of the picture in which corners were seen")
+    findings.metric(
+        "coverage", calibration.coverage, "", "higher", meaning="share of the picture in which corners were seen"
+    )
     if lying is not None:
         findings.metric("tilt", math.degrees(tilt), "deg", meaning="camera's axis to the bending plane's normal")
         meaning = "RMS distance of the corners in the plane from where the homography puts them"
-        findings.metric("plane_error", 1e6 * found.plane_error, "um", "lower", len(lying.corners), meaning=meaning)
+        findings.metric(
+            "plane_error", 1e6 * calibration.plane_error, "um", "lower", len(lying.corners), meaning=meaning
+        )
     with session.progress("drawing"):
-        findings.figure("reprojection", reprojection, found, album.views)
-        findings.figure("lens", lens, found.view)
+        findings.figure("reprojection", reprojection, calibration, album.views)
+        findings.figure("lens", lens, calibration.view)
         if lying is not None and album.last_picture is not None:
-            findings.figure("plane", plane, album.last_picture, lying, found.view)
-    values = [*(found.view.camera_matrix[[0, 1, 0, 1], [0, 1, 2, 2]]), *found.view.distortion]
+            findings.figure("plane", plane, album.last_picture, lying, calibration.view)
+    values = [*(calibration.view.camera_matrix[[0, 1, 0, 1], [0, 1, 2, 2]]), *calibration.view.distortion]
     names = [f"{name} [{unit}]" if unit else name for name, unit in _LENS]
-    rows: list[tuple[object, ...]] = list(zip(names, map(float, values), found.deviation.tolist(), strict=True))
+    rows: list[tuple[object, ...]] = list(zip(names, map(float, values), calibration.deviation.tolist(), strict=True))
     if settings.camera is None:
         rows = [(*row, true) for row, true in zip(rows, _true_lens(settings), strict=True)]
-    seen = [
+    summary = [
         ("views", len(album.views)),
         ("pictures", album.pictures),
-        ("reprojection error [px]", found.error),
-        ("coverage", found.coverage),
-        ("largest tilt of a view [deg]", float(np.degrees(found.tilts.max()))),
+        ("reprojection error [px]", calibration.error),
+        ("coverage", calibration.coverage),
+        ("largest tilt of a view [deg]", float(np.degrees(calibration.tilts.max()))),
     ]
     if lying is not None:
-        seen += [("tilt of the camera to the bending plane [deg]", math.degrees(tilt))]
+        summary += [("tilt of the camera to the bending plane [deg]", math.degrees(tilt))]
     columns = ("lens", "value", "standard deviation", *(("rendered with",) if settings.camera is None else ()))
-    tables = [Table("Views", ("what", "value"), seen), Table("Lens", columns, rows)]
-    return CameraCalibrated(session.study, findings, tables, album, found)
+    tables = [Table("Views", ("what", "value"), summary), Table("Lens", columns, rows)]
+    return CameraCalibrated(session.study, findings, tables, album, calibration)
 
 
-def _corners(album: Album, found: CameraCalibration) -> pd.DataFrame:
+def _corners(album: Album, calibration: CameraCalibration) -> pd.DataFrame:
     import numpy as np
     import pandas as pd
 
     names = np.repeat([view.name for view in album.views], [len(view.corners) for view in album.views])
-    corners, off = np.concatenate([view.corners for view in album.views]), np.concatenate(found.residuals)
+    corners, off = np.concatenate([view.corners for view in album.views]), np.concatenate(calibration.residuals)
     numbers = np.concatenate([view.numbers for view in album.views])
     columns = (names, numbers, *corners.T, *off.T)
     return pd.DataFrame(dict(zip(_MEANING, columns, strict=True)))
 
 
 def _true_lens(settings: CalibrateCameraSettings) -> list[float]:
-    """What rendered views were rendered with, in the order of _LENS."""
+    """Lens of rendered views, in the order of _LENS."""
     from wristctl.vision.view import Pinhole
 
     camera = Pinhole(settings.scene, "right")

@@ -20,10 +20,10 @@ from wristctl.plotting.style import BLACK, GREY
 from wristctl.vision.charuco import DICTIONARY as BOARD_DICTIONARY
 from wristctl.vision.detector import print_of
 
+# Width and height [mm].
 PAPERS = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
-"""Width and height [mm]."""
+# Length [mm] of the ruler on each page.
 RULER = 100.0
-"""Length [mm] of the ruler on each page."""
 _INCH, _MARGIN = 25.4, 8.0
 _COPIES = 3
 
@@ -54,9 +54,9 @@ def board_page(paper: Literal["a4", "letter"], board: CharucoBoard) -> Figure:
     width, height = PAPERS[paper]
     across, down, square = 1e3 * board.columns * board.square, 1e3 * board.rows * board.square, 1e3 * board.square
     if across > width - 2 * _MARGIN or down > height - 2 * _MARGIN - 20.0:
-        what = f"a board of {across:g} x {down:g} mm does not fit on {paper}"
-        raise UserError(what, "calibrate-camera.board", "fewer or smaller squares: --set board.square=0.02")
-    made, axes = _page(paper)
+        problem = f"a board of {across:g} x {down:g} mm does not fit on {paper}"
+        raise UserError(problem, "calibrate-camera.board", "fewer or smaller squares: --set board.square=0.02")
+    picture, axes = _page(paper)
     left, top = 0.5 * (width - across), _MARGIN
     chess = (np.add.outer(np.arange(board.rows), np.arange(board.columns)) % 2) == 0
     _paint(axes, chess, left, top, square)
@@ -67,22 +67,24 @@ def board_page(paper: Literal["a4", "letter"], board: CharucoBoard) -> Figure:
         _paint(axes, ink, left + column * square + inset, top + row * square + inset, 1e3 * board.marker / cells)
     below = top + down + 6.0
     _ruler(axes, left, below)
-    said = f"ChArUco {board.columns} x {board.rows}, squares {square:g} mm, markers {1e3 * board.marker:g} mm, 5x5_50"
-    axes.text(left + RULER + 5.0, below + 2.0, said, fontsize=7.5, va="center")
+    caption = (
+        f"ChArUco {board.columns} x {board.rows}, squares {square:g} mm, markers {1e3 * board.marker:g} mm, 5x5_50"
+    )
+    axes.text(left + RULER + 5.0, below + 2.0, caption, fontsize=7.5, va="center")
     _write(axes, left, below + 12.0, [line.format(square=square) for line in _BOARD_NOTES])
-    return made
+    return picture
 
 
 def marker_page(paper: Literal["a4", "letter"], markers: Markers) -> Figure:
     """The base's and the tip's marker with their white rims, some spares, a ruler and what to do."""
-    made, axes = _page(paper)
+    picture, axes = _page(paper)
     side = 1e3 * markers.side
     cell = side / (len(print_of(0)) - 2)
     flag, top = side + 2 * cell, 20.0
     step = flag + 22.0
     if 20.0 + _COPIES * step > PAPERS[paper][0]:
-        what = f"markers of {side:g} mm do not fit {_COPIES} in a row on {paper}"
-        raise UserError(what, "track.markers.side", "print smaller markers, and bring the camera nearer")
+        problem = f"markers of {side:g} mm do not fit {_COPIES} in a row on {paper}"
+        raise UserError(problem, "track.markers.side", "print smaller markers, and bring the camera nearer")
     for row, (name, number) in enumerate((("base", markers.base), ("tip", markers.tip))):
         for copy in range(_COPIES):
             left, upper = 20.0 + copy * step, top + row * (flag + 22.0)
@@ -94,17 +96,17 @@ def marker_page(paper: Literal["a4", "letter"], markers: Markers) -> Figure:
     below = top + 2 * (flag + 22.0)
     _ruler(axes, 20.0, below)
     _write(axes, 20.0, below + 12.0, [line.format(side=side) for line in _MARKER_NOTES])
-    return made
+    return picture
 
 
 def _page(paper: str) -> tuple[Figure, Axes]:
     """A page whose axes are in mm from its upper left corner."""
     width, height = PAPERS[paper]
-    made = Figure(figsize=(width / _INCH, height / _INCH))
-    axes = made.add_axes((0.0, 0.0, 1.0, 1.0))
+    picture = Figure(figsize=(width / _INCH, height / _INCH))
+    axes = picture.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.set(xlim=(0.0, width), ylim=(height, 0.0))
-    return made, axes
+    return picture, axes
 
 
 def _paint(axes: Axes, ink: Cells, left: float, top: float, cell: float) -> None:

@@ -25,7 +25,7 @@ _COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [
 
 @dataclass(frozen=True, repr=False, eq=False)
 class WristCalibrated(StudyResult):
-    """Where each tendon is just taut on the straight wrist, and which way its motor turns."""
+    """Position where each tendon is just taut on the straight wrist, and the sense of its motor."""
 
     kind = "calibrate-wrist"
 
@@ -40,7 +40,7 @@ class WristCalibrated(StudyResult):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AxisFound(StudyResult):
-    """Which way one motor turns, and how slack its tendon is."""
+    """Sense of one motor, and the slack of its tendon."""
 
     kind = "calibrate-wrist"
 
@@ -52,7 +52,7 @@ class AxisFound(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """What would be done; opens nothing."""
+    """Plan of a calibration. Opens no device."""
     settings = study.calibrate_wrist
     slack = 1e3 * settings.homing.slack
     if settings.axis is not None:
@@ -86,9 +86,9 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
         if settings.axis is not None:
             return _one_axis(session, testbed, settings.axis)
         with session.progress("homing"):
-            found = calibrated(testbed, settings, study.wrist)
-    findings.plain(FILE, found.plain())
-    zero = found.zero
+            calibration = calibrated(testbed, settings, study.wrist)
+    findings.plain(FILE, calibration.plain())
+    zero = calibration.zero
     findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
     by_model = ExpectedMoves(settings, study.wrist, settings.plane).steps()
     rows = []
@@ -98,7 +98,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
         findings.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")
         rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, by_model, 1e3 * slack, 1e3 * zero.friction[axis]))
     findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.marker):.3f} deg")
-    return WristCalibrated(study, findings, [Table("Zero", _COLUMNS, rows)], found)
+    return WristCalibrated(study, findings, [Table("Zero", _COLUMNS, rows)], calibration)
 
 
 def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
@@ -109,10 +109,10 @@ def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
 
     findings, study = session.findings, session.study
     with session.progress(f"trying axis {axis}"):
-        found = axis_tried(testbed, study.calibrate_wrist, axis)
-    findings.metric("taken_up", found.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
-    findings.metric("bend", found.bend, "rad", meaning="of the wrist then")
-    row = axis, ACTIVE[axis], f"{found.sense:+d}", 1e3 * found.taken_up, float(np.degrees(found.bend))
+        axis_result = axis_tried(testbed, study.calibrate_wrist, axis)
+    findings.metric("taken_up", axis_result.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
+    findings.metric("bend", axis_result.bend, "rad", meaning="of the wrist then")
+    row = axis, ACTIVE[axis], f"{axis_result.sense:+d}", 1e3 * axis_result.taken_up, float(np.degrees(axis_result.bend))
     return AxisFound(study, findings, [Table("One axis", _OF_AXIS, [row])])
 
 

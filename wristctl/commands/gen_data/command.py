@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from wristctl.learning.measured_samples import RecordedCourse
 
 
+# Samples beyond which there is no samples.csv, which nobody would read, and the figure shows some of them.
 READABLE = 200_000
-"""Samples beyond which there is no samples.csv, which nobody would read, and the figure shows some of them."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -43,12 +43,12 @@ class Generated(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """What a run would draw."""
+    """Plan of a data set."""
     settings, wrist = study.gen_data, study.wrist
-    for name, given in (("run", "run" in inputs), ("csv", bool(settings.files))):
-        if given and settings.source != name:
-            fix, what = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
-            raise UserError(f"{what} given, but source is {settings.source}", "gen-data.source", fix)
+    for name, present in (("run", "run" in inputs), ("csv", bool(settings.files))):
+        if present and settings.source != name:
+            fix, noun = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
+            raise UserError(f"{noun} given, but source is {settings.source}", "gen-data.source", fix)
     if settings.source in ("run", "csv"):
         courses, run = _courses(study, inputs), inputs.runs().get("run")
         whose = (
@@ -78,9 +78,9 @@ def gen_data(session: Session) -> Generated:
 
     findings = session.findings
     entropy = findings.stream("samples")
-    with session.progress("drawing", session.study.gen_data.samples, "samples") as done:
-        samples = drawn(session.study, entropy, session.inputs, done)
-        done(len(samples.theta))
+    with session.progress("drawing", session.study.gen_data.samples, "samples") as advance:
+        samples = drawn(session.study, entropy, session.inputs, advance)
+        advance(len(samples.theta))
     table = samples_table(samples)
     exact = angle_errors(exact_angle(samples.tip), samples.theta)
 
@@ -97,9 +97,9 @@ def gen_data(session: Session) -> Generated:
         share = float(np.mean(samples.held_out == code))
         findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
     rows: list[tuple[str, float, float]] = []
-    known = {"theta": (180.0 / np.pi, "deg"), "pose": (180.0 / np.pi, "deg"), "hand_mass": (1.0, "kg")}
+    units = {"theta": (180.0 / np.pi, "deg"), "pose": (180.0 / np.pi, "deg"), "hand_mass": (1.0, "kg")}
     for name in ("theta", "arc_length", "x", "y", *samples.names):
-        scale, unit = known.get(name, (1e3, "mm"))
+        scale, unit = units.get(name, (1e3, "mm"))
         low, high = scale * float(table[name].min()), scale * float(table[name].max())
         rows.append((f"{name} [{unit}]", low, high))
         findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")
@@ -115,7 +115,7 @@ def gen_data(session: Session) -> Generated:
     return Generated(session.study, findings, tables, samples)
 
 
-def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, done: Callable[[int], object] = int) -> Samples:
+def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, advance: Callable[[int], object] = int) -> Samples:
     """The samples that the study's gen-data section asks for; `done` is told how many there are by now."""
     import numpy as np
 
@@ -129,19 +129,19 @@ def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, done: Callable
     if settings.source == "plant":
         from wristctl.learning.dataset import draw_equilibria
 
-        return draw_equilibria(settings, study.wrist, rng, done)
+        return draw_equilibria(settings, study.wrist, rng, advance)
     return draw_samples(settings, study.wrist, rng)
 
 
-def samples_of(given: Run | Generated) -> Samples:
+def samples_of(source: Run | Generated) -> Samples:
     """The samples of a gen-data run or result."""
     from wristctl.learning.dataset import Samples
 
-    return Samples.from_arrays(given.array("samples")) if isinstance(given, Run) else given.samples
+    return Samples.from_arrays(source.array("samples")) if isinstance(source, Run) else source.samples
 
 
-def _counted(what: Sequence[object], name: str) -> str:
-    return f"{len(what)} {name}{'s' * (len(what) != 1)}"
+def _counted(items: Sequence[object], name: str) -> str:
+    return f"{len(items)} {name}{'s' * (len(items) != 1)}"
 
 
 def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
@@ -151,38 +151,41 @@ def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
         if not study.gen_data.files:
             raise UserError("source csv needs files", "gen-data.files", Setting("files=[recording.csv]", "gen-data"))
         return [course for file in study.gen_data.files for course in read_courses(Path(file))]
-    found = inputs.read("run", _courses_of)
-    if found is None:
+    courses = inputs.read("run", _courses_of)
+    if courses is None:
         fix = Call("gen-data", arguments=(Argument("run", "latest:simulate"),))
         raise UserError("source run needs a run", "gen-data.run", fix)
-    return found
+    return courses
 
 
-def _courses_of(given: Given) -> list[RecordedCourse]:
+def _courses_of(source: Given) -> list[RecordedCourse]:
     """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
     from wristctl.learning.measured_samples import NEEDED, courses_in
 
-    found = [course for name, columns in _kept(given) for course in courses_in(columns, name)]
-    if not found:
+    courses = [course for name, columns in _kept(source) for course in courses_in(columns, name)]
+    if not courses:
         tips = "name a simulate, compare, track or hw-run run; one made before tips were logged has to be repeated"
         raise UserError(
-            f"no course in that {given.kind} run: it has no data with {', '.join(NEEDED)}",
-            str(given.path) if isinstance(given, Run) else "run",
+            f"no course in that {source.kind} run: it has no data with {', '.join(NEEDED)}",
+            str(source.path) if isinstance(source, Run) else "run",
             tips,
         )
-    return found
+    return courses
 
 
-def _kept(given: Given) -> list[tuple[str, Mapping[str, Any]]]:
+def _kept(source: Given) -> list[tuple[str, Mapping[str, Any]]]:
     """Every table and every set of arrays of a run by its name, or what a result would have written of that."""
-    if isinstance(given, Run):
+    if isinstance(source, Run):
         from wristctl.records.formats import read_arrays, read_table
 
-        folder = given.path / "data"
+        folder = source.path / "data"
         frames = [(file.stem, read_table(file)) for file in sorted(folder.glob("*.csv"))]
-        tables = [(at, {str(name): column.to_numpy() for name, column in frame.items()}) for at, frame in frames]
+        tables = [
+            (table_name, {str(name): column.to_numpy() for name, column in frame.items()})
+            for table_name, frame in frames
+        ]
         return [*tables, *((file.stem, read_arrays(file)) for file in sorted(folder.glob("*.npz")))]
-    return list(given.courses().items())
+    return list(source.courses().items())
 
 
 GEN_DATA = Procedure("gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),))

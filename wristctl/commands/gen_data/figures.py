@@ -1,4 +1,4 @@
-"""Where the wrist's tip can rest: from one end of the tendons' tension to the other, by statics and not by geometry."""
+"""Rest positions of the wrist's tip over the range of the tendons' tension, by statics and not by geometry."""
 
 from contextlib import suppress
 
@@ -26,9 +26,11 @@ def rest_poses(wrist: WristParameters, tension: Array) -> Array:
     Positive is the + side's tension, negative the - side's; the other side keeps its pretension.
     """
     poses = np.full((len(tension), SEGMENTS), np.nan)
-    for at, pull in enumerate(tension.tolist()):
+    for index, pull in enumerate(tension.tolist()):
         with suppress(UserError):
-            poses[at] = equilibrium(wrist, SEGMENTS, tuple(max(each, wrist.pretension) for each in (pull, -pull)))
+            poses[index] = equilibrium(
+                wrist, SEGMENTS, tuple(max(side_tension, wrist.pretension) for side_tension in (pull, -pull))
+            )
     return poses
 
 
@@ -37,7 +39,7 @@ def workspace(wrist: WristParameters) -> Figure:
     up = np.linspace(wrist.pretension, wrist.tension_limit, _TENSIONS)
     tension = np.concatenate([-up[::-1], up])
     poses = rest_poses(wrist, tension)
-    made, ((shape, curve),) = figure(1, 2, width=8.5, height=3.8)
+    picture, ((shape, curve),) = figure(1, 2, width=8.5, height=3.8)
     colours = ScalarMappable(Normalize(-wrist.tension_limit, wrist.tension_limit), mpl.colormaps["viridis"])
     tips = []
     for number, pose in enumerate(poses):
@@ -49,14 +51,14 @@ def workspace(wrist: WristParameters) -> Figure:
     shape.plot(tip.imag, tip.real, color=BLACK, linewidth=2.0)
     shape.set(xlabel="y [mm]", ylabel="x [mm]", aspect="equal")
     reach = np.degrees(poses.sum(axis=1))
-    known, limit = reach[np.isfinite(reach)], f"within {wrist.tension_limit:g} N"
-    ends = f"from {known.min():.3g} to {known.max():.3g} deg" if len(known) else "nowhere: it buckles"
+    finite, limit = reach[np.isfinite(reach)], f"within {wrist.tension_limit:g} N"
+    ends = f"from {finite.min():.3g} to {finite.max():.3g} deg" if len(finite) else "nowhere: it buckles"
     title(shape, f"the tip rests {ends} {limit}")
     for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
-        other = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
-        angle = np.degrees(rest_poses(other, tension).sum(axis=1))
+        stiffer = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
+        angle = np.degrees(rest_poses(stiffer, tension).sum(axis=1))
         label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
         curve.plot(tension, angle, style, color=BLUE if factor == 1.0 else GREY, label=label)
     curve.set(xlabel="tension of the pulling side's tendons [N]", ylabel="bending angle at rest [deg]")
     legend(curve, loc="best")
-    return made
+    return picture

@@ -48,13 +48,13 @@ class Performed(StudyResult):
         from wristctl.simulation.oscillation import chatter
         from wristctl.simulation.trajectory import rests
 
-        done = self.trials[self.trials["outcome"] == "ok"]
-        courses = [self.twins[number].trajectory for number in done["trial"]]
+        completed = self.trials[self.trials["outcome"] == "ok"]
+        courses = [self.twins[number].trajectory for number in completed["trial"]]
         most = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
-        short = int((done["steady_state"].to_numpy(float) > SHORT * most).sum())
-        chatters = int((chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range) > 0.0).sum())
+        short = int((completed["steady_state"].to_numpy(float) > SHORT * most).sum())
+        chatters = int((chatter(completed["chattering"].to_numpy(float), self.study.wrist.tension_range) > 0.0).sum())
         counts = {"does not arrive": short, "chatters": chatters}
-        return [f"{mark}: {count} of {len(done)} trials" for mark, count in counts.items() if count]
+        return [f"{mark}: {count} of {len(completed)} trials" for mark, count in counts.items() if count]
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -72,8 +72,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_inverses(inverses_of([settings.reference]), inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
     count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
-    each = settings.horizon + settings.back + settings.rest
-    return f"{describe_rig(settings)}\n{count} trials, about {count * each:.0f} s of motion after homing"
+    trial_seconds = settings.horizon + settings.back + settings.rest
+    return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
 
 def hw_run(session: Session) -> Performed:
@@ -83,15 +83,18 @@ def hw_run(session: Session) -> Performed:
     from wristctl.commands.hw_run.trials import perform_trials
 
     study, bench = session.study, session.study.wrist
-    known = replace(session, study=identified(study, "hw-run", session.inputs))
-    believed = known.study.hw_run
-    network, tuned = network_for(session.inputs, known.study.wrist, [believed.loop]), tuned_gains(session.inputs)
+    identified_session = replace(session, study=identified(study, "hw-run", session.inputs))
+    believed = identified_session.study.hw_run
+    network, tuned = (
+        network_for(session.inputs, identified_session.study.wrist, [believed.loop]),
+        tuned_gains(session.inputs),
+    )
     if believed.port is None:
         warn_outside_conditions(believed.rows, [believed.loop])
     elif swinging := outside_conditions(believed.rows, [believed.loop]):
         session.operator.dare("; ".join(swinging))
-    trials = perform_trials(known, bench, network, tuned)
-    tables, twins = trial_tables(known, trials, network, tuned)
+    trials = perform_trials(identified_session, bench, network, tuned)
+    tables, twins = trial_tables(identified_session, trials, network, tuned)
     return Performed(study, session.findings, tables, trials, twins)
 
 

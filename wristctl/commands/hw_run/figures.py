@@ -24,8 +24,8 @@ from wristctl.plotting.style import (
     title,
 )
 
+# In the paper's order.
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
-"""In the paper's order."""
 
 _SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
 
@@ -52,63 +52,63 @@ class LoggedTrial:
 
 def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
-    made, panels = _panels(courses)
+    picture, panels = _panels(courses)
     for course in courses:
         panel = panels[course.direction]
         _draw_simulated(panel, course, 1)
         panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
         panel.plot(course.time, np.degrees(course.theta_desired), **WANTED)
-    return _finished(made, panels, courses, heading, "bending angle [deg]")
+    return _finished(picture, panels, courses, heading, "bending angle [deg]")
 
 
 def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Error e = theta - theta_ref [deg] over time [s], one panel for each direction."""
-    made, panels = _panels(courses, sharey=True)
+    picture, panels = _panels(courses, sharey=True)
     for course in courses:
         panel = panels[course.direction]
         _draw_simulated(panel, course, 2)
         panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
         panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    return _finished(made, panels, courses, heading, "error [deg]")
+    return _finished(picture, panels, courses, heading, "error [deg]")
 
 
 def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Commanded tension [N] of each tendon of both sides over time [s], one panel for each direction."""
-    made, panels = _panels(courses, sharey=True)
+    picture, panels = _panels(courses, sharey=True)
     for course in courses:
         for (side, colour), tension in zip(_SIDES.items(), course.tension.T, strict=True):
             panels[course.direction].plot(course.time, tension, color=colour, linewidth=1.0, label=side)
-    return _finished(made, panels, courses, heading, "tension [N]")
+    return _finished(picture, panels, courses, heading, "tension [N]")
 
 
 def lateness(late: Array, period: float) -> Figure:
-    """How many ticks began how late [ms]."""
-    made, ((axes,),) = figure(height=2.6)
+    """Histogram of the lateness of ticks [ms]."""
+    picture, ((axes,),) = figure(height=2.6)
     axes.hist(1e3 * late, bins=np.linspace(0.0, 1e3 * max(period, float(late.max())), 60).tolist(), color=BLUE)
     logarithmic(axes.yaxis)
     axes.set(xlabel="from due to begun [ms]", ylabel="ticks [1]")
-    return made
+    return picture
 
 
 def _draw_simulated(panel: Axes, course: LoggedTrial, which: Literal[1, 2]) -> None:
     """Angle (1) or error (2) in simulation, beside the first repetition alone."""
     if course.simulated is not None and course.repetition == 0:
-        own: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
-        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **own | SIMULATED)
+        style: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
+        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **style | SIMULATED)
 
 
 def _panels(courses: Sequence[LoggedTrial], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
     names = [name for name in DIRECTIONS if any(course.direction == name for course in courses)]
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
-    made, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
-    for each in axes.flat[len(names) :]:
-        each.set_visible(False)
-    return made, dict(zip(names, axes.ravel().tolist(), strict=False))
+    picture, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
+    for panel in axes.flat[len(names) :]:
+        panel.set_visible(False)
+    return picture, dict(zip(names, axes.ravel().tolist(), strict=False))
 
 
 def _finished(
-    made: Figure, panels: dict[str, Axes], courses: Sequence[LoggedTrial], heading: str, ylabel: str
+    picture: Figure, panels: dict[str, Axes], courses: Sequence[LoggedTrial], heading: str, ylabel: str
 ) -> Figure:
     for name, panel in panels.items():
         title(panel, name)
@@ -118,7 +118,7 @@ def _finished(
     for panel in list(panels.values())[-2:]:
         panel.set_xlabel("time [s]")
         panel.tick_params(labelbottom=True)  # of three panels the second has an empty place below it
-    made.suptitle(heading, fontsize=10.0)
-    made.supylabel(ylabel, fontsize=10.0)
-    legend_below(made)
-    return made
+    picture.suptitle(heading, fontsize=10.0)
+    picture.supylabel(ylabel, fontsize=10.0)
+    legend_below(picture)
+    return picture

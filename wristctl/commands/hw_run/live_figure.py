@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from wristctl.plotting.style import BLACK, BLUE, ORANGE, PURPLE, SKY, VERMILLION, WANTED, figure, legend_below, title
 from wristctl.wrist.directions import ACTIVE
 
+# Bytes of a row of the log, at most.
 _ROW = 1000
-"""Bytes of a row of the log, at most."""
 _COLOURS = (ORANGE, VERMILLION, PURPLE, SKY)
 
 
@@ -25,26 +25,26 @@ def newest_rows(log: Path, seconds: float, period: float) -> pd.DataFrame:
         begin, end = file.tell(), file.seek(0, io.SEEK_END)
         file.seek(max(begin, end - int(_ROW * seconds / period)))
         rows = file.read() if file.tell() == begin else file.read().partition(b"\n")[2]
-    whole = rows[: rows.rfind(b"\n") + 1]
-    table = pd.read_csv(io.BytesIO(header + whole))
+    complete_rows = rows[: rows.rfind(b"\n") + 1]
+    table = pd.read_csv(io.BytesIO(header + complete_rows))
     newest: pd.DataFrame = table[table["clock"] > table["clock"].max() - seconds]
     return newest
 
 
 def recent(rows: pd.DataFrame) -> Figure:
     """Angle and reference [deg] and the tensions commanded [N] over the seconds up to the newest row."""
-    made, ((above,), (below,)) = figure(2, height=5.0, sharex=True)
+    picture, ((above,), (below,)) = figure(2, height=5.0, sharex=True)
     if len(rows):
         time = rows["clock"] - rows["clock"].iloc[-1]
         above.plot(time, np.degrees(rows["theta_ref"]), **WANTED | {"label": "reference"})
         above.plot(time, np.degrees(rows["theta"]), color=BLUE, label="angle")
-        seen = time + rows["captured"] - rows["time"]
-        above.plot(seen, np.degrees(rows["theta_measured"]), ".", color=BLACK, markersize=2.0, label="marker")
+        capture_time = time + rows["captured"] - rows["time"]
+        above.plot(capture_time, np.degrees(rows["theta_measured"]), ".", color=BLACK, markersize=2.0, label="marker")
         for tendon, colour in zip(ACTIVE, _COLOURS, strict=True):
             below.plot(time, rows[f"tension_{tendon}"], color=colour, label=f"tendon {tendon}")
         newest = rows.iloc[-1]
         title(above, f"trial {newest['trial'] + 1:.0f}, {newest['time']:.1f} s, board {newest['state']}")
-        legend_below(made, columns=4)
+        legend_below(picture, columns=4)
     above.set_ylabel("bending angle [deg]")
     below.set(xlabel="time before now [s]", ylabel="tension [N]")
-    return made
+    return picture

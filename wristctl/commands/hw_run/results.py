@@ -17,8 +17,8 @@ from wristctl.trial.trials import Trial, twin
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 from wristctl.wrist.kinematics import Inverse
 
+# The simulation of each trial, by its number.
 Twins = dict[int, Simulation]
-"""The simulation of each trial, by its number."""
 
 _MEANS = ("rmse", "steady_state", "settling", "recovery", "true_rmse", "true_steady_state")
 _COLUMNS = (
@@ -48,18 +48,18 @@ def trial_tables(
 
 
 def _twins(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
-    """Each trial in simulation; repetitions share one."""
+    """Simulation of every trial. Repetitions share one."""
     names = [row.label for row in session.study.hw_run.rows]
-    done: dict[tuple[Any, ...], Simulation] = {}
-    found = {}
+    simulated: dict[tuple[Any, ...], Simulation] = {}
+    twins = {}
     with session.progress("simulating the same trials"):
-        for each in trials.to_dict("records"):
-            key = each["direction"], each["push"], each["label"]
-            if key not in done:
-                trial = Trial(each["trial"], each["direction"], 0, each["push"], names.index(each["label"]))
-                done[key] = twin(session.study, trial, network, tuned)
-            found[each["trial"]] = done[key]
-    return found
+        for row in trials.to_dict("records"):
+            key = row["direction"], row["push"], row["label"]
+            if key not in simulated:
+                trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
+                simulated[key] = twin(session.study, trial, network, tuned)
+            twins[row["trial"]] = simulated[key]
+    return twins
 
 
 def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tuple[Any, ...]]:
@@ -85,7 +85,7 @@ def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tup
 
 
 def _papers() -> Iterator[tuple[Any, ...]]:
-    """What the paper measured with its own law."""
+    """Hardware results of the paper's own law."""
     for name, printed in EXPERIMENT.items():
         count = 4 if name == "four directions" else 1
         yield (f"paper: {name}", count, printed.rmse, printed.steady_state, printed.settling, *[None] * 5)
@@ -95,17 +95,17 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
     findings, settings = session.findings, session.study.hw_run
     push, log = settings.push, _logged(findings, "log")
     courses = []
-    for each in trials.to_dict("records"):
-        course, simulated = log[log["trial"] == each["trial"]], twins[each["trial"]].trajectory
+    for record in trials.to_dict("records"):
+        course, simulated = log[log["trial"] == record["trial"]], twins[record["trial"]].trajectory
         courses.append(
             trial_figures.LoggedTrial(
-                direction=each["direction"],
-                label=each["label"],
-                repetition=each["repetition"],
+                direction=record["direction"],
+                label=record["label"],
+                repetition=record["repetition"],
                 **{name: course[name].to_numpy(float) for name in ("time", "theta", "theta_ref", "theta_desired")},
-                tension=_sides(course, each["direction"]),
+                tension=_sides(course, record["direction"]),
                 simulated=(simulated.time, simulated.theta, simulated.error),
-                push=(push.start, push.start + push.duration) if each["push"] else None,
+                push=(push.start, push.start + push.duration) if record["push"] else None,
             )
         )
     for prefix, some in (
@@ -116,11 +116,15 @@ def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
             findings.figure(f"{prefix}directions", trial_figures.desired_and_obtained, some)
             findings.figure(f"{prefix}errors", trial_figures.errors, some)
             row = settings.rows[0]
-            first = [each for each in some if each.label == row.label and each.repetition == 0]
+            first = [
+                logged_trial
+                for logged_trial in some
+                if logged_trial.label == row.label and logged_trial.repetition == 0
+            ]
             findings.figure(f"{prefix}tensions", trial_figures.tensions, first, row.label)
     if settings.real_time or settings.port is not None:
-        both = (log, _logged(findings, "between"))
-        late = np.concatenate([table["late"].to_numpy(float) for table in both])
+        logs = (log, _logged(findings, "between"))
+        late = np.concatenate([table["late"].to_numpy(float) for table in logs])
         findings.figure("lateness", trial_figures.lateness, late, settings.control_period)
 
 

@@ -117,9 +117,9 @@ def _films(run: LiveRun, settings: HwRunSettings) -> Films:
     return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
 
 
-def _add(films: Films, frame: Frame, seen: Sighting) -> None:
+def _add(films: Films, frame: Frame, sighting: Sighting) -> None:
     for film in films:
-        film.add(frame, seen)
+        film.add(frame, sighting)
 
 
 def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
@@ -183,17 +183,19 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
 
 
 def _tell_oddities(session: Session, experiment: Experiment) -> None:
-    """How near trials came to the limits of what a wrist may do otherwise than its motors, and what was odd."""
+    """Report how near trials came to the limits on unexpected motion, and anything odd."""
     findings, limits, greatest = session.findings, session.study.hw_run.safety, experiment.greatest
-    known = {
+    limits_and_values = {
         "apart": (np.degrees(greatest.apart), limits.follow_deg, "deg", "marker from where the spools should have it"),
         "jump": (np.degrees(greatest.jump), limits.jump_deg, "deg", "of the marker, off that, between two frames"),
         "load": (greatest.load, limits.load, "N m", "load torque as estimated"),
         "across": (np.degrees(greatest.across), limits.across_deg, "deg", "bend across the plane"),
     }
-    for name, (value, limit, unit, meaning) in known.items():
+    for name, (value, limit, unit, meaning) in limits_and_values.items():
         findings.metric(f"greatest_{name}", float(value), unit, "lower", meaning=f"{meaning}; limit {limit:g} {unit}")
-    parts = ", ".join(f"{name} {value:.2g} of {limit:g} {unit}" for name, (value, limit, unit, _) in known.items())
+    parts = ", ".join(
+        f"{name} {value:.2g} of {limit:g} {unit}" for name, (value, limit, unit, _) in limits_and_values.items()
+    )
     findings.summary(f"Greatest of what the model of the rig does not explain, and the limit: {parts}.")
     for number, words in experiment.odd.items():
         if words and experiment.outcomes.get(number) == "ok":

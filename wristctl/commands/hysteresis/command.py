@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Fitted parameters: unit and meaning.
 FITTED = {
     "friction": ("", "coefficient of the tendons' friction, mu"),
     "sheath": ("rad", "angle by which a tendon is wrapped before it reaches the wrist"),
     "presliding": ("m", "path in which friction turns round"),
 }
-"""What is found: unit and meaning."""
+# Share of the presliding by which a loop may leap between two samples at its turns.
 _COARSE = 0.25
-"""Share of the presliding by which a loop may leap between two samples at its turns."""
 
+# Share of the noise by which what is expected may change with the integration step.
 _STEP_ERROR = 0.1
-"""Share of the noise by which what is expected may change with the integration step."""
+# Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble.
 _TREMBLE = 0.01
-"""Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble."""
 
 
 def problem_of(study: Study) -> LoopProblem:
@@ -59,76 +59,80 @@ def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
 
     findings, source = session.findings, Path(str(session.study.hysteresis.measured))
     with session.progress("fitting the measured loop"):
-        found = fit_friction(problem_of(session.study))
-    if found.autocorrelation > ALIKE:
+        friction_fit = fit_friction(problem_of(session.study))
+    if friction_fit.autocorrelation > ALIKE:
         log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
-    if found.step_error > _STEP_ERROR:
-        told = "the fit depends on the integration step: half of it changes the model by %.2g of the noise - fix: %s"
-        log.warning(told, found.step_error, f"hysteresis.step: {0.5 * session.study.hysteresis.step:g}")
-    if found.leap > _COARSE * found.presliding.value:
-        leap, path = 1e6 * found.leap, 1e6 * found.presliding.value
+    if friction_fit.step_error > _STEP_ERROR:
+        advice = "the fit depends on the integration step: half of it changes the model by %.2g of the noise - fix: %s"
+        log.warning(advice, friction_fit.step_error, f"hysteresis.step: {0.5 * session.study.hysteresis.step:g}")
+    if friction_fit.leap > _COARSE * friction_fit.presliding.value:
+        leap, path = 1e6 * friction_fit.leap, 1e6 * friction_fit.presliding.value
         fix = "sample more often, or turn more softly"
-        told = "the loop leaps %.2g um between two samples at its turns, and presliding is some %.2g um: %s - fix: %s"
-        log.warning(told, leap, path, "values may be off by more than their intervals", fix)
-    loop = found.problem.loop
-    if loop.winch and loop.tremble > _TREMBLE * found.exponent.value * float(loop.drive.mean()):
+        advice = "the loop leaps %.2g um between two samples at its turns, and presliding is some %.2g um: %s - fix: %s"
+        log.warning(advice, leap, path, "values may be off by more than their intervals", fix)
+    loop = friction_fit.problem.loop
+    if loop.winch and loop.tremble > _TREMBLE * friction_fit.exponent.value * float(loop.drive.mean()):
         fix = "measure the spools' positions too, or hang weights"
-        told = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
-        log.warning(told, loop.tremble, fix)
+        advice = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
+        log.warning(advice, loop.tremble, fix)
     findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
-    _write_fit(findings, found)
-    findings.figure("measured", measured, found)
-    return found, _fit_table(findings, found)
+    _write_fit(findings, friction_fit)
+    findings.figure("measured", measured, friction_fit)
+    return friction_fit, _fit_table(findings, friction_fit)
 
 
-def _write_fit(findings: Findings, found: FrictionFit) -> None:
-    columns = {"time": found.problem.loop.time[found.problem.first :]}
+def _write_fit(findings: Findings, friction_fit: FrictionFit) -> None:
+    columns = {"time": friction_fit.problem.loop.time[friction_fit.problem.first :]}
     names = ("theta", "tension_plus", "tension_minus")
-    for name, seen, residual in zip(names, found.problem.measured, found.residuals, strict=False):
-        columns |= {name: seen, f"{name}_model": seen - residual}
+    for name, samples, residual in zip(names, friction_fit.problem.measured, friction_fit.residuals, strict=False):
+        columns |= {name: samples, f"{name}_model": samples - residual}
     units = {name: "s" if name == "time" else "rad" if name.startswith("theta") else "N" for name in columns}
     findings.table("data/measured.csv", columns, units)
 
 
-def _fit_table(findings: Findings, found: FrictionFit) -> Table:
+def _fit_table(findings: Findings, friction_fit: FrictionFit) -> Table:
     rows: list[tuple[str, float, float | None, float | None, str, str]] = []
     for name, (unit, meaning) in FITTED.items():
-        value, low, high = getattr(found, name)
+        value, low, high = getattr(friction_fit, name)
         ended = math.isfinite(high)
         rows.append((name, value, low, high if ended else None, unit, meaning))
-        findings.metric(name, value if ended else None, unit, "", found.count, (low, high) if ended else None, meaning)
-    bend, exponent = found.told_best
+        findings.metric(
+            name, value if ended else None, unit, "", friction_fit.count, (low, high) if ended else None, meaning
+        )
+    bend, exponent = friction_fit.told_best
     meaning = f"mu (bend + sheath) at a bend of {math.degrees(bend):.3g} deg, where it is told best"
-    findings.metric("exponent", exponent.value, "", "", found.count, (exponent.low, exponent.high), meaning)
+    findings.metric("exponent", exponent.value, "", "", friction_fit.count, (exponent.low, exponent.high), meaning)
     rows.append(("exponent", *exponent, "", meaning))
-    findings.metric("correlation", found.correlation, n=found.count, meaning=_CORRELATION)
-    rows.append(("correlation", found.correlation, None, None, "", _CORRELATION))
-    for name, unit, noise in zip(("angle", "+ tension", "- tension"), ("rad", "N", "N"), found.noise, strict=False):
+    findings.metric("correlation", friction_fit.correlation, n=friction_fit.count, meaning=_CORRELATION)
+    rows.append(("correlation", friction_fit.correlation, None, None, "", _CORRELATION))
+    for name, unit, noise in zip(
+        ("angle", "+ tension", "- tension"), ("rad", "N", "N"), friction_fit.noise, strict=False
+    ):
         rows.append((f"{name}, left over", float(noise), None, None, unit, "standard deviation of measured less model"))
     heads = ("", "value", "95 % low", "95 % high", "unit", "meaning")
-    return Table(_fit_heading(found), heads, rows)
+    return Table(_fit_heading(friction_fit), heads, rows)
 
 
 _CORRELATION = "of mu with bend + sheath, as logarithms, at the mean bend"
 
 
-def _fit_heading(found: FrictionFit) -> str:
-    """What came out, in words."""
-    friction, sheath, path = found.friction, found.sheath, found.presliding
+def _fit_heading(friction_fit: FrictionFit) -> str:
+    """Heading of the fit's table."""
+    friction, sheath, path = friction_fit.friction, friction_fit.sheath, friction_fit.presliding
     presliding = f"presliding {_between(path, 1e6)} um" if math.isfinite(path.high) else "nothing of presliding"
     if friction.low > 0.0 and math.isfinite(sheath.high):
         apart = f"mu {_between(friction)}, sheath {_between(sheath)} rad"
-        return f"{found.problem.loop.name} tells {apart} and {presliding}"
-    bend, exponent = found.told_best
+        return f"{friction_fit.problem.loop.name} tells {apart} and {presliding}"
+    bend, exponent = friction_fit.told_best
     return (
-        f"{found.problem.loop.name} tells mu (bend + sheath), {_between(exponent)} at a bend of "
+        f"{friction_fit.problem.loop.name} tells mu (bend + sheath), {_between(exponent)} at a bend of "
         f"{math.degrees(bend):.3g} deg, and {presliding},\nbut not mu and the sheath apart: mu may be up to "
         f"{number(friction.high)}, the sheath {number(sheath.low)} rad or more; a wider range of bend would tell"
     )
 
 
-def _between(found: FrictionEstimate, scale: float = 1.0) -> str:
-    value, low, high = (number(scale * each) for each in found)
+def _between(estimate: FrictionEstimate, scale: float = 1.0) -> str:
+    value, low, high = (number(scale * end) for end in estimate)
     return f"{value} ({low} to {high})"
 
 
@@ -188,7 +192,7 @@ class Hysteresis(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """How many loops and dead bands still change with the integration step."""
+        """Number of loops and dead bands that still change with the integration step."""
         open_ = _still_change(self.loops, self.dead_bands)
         return [f"not converged: {open_} of {len(self.loops) + len(self.dead_bands)}"] * bool(open_)
 
@@ -196,10 +200,10 @@ class Hysteresis(StudyResult):
         """One row per loop: friction, speed, range, the dead band in its middle, and works; SI units."""
         import pandas as pd
 
-        cases = [each.case.tendons._asdict() | each.case._asdict() for each in self.loops]
-        own = [name for name in _LOOPS if name not in (cases[0] if cases else ())]
-        found = [{name: getattr(each, name) for name in own} for each in self.loops]
-        rows = [case | values for case, values in zip(cases, found, strict=True)]
+        cases = [loop.case.tendons._asdict() | loop.case._asdict() for loop in self.loops]
+        columns = [name for name in _LOOPS if name not in (cases[0] if cases else ())]
+        values_of = [{name: getattr(loop, name) for name in columns} for loop in self.loops]
+        rows = [case | values for case, values in zip(cases, values_of, strict=True)]
         return pd.DataFrame(rows, columns=list(_LOOPS))
 
 
@@ -210,12 +214,12 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     settings = study.hysteresis
     strokes(study.wrist, settings)
-    count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / each for each in settings.frequencies)
-    told = f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
+    count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / frequency for frequency in settings.frequencies)
+    size_text = f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
     if settings.measured is None:
-        return told
+        return size_text
     problem = problem_of(study)
-    return f"{told}; {', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
+    return f"{size_text}; {', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
 
 
 def hysteresis(session: Session) -> Hysteresis:
@@ -229,12 +233,12 @@ def hysteresis(session: Session) -> Hysteresis:
     from wristctl.simulation.strokes import strokes
 
     findings, settings = session.findings, session.study.hysteresis
-    own = strokes(session.study.wrist, settings)
-    with session.progress("compiling and driving loops", 100, "%") as done:
-        driven = loops(own, lambda share: done(round(100.0 * share)))
-        bands = dead_bands(own)
+    driven_strokes = strokes(session.study.wrist, settings)
+    with session.progress("compiling and driving loops", 100, "%") as advance:
+        driven = loops(driven_strokes, lambda share: advance(round(100.0 * share)))
+        bands = dead_bands(driven_strokes)
     fit, answer = fit_measured(session) if settings.measured is not None else (None, None)
-    shortest = min([each.step for each in driven] + [each.step for each in bands])
+    shortest = min([item.step for item in driven] + [each.step for each in bands])
     findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments)
     open_ = _still_change(driven, bands)
     findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
@@ -243,38 +247,41 @@ def hysteresis(session: Session) -> Hysteresis:
     _write(findings, result)
     with session.progress("drawing"):
         if bands:
-            findings.figure("dead-band", figures.dead_band, own, bands)
-        findings.figure("loops", figures.loops, own, driven)
+            findings.figure("dead-band", figures.dead_band, driven_strokes, bands)
+        findings.figure("loops", figures.loops, driven_strokes, driven)
         if len(settings.ranges_deg) > 1:
-            findings.figure("minor-loops", figures.minor_loops, own, driven)
-        findings.figure("work", figures.work, own, driven)
+            findings.figure("minor-loops", figures.minor_loops, driven_strokes, driven)
+        findings.figure("work", figures.work, driven_strokes, driven)
     return result
 
 
-def _write(findings: Findings, found: Hysteresis) -> None:
+def _write(findings: Findings, results: Hysteresis) -> None:
     import numpy as np
     import pandas as pd
 
     def units(columns: dict[str, tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
-        return {name: each[0] for name, each in columns.items()}, {name: each[1] for name, each in columns.items()}
+        return {name: unit_and_meaning[0] for name, unit_and_meaning in columns.items()}, {
+            name: unit_and_meaning[1] for name, unit_and_meaning in columns.items()
+        }
 
-    findings.table("data/loops.csv", found.frame(), *units(_LOOPS))
+    findings.table("data/loops.csv", results.frame(), *units(_LOOPS))
     courses = [
-        {"loop": np.full(len(each.time), at), "time": each.time, "unhindered": each.unhindered} | each.course._asdict()
-        for at, each in enumerate(found.loops)
+        {"loop": np.full(len(loop.time), number), "time": loop.time, "unhindered": loop.unhindered}
+        | loop.course._asdict()
+        for number, loop in enumerate(results.loops)
     ]
-    columns = {name: np.concatenate([each[name] for each in courses]) for name in _COURSES}
+    columns = {name: np.concatenate([course[name] for course in courses]) for name in _COURSES}
     findings.table("data/courses.csv", columns, *units(_COURSES))
-    if found.dead_bands:
+    if results.dead_bands:
         rows = [
-            {name: getattr(each, name, None) for name in _BANDS} | each.tendons._asdict() for each in found.dead_bands
+            {name: getattr(band, name, None) for name in _BANDS} | band.tendons._asdict() for band in results.dead_bands
         ]
         findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
 
 
 _NOT_CONVERGED = "loops and dead bands that still change with the integration step"
+# Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data.
 _MOST = 60
-"""Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data."""
 
 
 def _tables(
@@ -282,42 +289,42 @@ def _tables(
 ) -> list[Table]:
     """The outer loops, under what they say in words, and the dead bands."""
     first, many = driven[0].case, len(driven) + len(bands) > _MOST
-    outer = [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
+    outer = [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
     fate = ("fate",) * (_still_change(driven, bands) > 0)
     heads = ("friction", "sheath [rad]", "presliding [um]")
     loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]",
                   "step [ms]", *fate)  # fmt: skip
     rows = [
-        (*_in_um(each.case.tendons), each.case.frequency, math.degrees(each.width), math.degrees(each.exact_width),
-         *(1e3 * part for part in (each.friction_work, each.damped_work, each.raw_work, each.step)),
-         *(_fate(each),) * len(fate))
-        for each in outer
-        if not many or each.case.tendons.presliding == main.presliding
+        (*_in_um(loop.case.tendons), loop.case.frequency, math.degrees(loop.width), math.degrees(loop.exact_width),
+         *(1e3 * part for part in (loop.friction_work, loop.damped_work, loop.raw_work, loop.step)),
+         *(_fate(loop),) * len(fate))
+        for loop in outer
+        if not many or loop.case.tendons.presliding == main.presliding
     ]  # fmt: skip
     tables = [Table(_told(findings, outer, bands, main), (*heads, *loop_heads), rows)]
     if bands:
         held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully", "step [ms]", *fate)
         rests = [
-            (*_in_um(each.tendons), *map(math.degrees, (each.unhindered, each.width, each.exact_width)), each.slid,
-             1e3 * each.step, *(_fate(each),) * len(fate))
-            for each in bands
-            if not many or each.tendons.presliding == main.presliding
+            (*_in_um(band.tendons), *map(math.degrees, (band.unhindered, band.width, band.exact_width)), band.slid,
+             1e3 * band.step, *(_fate(band),) * len(fate))
+            for band in bands
+            if not many or band.tendons.presliding == main.presliding
         ]  # fmt: skip
         tables.append(Table("Where ramps leave the wrist", (*heads, *held), rests))
     return tables
 
 
 def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[DeadBand], chosen: FrictionCase) -> str:
-    """What was found, in words, of the main one of the frictions; its numbers are the run's metrics."""
+    """Text of the results for the main friction case. Its numbers become metrics of the run."""
     slow, *faster = sorted((e for e in outer if e.case.tendons == chosen), key=lambda e: e.case.frequency)
     case = f"mu {chosen.friction:g}, sheath {chosen.sheath:g} rad"
     swing = f"{math.degrees(slow.case.low):g} to {math.degrees(slow.case.high):g} deg"
     lines = []
-    if mine := [each for each in bands if each.tendons == chosen]:
+    if mine := [item for item in bands if item.tendons == chosen]:
         band = mine[len(mine) // 2]
-        width, exact, at = (math.degrees(each) for each in (band.width, band.exact_width, band.unhindered))
-        lines.append(f"dead band {width:.3g} deg at {at:g} deg (roots of the statics: {exact:.3g} deg)")
-        findings.metric("dead_band", width, "deg", "lower", meaning=f"at {at:g} deg, {case}")
+        width, exact, angle = (math.degrees(quantity) for quantity in (band.width, band.exact_width, band.unhindered))
+        lines.append(f"dead band {width:.3g} deg at {angle:g} deg (roots of the statics: {exact:.3g} deg)")
+        findings.metric("dead_band", width, "deg", "lower", meaning=f"at {angle:g} deg, {case}")
     lines.append(f"friction takes {1e3 * slow.friction_work:.3g} mJ a cycle of {swing}")
     findings.metric("friction_work", slow.friction_work, "J", "lower", meaning=f"a cycle of {swing}, {case}")
     if faster and slow.friction_work > 0.0:
@@ -327,8 +334,8 @@ def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[D
         findings.metric("friction_work_change", change, "", "lower", meaning=f"between {speeds}, {case}")
     damped = ", ".join(f"{1e3 * e.damped_work:.3g} mJ at {e.case.frequency:g} Hz" for e in (slow, *faster))
     lines.append(f"the wrist's damping makes up the rest of the raw loop: {damped}")
-    if slid := [each for each in bands if each.slid and each.exact_width > 1e-9]:
-        worst = max(abs(each.width / each.exact_width - 1.0) for each in slid)
+    if slid := [item for item in bands if item.slid and item.exact_width > 1e-9]:
+        worst = max(abs(item.width / item.exact_width - 1.0) for item in slid)
         meaning = "largest relative error of a simulated dead band against the roots of the statics"
         findings.metric("root_error", worst, "", "lower", len(slid), meaning=meaning)
     if open_ := _still_change(outer, bands):
@@ -337,15 +344,15 @@ def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[D
 
 
 def _still_change(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand]) -> int:
-    """How many change with the integration step."""
-    return sum(each.drift > 0.0 for each in driven) + sum(each.drift > 0.0 for each in bands)
+    """Number of loops and dead bands that change with the integration step."""
+    return sum(item.drift > 0.0 for item in driven) + sum(each.drift > 0.0 for each in bands)
 
 
-def _fate(found: HysteresisLoop | DeadBand) -> str:
-    """By how much it still changes with the integration step; empty where it does not."""
-    if found.drift == 0.0:
+def _fate(item: HysteresisLoop | DeadBand) -> str:
+    """Remaining change of a loop with the integration step, as text. Empty where there is none."""
+    if item.drift == 0.0:
         return ""
-    by = f"by {100.0 * found.drift:.2g} % " if math.isfinite(found.drift) else ""
+    by = f"by {100.0 * item.drift:.2g} % " if math.isfinite(item.drift) else ""
     return f"NOT CONVERGED: changes {by}with the integration step"
 
 

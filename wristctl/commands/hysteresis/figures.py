@@ -28,8 +28,8 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _WORKS = {"friction_work": "-", "damped_work": ":", "raw_work": (0, (6, 2))}
+# Panels beside each other.
 _MOST = 3
-"""Panels beside each other."""
 
 
 def case_text(case: FrictionCase) -> str:
@@ -42,34 +42,34 @@ def case_text(case: FrictionCase) -> str:
 def _some(cases: Sequence[FrictionCase]) -> list[FrictionCase]:
     """As many of them as have room beside each other, spread over all."""
     chosen = np.unique(np.linspace(0, len(cases) - 1, min(len(cases), _MOST)).round().astype(int))
-    return [cases[at] for at in chosen]
+    return [cases[index] for index in chosen]
 
 
-def loops(own: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
+def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """The outer loops with up to three sheaths: tension over angle, at the spool by speed and, of the slowest, at the
     wrist; and by how much the angle differs from that without friction, between the roots of the statics."""
-    outer, cases = _outer(driven), _some(with_sheaths(own.settings))
-    made, axes = figure(2, len(cases), height=6.2, sharey="row")
+    outer, cases = _outer(driven), _some(with_sheaths(all_strokes.settings))
+    picture, axes = figure(2, len(cases), height=6.2, sharey="row")
     for (above, below), case in zip(axes.T, cases, strict=True):
-        mine = sorted((each for each in outer if each.case.tendons == case), key=lambda each: each.case.frequency)
-        for each, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
-            angle, label = np.degrees(each.course.theta), f"{each.case.frequency:g} Hz"
-            above.plot(angle, each.course.spool_plus / TENDONS_PER_SIDE, color=colour, linewidth=1.0, label=label)
-            lag = np.degrees(each.course.theta - each.unhindered)
-            below.plot(np.degrees(each.unhindered), lag, color=colour, linewidth=1.0, label=label)
+        mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
+        for loop, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
+            angle, label = np.degrees(loop.course.theta), f"{loop.case.frequency:g} Hz"
+            above.plot(angle, loop.course.spool_plus / TENDONS_PER_SIDE, color=colour, linewidth=1.0, label=label)
+            lag = np.degrees(loop.course.theta - loop.unhindered)
+            below.plot(np.degrees(loop.unhindered), lag, color=colour, linewidth=1.0, label=label)
         slow = mine[0]
         at_wrist = slow.course.wrist_plus / TENDONS_PER_SIDE
         above.plot(np.degrees(slow.course.theta), at_wrist, label="slowest, at the wrist", **DOTTED)
         angle = np.linspace(slow.case.low, slow.case.high, 61)
-        for edge in own.exact([case] * len(angle), angle).T:
+        for edge in all_strokes.exact([case] * len(angle), angle).T:
             below.plot(np.degrees(angle), np.degrees(edge - angle), label="roots of the statics", **_ROOTS)
         title(above, case_text(case))
         above.set_xlabel("angle [deg]")
         below.set_xlabel("without friction [deg]")
     axes[0, 0].set_ylabel("tension of a + tendon [N]")
     axes[1, 0].set_ylabel("angle less that [deg]")
-    legend_below(made, 3)
-    return made
+    legend_below(picture, 3)
+    return picture
 
 
 _ROOTS = {"color": BLACK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
@@ -77,41 +77,41 @@ _ROOTS = {"color": BLACK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 def _outer(driven: Sequence[HysteresisLoop]) -> list[HysteresisLoop]:
     first = driven[0].case
-    return [each for each in driven if (each.case.low, each.case.high) == (first.low, first.high)]
+    return [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
 
 
-def dead_band(own: Strokes, bands: Sequence[DeadBand]) -> Figure:
+def dead_band(all_strokes: Strokes, bands: Sequence[DeadBand]) -> Figure:
     """Width of the dead band over the angle: roots of the statics, and where ramps came to rest."""
-    made, ((axes,),) = figure(height=3.6)
-    low, high = np.radians(own.settings.ranges_deg[0])
+    picture, ((axes,),) = figure(height=3.6)
+    low, high = np.radians(all_strokes.settings.ranges_deg[0])
     angle = np.linspace(low, high, 61)
-    cases = list(dict.fromkeys((each.tendons.friction, each.tendons.sheath) for each in bands))
+    cases = list(dict.fromkeys((band.tendons.friction, band.tendons.sheath) for band in bands))
     for pair, colour in zip(cases, _COLOURS, strict=False):
-        mine = [each for each in bands if (each.tendons.friction, each.tendons.sheath) == pair]
-        edges = own.exact([mine[0].tendons] * len(angle), angle)
+        mine = [band for band in bands if (band.tendons.friction, band.tendons.sheath) == pair]
+        edges = all_strokes.exact([mine[0].tendons] * len(angle), angle)
         name = f"mu {pair[0]:g}, {pair[1]:g} rad" if pair[0] else "no friction"
         axes.plot(np.degrees(angle), np.degrees(edges[:, 1] - edges[:, 0]), color=colour, label=f"{name}, statics")
-        for slid, mark, told in ((True, "o", "came to rest"), (False, "x", "came to rest, but slid too little")):
-            points = [(each.unhindered, each.width) for each in mine if each.slid == slid]
+        for slid, mark, label in ((True, "o", "came to rest"), (False, "x", "came to rest, but slid too little")):
+            points = [(band.unhindered, band.width) for band in mine if band.slid == slid]
             if points:
                 style = {"color": colour, "markersize": 5.0, "markerfacecolor": "white", "linestyle": ""}
-                axes.plot(*np.degrees(points).T, mark, label=told, **style)
-    held = "pulls" if own.winch else "spools"
+                axes.plot(*np.degrees(points).T, mark, label=label, **style)
+    held = "pulls" if all_strokes.winch else "spools"
     axes.set(xlabel="angle without friction [deg]", ylabel=f"dead band on held {held} [deg]")
     axes.set_ylim(bottom=0.0)
-    legend_below(made, 3)
-    return made
+    legend_below(picture, 3)
+    return picture
 
 
-def work(own: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
+def work(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """Work of a cycle over how often it is gone through: what friction takes, what damping takes, and the raw loop."""
     outer = _outer(driven)
-    made, ((axes,),) = figure(height=3.8)
-    for case, colour in zip(_some(with_sheaths(own.settings)), _COLOURS, strict=False):
-        mine = sorted((each for each in outer if each.case.tendons == case), key=lambda each: each.case.frequency)
-        speed = [each.case.frequency for each in mine]
+    picture, ((axes,),) = figure(height=3.8)
+    for case, colour in zip(_some(with_sheaths(all_strokes.settings)), _COLOURS, strict=False):
+        mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
+        speed = [loop.case.frequency for loop in mine]
         for name, dashes in _WORKS.items():
-            values = 1e3 * np.array([getattr(each, name) for each in mine])
+            values = 1e3 * np.array([getattr(loop, name) for loop in mine])
             label = case_text(case) if name == "friction_work" else None
             axes.plot(speed, values.clip(1e-9), ".", color=colour, linestyle=dashes, linewidth=1.2, label=label)
     for name, dashes in zip(("friction", "damping", "raw loop"), _WORKS.values(), strict=True):
@@ -119,46 +119,46 @@ def work(own: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
     axes.set(xlabel="cycles per second [Hz]", ylabel="work a cycle [mJ]")
-    legend_below(made, 3)
-    return made
+    legend_below(picture, 3)
+    return picture
 
 
-def minor_loops(own: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
+def minor_loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """The slowest loops of all ranges, of up to three preslidings (of sheaths where there is one): tension, angle."""
-    slowest = min(each.case.frequency for each in driven)
-    slow = [each for each in driven if each.case.frequency == slowest]
-    several = len(own.settings.preslidings) > 1 and own.settings.frictions[0] > 0.0
-    cases = _some(with_preslidings(own.settings) if several else with_sheaths(own.settings))
-    made, axes = figure(1, len(cases), height=3.4, sharey=True)
-    for each, case in zip(axes[0], cases, strict=True):
+    slowest = min(loop.case.frequency for loop in driven)
+    slow = [loop for loop in driven if loop.case.frequency == slowest]
+    several = len(all_strokes.settings.preslidings) > 1 and all_strokes.settings.frictions[0] > 0.0
+    cases = _some(with_preslidings(all_strokes.settings) if several else with_sheaths(all_strokes.settings))
+    picture, axes = figure(1, len(cases), height=3.4, sharey=True)
+    for panel, case in zip(axes[0], cases, strict=True):
         for loop, colour in zip((one for one in slow if one.case.tendons == case), _COLOURS, strict=False):
             label = f"{np.degrees(loop.case.low):g} to {np.degrees(loop.case.high):g} deg"
             tension = loop.course.spool_plus / TENDONS_PER_SIDE
-            each.plot(np.degrees(loop.course.theta), tension, color=colour, linewidth=1.2, label=label)
-        title(each, case_text(case))
-        each.set_xlabel("angle [deg]")
+            panel.plot(np.degrees(loop.course.theta), tension, color=colour, linewidth=1.2, label=label)
+        title(panel, case_text(case))
+        panel.set_xlabel("angle [deg]")
     axes[0, 0].set_ylabel(f"tension of a + tendon, {slowest:g} Hz [N]")
-    legend_below(made, 4)
-    return made
+    legend_below(picture, 4)
+    return picture
 
 
 def measured(fit: FrictionFit) -> Figure:
     """A measured loop, after its first turn, and the fitted model: the angle over what drove it, less that of the same
     wrist without friction where spools did; tensions over the angle; and what is left over, in time."""
     problem, loop, rows = fit.problem, fit.problem.loop, len(fit.residuals)
-    made, axes = figure(rows, 2, height=0.8 + 2.4 * rows, width_ratios=(3, 2))
-    time, seen = loop.time[problem.first :], problem.measured
-    model = [each - residual for each, residual in zip(seen, fit.residuals, strict=True)]
+    picture, axes = figure(rows, 2, height=0.8 + 2.4 * rows, width_ratios=(3, 2))
+    time, samples = loop.time[problem.first :], problem.measured
+    model = [sample - residual for sample, residual in zip(samples, fit.residuals, strict=True)]
     driver = loop.drive[problem.first :, 0]
     if loop.winch:
-        lines = [(driver, np.degrees(seen[0]), driver, np.degrees(model[0]), "+ tension [N]", "angle [deg]")]
+        lines = [(driver, np.degrees(samples[0]), driver, np.degrees(model[0]), "+ tension [N]", "angle [deg]")]
     else:
         free, mm = fit.without_friction, 1e3 * driver
-        told = "angle less that\nwithout friction [deg]"
-        lines = [(mm, np.degrees(seen[0] - free), mm, np.degrees(model[0] - free), "+ spool [mm]", told)]
-    for side, at in (("+", 1), ("-", 2)):
-        if at < rows:
-            drawn = np.degrees(seen[0]), seen[at], np.degrees(model[0]), model[at]
+        ylabel = "angle less that\nwithout friction [deg]"
+        lines = [(mm, np.degrees(samples[0] - free), mm, np.degrees(model[0] - free), "+ spool [mm]", ylabel)]
+    for side, number in (("+", 1), ("-", 2)):
+        if number < rows:
+            drawn = np.degrees(samples[0]), samples[number], np.degrees(model[0]), model[number]
             lines.append((*drawn, "angle [deg]", f"{side} tension [N]"))
     for (left, right), (x, y, model_x, model_y, below, beside), residual in zip(
         axes, lines, fit.residuals, strict=True
@@ -170,5 +170,5 @@ def measured(fit: FrictionFit) -> Figure:
         right.plot(time, scale * residual, ".", color=VERMILLION, markersize=2.0)
         right.axhline(0.0, **THIN)
         right.set(xlabel="time [s]", ylabel="left over [N]" if "tension" in beside else "left over [deg]")
-    legend_below(made)
-    return made
+    legend_below(picture)
+    return picture

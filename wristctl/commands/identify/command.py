@@ -80,35 +80,35 @@ def identify(session: Session) -> Identified:
     findings, settings = session.findings, session.study.identify
     problem = _problem(session.study, session.inputs)
     with session.progress("compiling and searching"):
-        found = fit(problem)
-        sure, suspected, missed = knowledge(found), suspicions(found), misfits(found)
-        moved = budget(found, sure)
-        known = widened(sure, suspected, moved[FINER])
-        lacking = not_identified(found, known)
-        offered = additions(found, lacking) if lacking else []
+        fitted = fit(problem)
+        sure, suspected, missed = knowledge(fitted), suspicions(fitted), misfits(fitted)
+        moved = budget(fitted, sure)
+        estimated = widened(sure, suspected, moved[FINER])
+        lacking = not_identified(fitted, estimated)
+        offered = additions(fitted, lacking) if lacking else []
     findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments)
     tables = [
-        parameters(findings, found, known, lacking), fit_table(findings, found, known), residual_table(missed),
-        causes(found, sure, suspected), budget_table(found, moved),
+        parameters(findings, fitted, estimated, lacking), fit_table(findings, fitted, estimated),
+        residual_table(missed), causes(fitted, sure, suspected), budget_table(fitted, moved),
     ]  # fmt: skip
     if offered:
         tables.append(offers(offered))
     with session.progress("drawing"):
-        findings.figure("angles", angles, found)
-        findings.figure("residuals", residuals, found, known)
-        findings.figure("correlations", correlations, found, known)
-    if known.misses_something:
+        findings.figure("angles", angles, fitted)
+        findings.figure("residuals", residuals, fitted, estimated)
+        findings.figure("correlations", correlations, fitted, estimated)
+    if estimated.misses_something:
         log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
-    for each in suspected:
-        if each.evident:
-            log.warning("the trials look like %s, which the model has not; intervals are widened", each.told)
+    for suspicion in suspected:
+        if suspicion.evident:
+            log.warning("the trials look like %s, which the model has not; intervals are widened", suspicion.told)
     with _told_if_refused(session, tables):
         if settings.misfit == "refuse":
-            refuse_misfit(found, sure, suspected, missed)
-        refuse(lacking, offered, known.condition, problem.start)
-    yaml = identified_yaml(found.values, _camera(session.inputs, found))
+            refuse_misfit(fitted, sure, suspected, missed)
+        refuse(lacking, offered, estimated.condition, problem.start)
+    yaml = identified_yaml(fitted.values, _camera(session.inputs, fitted))
     findings.text("data/identified.yaml", yaml)
-    return Identified(session.study, findings, tables, found, known, yaml)
+    return Identified(session.study, findings, tables, fitted, estimated, yaml)
 
 
 @contextmanager
@@ -150,15 +150,17 @@ def _logged(run: Run) -> _Logged:
     return _Logged(*(run.data(name) for name in ("log", "frames", "trials")))
 
 
-def _camera(inputs: Inputs, found: Fit) -> dict[str, float]:
+def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
     """The camera as the frames of all runs show it."""
     import pandas as pd
 
     from wristctl.identification.measured_trials import camera_parameters
 
     logged = {role: inputs.read(role, _logged) for role in inputs}
-    frames = pd.concat([each.frames.assign(run=role) for role, each in logged.items() if each is not None])
-    return camera_parameters(frames, found.values["delay"], found.noise)
+    frames = pd.concat(
+        [logged_run.frames.assign(run=role) for role, logged_run in logged.items() if logged_run is not None]
+    )
+    return camera_parameters(frames, fitted.values["delay"], fitted.noise)
 
 
 IDENTIFY = Procedure("identify", plan, identify, (EarlierRun("runs", kind="hw-run"),))

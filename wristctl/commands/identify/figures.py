@@ -7,8 +7,8 @@ from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
 
+# Trials drawn, spread over all of them.
 _SHOWN = 8
-"""Trials drawn, spread over all of them."""
 _LAGS = 30
 
 
@@ -16,10 +16,10 @@ def angles(fit: Fit) -> Figure:
     """Marker's angle and the model's at the frames [deg], and the difference, of up to eight trials."""
     count = len(fit.problem.trials)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).round().astype(int))
-    made, axes = figure(len(chosen), 2, height=0.7 + 1.35 * len(chosen), sharex=True, width_ratios=(3, 2))
-    most = 1.05 * max(float(np.abs(np.degrees(fit.residuals[at])).max()) for at in chosen)
-    for (left, right), at in zip(axes, chosen, strict=True):
-        trial, residual = fit.problem.trials[at], fit.residuals[at]
+    picture, axes = figure(len(chosen), 2, height=0.7 + 1.35 * len(chosen), sharex=True, width_ratios=(3, 2))
+    most = 1.05 * max(float(np.abs(np.degrees(fit.residuals[index])).max()) for index in chosen)
+    for (left, right), index in zip(axes, chosen, strict=True):
+        trial, residual = fit.problem.trials[index], fit.residuals[index]
         left.plot(trial.captured, np.degrees(trial.angle), ".", color=GREY, markersize=3.0, label="marker")
         left.plot(trial.captured, np.degrees(trial.angle - residual), color=BLUE, linewidth=1.0, label="model")
         right.plot(trial.captured, np.degrees(residual), ".", color=VERMILLION, markersize=2.0)
@@ -28,15 +28,15 @@ def angles(fit: Fit) -> Figure:
         left.set_ylabel("angle [deg]")
         title(left, trial.label)
     title(axes[0, 1], "marker less model [deg]")
-    for each in axes[-1]:
-        each.set_xlabel("time [s]")
-    legend_below(made)
-    return made
+    for panel in axes[-1]:
+        panel.set_xlabel("time [s]")
+    legend_below(picture)
+    return picture
 
 
-def residuals(fit: Fit, known: Knowledge) -> Figure:
+def residuals(fit: Fit, knowledge: Knowledge) -> Figure:
     """Distribution of the residuals [deg] beside a normal one, and their autocorrelation with its 95 % band."""
-    made, ((left, right),) = figure(1, 2, height=3.0)
+    picture, ((left, right),) = figure(1, 2, height=3.0)
     every = np.degrees(np.concatenate(fit.residuals))
     sd = np.degrees(fit.noise)
     left.hist(every, bins=60, density=True, color=GREY, label=f"residuals, sd {sd:.3f} deg")
@@ -46,22 +46,25 @@ def residuals(fit: Fit, known: Knowledge) -> Figure:
     left.set(xlabel="marker less model [deg]", ylabel="density [1/deg]")
     legend(left, loc="upper left")
     lags = np.arange(1, _LAGS + 1)
-    power = sum(float(each @ each) for each in fit.residuals)
-    alike = [sum(float(each[lag:] @ each[:-lag]) for each in fit.residuals if len(each) > lag) / power for lag in lags]
+    power = sum(float(residual @ residual) for residual in fit.residuals)
+    alike = [
+        sum(float(residual[lag:] @ residual[:-lag]) for residual in fit.residuals if len(residual) > lag) / power
+        for lag in lags
+    ]
     band = 1.96 / np.sqrt(len(every))
     right.axhspan(-band, band, color=GREY, alpha=0.3, linewidth=0.0, label="95 % of white noise")
     right.vlines(lags, 0.0, alike, color=VERMILLION)
     right.set(xlabel="lag [frames]", ylabel="autocorrelation")
-    title(right, f"worth {known.effective:.0f} independent frames of {len(every)}")
+    title(right, f"worth {knowledge.effective:.0f} independent frames of {len(every)}")
     legend(right, loc="upper right")
-    return made
+    return picture
 
 
-def correlations(fit: Fit, known: Knowledge) -> Figure:
+def correlations(fit: Fit, knowledge: Knowledge) -> Figure:
     """Correlations of the estimates."""
     names = fit.problem.free
-    matrix = known.correlation[: len(names), : len(names)]
-    made, ((axes,),) = figure(width=5.6, height=4.8)
+    matrix = knowledge.correlation[: len(names), : len(names)]
+    picture, ((axes,),) = figure(width=5.6, height=4.8)
     axes.grid(False)
     image = axes.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     for (row, column), value in np.ndenumerate(matrix):
@@ -69,6 +72,6 @@ def correlations(fit: Fit, known: Knowledge) -> Figure:
         axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=9.0, color=shade)
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(names)), names)
-    made.colorbar(image, label="correlation")
-    title(axes, f"condition number {known.condition:.3g}")
-    return made
+    picture.colorbar(image, label="correlation")
+    title(axes, f"condition number {knowledge.condition:.3g}")
+    return picture

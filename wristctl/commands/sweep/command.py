@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from wristctl.work.worker import Golden, Unit
 
 
+# Points of `simulate` in one unit.
 _LANES = 2_000
-"""Points of `simulate` in one unit."""
 _SECTIONS = {"simulate": {"seed", "wrist", "simulate"}}
 _WHOLE = {"seed", "wrist", "families"}
 
@@ -39,13 +39,13 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
     together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
-    keys = [(each.key, each.text) for each in axes]
+    keys = [(axis.key, axis.text) for axis in axes]
     units = []
     for first in range(0, len(points), together):
-        own = [list(each) for each in points[first : first + together]]
-        spec = {"study": content, "command": command, "keys": keys, "points": own}
-        name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, own[0], strict=True))}"
-        units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(own)))
+        block = [list(point) for point in points[first : first + together]]
+        spec = {"study": content, "command": command, "keys": keys, "points": block}
+        name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, block[0], strict=True))}"
+        units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(block)))
     return units
 
 
@@ -57,7 +57,7 @@ def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
 
 def _plain(values: Sequence[Any]) -> list[Any]:
     """JSON knows no tuples, and sections nothing else."""
-    return [tuple(_plain(each)) if isinstance(each, list) else each for each in values]
+    return [tuple(_plain(value)) if isinstance(value, list) else value for value in values]
 
 
 def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -73,16 +73,16 @@ def simulated(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
     def loops() -> Iterator[SweptLoop]:
         for point, study in enumerate(_studies(spec)):
-            for repetition, each in enumerate(swept_loops(study)):
+            for repetition, loop in enumerate(swept_loops(study)):
                 places.append((point, repetition))
-                every.append(each)
-                yield each
+                every.append(loop)
+                yield loop
 
-    found = run_swept(loops())
+    outcome = run_swept(loops())
     point, repetition = np.array(places).T
-    rows = {"point": point, "repetition": repetition, "failed": found.failed, "until": found.until}
-    rows |= {"fate": np.array(fates(every, found))}
-    return rows | {f"metric {name}": values for name, values in found.metrics.items()}
+    rows = {"point": point, "repetition": repetition, "failed": outcome.failed, "until": outcome.until}
+    rows |= {"fate": np.array(fates(every, outcome))}
+    return rows | {f"metric {name}": values for name, values in outcome.metrics.items()}
 
 
 def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -96,10 +96,10 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
     (study,) = _studies(spec)
     procedure: Any = function_at(_PROCEDURES[spec["command"]])
-    found: Any = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
-    known = found.findings.metrics
-    values = {f"metric {name}": np.array([value]) for name, value in found.metrics.items()}
-    units = {f"unit {name}": np.array([each["unit"]]) for name, each in known.items()}
+    result: Any = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
+    metrics = result.findings.metrics
+    values = {f"metric {name}": np.array([value]) for name, value in result.metrics.items()}
+    units = {f"unit {name}": np.array([metric["unit"]]) for name, metric in metrics.items()}
     return {"point": np.zeros(1, np.int64), "repetition": np.zeros(1, np.int64), **values, **units}
 
 
@@ -110,11 +110,11 @@ _PROCEDURES: Mapping[str, str] = {
 
 
 Found = TypeVar("Found", bound=StudyResult)
+# Points that are made before anything is computed, so that a value that cannot be is known by then.
 _CHECKED = 20_000
-"""Points that are made before anything is computed, so that a value that cannot be is known by then."""
 _FIRST = ("rmse", "steady_state", "oscillation", "chattering")
+# Rows and metrics that are printed and drawn of a sweep.
 _SHOWN, _SAID = 20, 4
-"""Rows and metrics that are printed and drawn of a sweep."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -132,17 +132,17 @@ class Swept(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """Of how many rollouts which is no good."""
+        """Number of rollouts with each mark."""
         return [f"{mark}: {count} of {len(self.table)}" for mark, count in _fates(self.table).items()]
 
     @property
     def fault(self) -> UserError | None:
-        """That points were given up."""
+        """UserError for points that were given up."""
         if not self.poisoned:
             return None
         first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
-        what = f"{len(self.poisoned)} of the sweep's points failed: {first.unit.name}: {first.why}"
-        return UserError(what, where, "leave those values out, or mend them", exit_code=3)
+        problem = f"{len(self.poisoned)} of the sweep's points failed: {first.unit.name}: {first.why}"
+        return UserError(problem, where, "leave those values out, or mend them", exit_code=3)
 
 
 def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
@@ -155,26 +155,28 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
             return procedure.plan(study, inputs)
         base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
         points = points_of(axes)
-        for each in points[:_CHECKED]:
-            study_at(base, axes, each)
+        for point in points[:_CHECKED]:
+            study_at(base, axes, point)
         assert procedure.size is not None
         sizes = []
-        for each in _corners(axes):
-            said = procedure.plan(study_at(base, axes, each), Inputs())
-            sizes.append(procedure.size(study_at(base, axes, each)))
-        steps, rollouts = (sum(each) / len(sizes) for each in zip(*((a.steps, a.rollouts) for a in sizes), strict=True))
+        for corner in _corners(axes):
+            plan_text = procedure.plan(study_at(base, axes, corner), Inputs())
+            sizes.append(procedure.size(study_at(base, axes, corner)))
+        steps, rollouts = (
+            sum(column) / len(sizes) for column in zip(*((a.steps, a.rollouts) for a in sizes), strict=True)
+        )
         try:
             check_steps(len(points) * steps, len(points) * rollouts)
         except UserError as error:
             raise error.at(Argument("sweep", metavar="KEY=VALUES")) from error
-        return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {said}"
+        return f"{len(points)} points of {', '.join(axis.key for axis in axes)}; at each: {plan_text}"
 
     @wraps(procedure.perform)
     def perform(session: Session) -> Found | Swept:
         return _swept(session, procedure.kind) if session.study.sweep else procedure.perform(session)
 
-    found: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True)
-    return cast(Procedure[Found], found)
+    swept: Any = replace(procedure, plan=plan, perform=cast(Any, perform), in_units=True)
+    return cast(Procedure[Found], swept)
 
 
 def _base(study: Study, command: str, inputs: Inputs) -> Study:
@@ -184,7 +186,7 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
     if "network" in inputs:
         fix = "leave it out: inverse: closed-form follows tips without one"
         raise UserError("a sweep runs without a network", Argument("network"), fix)
-    by_gain = any(".gains." in f".{each}" for each in study.sweep)
+    by_gain = any(".gains." in f".{key}" for key in study.sweep)
     study, tuned = study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
     if command in ("simulate", "tune"):
         study = identified(study, command, inputs)
@@ -206,14 +208,14 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
 
 def _corners(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
     """The first point, and each axis at its every value that may be unlike the others: names, and both ends."""
-    first = tuple(each.values[0] for each in axes)
-    found = [first]
-    for at, axis in enumerate(axes):
-        names = [each for each in axis.values if isinstance(each, str)]
-        numbers = [each for each in axis.values if not isinstance(each, str)]
+    first = tuple(axis.values[0] for axis in axes)
+    corners = [first]
+    for position, axis in enumerate(axes):
+        names = [value for value in axis.values if isinstance(value, str)]
+        numbers = [value for value in axis.values if not isinstance(value, str)]
         ends = [min(numbers), max(numbers)] if numbers else []
-        found += [(*first[:at], each, *first[at + 1 :]) for each in [*names[:100], *ends]]
-    return found
+        corners += [(*first[:position], value, *first[position + 1 :]) for value in [*names[:100], *ends]]
+    return corners
 
 
 def _swept(session: Session, command: str) -> Swept:
@@ -227,46 +229,50 @@ def _swept(session: Session, command: str) -> Swept:
     points = points_of(axes)
     units = sweep_units(base, command, axes, points)
     golden = None if session.executor == "serial" else _golden(base, command)
-    done = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
+    outcome = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
     parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
-    for unit, arrays in zip(units, done.arrays, strict=True):
+    for unit, arrays in zip(units, outcome.arrays, strict=True):
         if arrays is not None:
-            known_units |= {name[5:]: str(each[0]) for name, each in arrays.items() if name.startswith("unit ")}
-            rows = {name.removeprefix("metric "): each for name, each in arrays.items() if not name.startswith("unit ")}
+            known_units |= {name[5:]: str(array[0]) for name, array in arrays.items() if name.startswith("unit ")}
+            rows = {
+                name.removeprefix("metric "): array for name, array in arrays.items() if not name.startswith("unit ")
+            }
             parts.append(pd.DataFrame(rows | {"point": rows["point"] + first}))
         first += unit.size
     if not parts:
         raise UserError(
             "no point of the sweep could be computed",
             Argument("sweep", metavar="KEY=VALUES"),
-            f"at the first: {done.poisoned[0].why}",
+            f"at the first: {outcome.poisoned[0].why}",
             exit_code=3,
         )
     table = pd.concat(parts, ignore_index=True)
-    keys = {axis.key: [points[at][number] for at in table["point"]] for number, axis in enumerate(axes)}
+    keys = {axis.key: [points[index][number] for index in table["point"]] for number, axis in enumerate(axes)}
     table = pd.concat([pd.DataFrame(keys), table], axis=1)
     metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until", "fate"}]
     findings.table(
         "data/sweep.csv", table, {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
     )
-    known = [name for name in metrics if table[name].notna().any()]
-    said = [*(name for name in _FIRST if name in known), *(name for name in known if name not in _FIRST)][:_SAID]
-    _note(session, table, said, known_units)
+    measured = [name for name in metrics if table[name].notna().any()]
+    headline = [*(name for name in _FIRST if name in measured), *(name for name in measured if name not in _FIRST)][
+        :_SAID
+    ]
+    _note(session, table, headline, known_units)
     with session.progress("drawing"):
         for axis in axes:
-            others = [each.key for each in axes if each is not axis]
-            figure_units = {axis.key: unit_at(base, axis.path)} | _units(said, known_units)
-            findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, said, figure_units)
-    title = _answer(command, table, axes, said, _units(said, known_units))
+            others = [other_axis.key for other_axis in axes if other_axis is not axis]
+            figure_units = {axis.key: unit_at(base, axis.path)} | _units(headline, known_units)
+            findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, headline, figure_units)
+    title = _answer(command, table, axes, headline, _units(headline, known_units))
     findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
-    heads = [*keys, *(["fate"] if "fate" in table else []), *said]
-    lines = [tuple(each) for each in table[heads].head(_SHOWN).itertuples(index=False)]
+    heads = [*keys, *(["fate"] if "fate" in table else []), *headline]
+    lines = [tuple(line) for line in table[heads].head(_SHOWN).itertuples(index=False)]
     more = f" The first {_SHOWN} of {len(table)} rows; data/sweep.csv has all." if len(table) > _SHOWN else ""
-    return Swept(study, findings, [Table(title + more, heads, lines)], table, done.poisoned)
+    return Swept(study, findings, [Table(title + more, heads, lines)], table, outcome.poisoned)
 
 
 def _golden(study: Study, command: str) -> Golden:
-    """Of the loop of simulate, else of the built-in one: workers show by it that they compute the same."""
+    """Golden rollout of the loop of simulate or the built-in loop, by which workers show that they compute the same."""
     from wristctl.config.loop import LOOPS
     from wristctl.simulation.golden import GOLDEN, golden_spec
     from wristctl.work.worker import Golden
@@ -277,52 +283,52 @@ def _golden(study: Study, command: str) -> Golden:
     return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist))
 
 
-def _units(metrics: Sequence[str], known: dict[str, str]) -> dict[str, str]:
+def _units(metrics: Sequence[str], units: dict[str, str]) -> dict[str, str]:
     from wristctl.simulation.metrics import METRICS
 
     of_table = {name: METRICS[name].unit or "1" for name in metrics if name in METRICS}
     return (
         {"point": "1", "repetition": "1", "failed": "1", "until": "s", "fate": "1"}
         | of_table
-        | {k: v or "1" for k, v in known.items()}
+        | {k: v or "1" for k, v in units.items()}
     )
 
 
-def _note(session: Session, table: pd.DataFrame, said: Sequence[str], known: dict[str, str]) -> None:
-    """What `runs ls` can choose by."""
-    findings, units = session.findings, _units(said, known)
+def _note(session: Session, table: pd.DataFrame, headline: Sequence[str], known_units: dict[str, str]) -> None:
+    """Note the metrics that `runs ls` can filter by."""
+    findings, units = session.findings, _units(headline, known_units)
     findings.metric("points", int(table["point"].nunique()), meaning="of the sweep")
     if "failed" in table:
         findings.metric(
             "failed", float(table["failed"].mean()), better="lower", n=len(table), meaning="share that left its range"
         )
-    for name in said:
+    for name in headline:
         values = table[name].dropna()
         findings.metric(f"{name}_least", float(values.min()), units[name], "lower", len(values))
         findings.metric(f"{name}_most", float(values.max()), units[name], "lower", len(values))
 
 
 def _answer(
-    command: str, table: pd.DataFrame, axes: Sequence[SweepAxis], said: Sequence[str], units: dict[str, str]
+    command: str, table: pd.DataFrame, axes: Sequence[SweepAxis], headline: Sequence[str], units: dict[str, str]
 ) -> str:
-    """Where the first metric is least and most, and how often the wrist fails."""
+    """Points where the first metric is least and most, and how often the wrist fails."""
     text = f"{command} at {table['point'].nunique()} points"
-    if said:
+    if headline:
         sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
-        unit = "" if units[said[0]] == "1" else f" {units[said[0]]}"
-        least, most = (sound.loc[getattr(sound[said[0]], each)()] for each in ("idxmin", "idxmax"))
+        unit = "" if units[headline[0]] == "1" else f" {units[headline[0]]}"
+        least, most = (sound.loc[getattr(sound[headline[0]], extreme)()] for extreme in ("idxmin", "idxmax"))
         ends = [
-            f"{number(float(row[said[0]]))}{unit} at {', '.join(f'{a.key} = {_told(row[a.key])}' for a in axes)}"
+            f"{number(float(row[headline[0]]))}{unit} at {', '.join(f'{a.key} = {_told(row[a.key])}' for a in axes)}"
             for row in (least, most)
         ]
-        text += f": {said[0]} is least, {ends[0]}, and most, {ends[1]}"
+        text += f": {headline[0]} is least, {ends[0]}, and most, {ends[1]}"
     for fate, count in _fates(table).items():
         text += f"; {count} of {len(table)} rollouts: {fate}"
     return f"{text}."
 
 
 def _fates(table: pd.DataFrame) -> dict[str, int]:
-    """How many rollouts have which mark; a rollout may have several."""
+    """Number of rollouts with each mark. A rollout may have several."""
     if "fate" not in table:
         return {}
     from wristctl.simulation.repetitions import MARKS

@@ -14,26 +14,26 @@ from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic,
 if TYPE_CHECKING:
     import pandas as pd
 
+# Range beyond which an axis is logarithmic; places at which a line of medians is drawn.
 _DECADES, _BINS = 20.0, 25
-"""Range beyond which an axis is logarithmic; places at which a line of medians is drawn."""
 
 
 def over_key(
-    table: pd.DataFrame, key: str, others: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
+    table: pd.DataFrame, key: str, other_keys: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
 ) -> Figure:
-    """Each metric over one key: a dot for each rollout, crosses where the wrist failed, a line of medians.
+    """Metrics over one key: a dot for each rollout, crosses where the wrist failed, a line of medians.
 
     What else was swept spreads the dots.
     """
     rows = max(1, -(-len(metrics) // 2))
-    made, axes = figure(rows, min(2, max(1, len(metrics))), height=0.4 + 2.3 * rows, sharex=True)
+    picture, axes = figure(rows, min(2, max(1, len(metrics))), height=0.4 + 2.3 * rows, sharex=True)
     values = table[key].to_numpy()
     named = values.dtype.kind not in "if"
     places, labels = (
         (np.unique(values.astype(str), return_inverse=True)[::-1]) if named else (values.astype(float), None)
     )
     failed = table["failed"].to_numpy(bool) if "failed" in table else np.zeros(len(table), bool)
-    panels = [each for row in axes.tolist() for each in row]
+    panels = [panel for row in axes.tolist() for panel in row]
     for panel, name in zip(panels, metrics, strict=False):
         heights = table[name].to_numpy(float)
         panel.plot(places[~failed], heights[~failed], ".", color=BLUE, markersize=3.0, alpha=0.6)
@@ -50,20 +50,20 @@ def over_key(
             logarithmic(panel.xaxis)
     for panel in panels[len(metrics) :]:
         panel.set_visible(False)
-    rest = f"; {', '.join(others)} as swept" if others else ""
+    spread = f"; {', '.join(other_keys)} as swept" if other_keys else ""
     crosses = "; crosses left their range" if failed.any() else ""
-    made.suptitle(f"over {key}{rest}{crosses}", fontsize=10.0)
-    return made
+    picture.suptitle(f"over {key}{spread}{crosses}", fontsize=10.0)
+    return picture
 
 
 def _is_wide(values: np.ndarray) -> bool:
-    known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0.0 and known.max() / known.min() > _DECADES)
+    finite = values[np.isfinite(values)]
+    return bool(finite.size and finite.min() > 0.0 and finite.max() / finite.min() > _DECADES)
 
 
 def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
-    there = np.isfinite(heights)
-    places, heights = places[there], heights[there]
+    finite = np.isfinite(heights)
+    places, heights = places[finite], heights[finite]
     if not places.size:
         return
     distinct = np.unique(places)
@@ -71,6 +71,6 @@ def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
     group = (
         np.searchsorted(edges, places, side="right") - 1 if len(distinct) > _BINS else np.searchsorted(edges, places)
     )
-    at = np.unique(group)
-    line = [(float(np.median(places[group == each])), float(np.median(heights[group == each]))) for each in at]
+    levels = np.unique(group)
+    line = [(float(np.median(places[group == level])), float(np.median(heights[group == level]))) for level in levels]
     panel.plot(*np.array(line).T, color=GREY, linewidth=1.2)

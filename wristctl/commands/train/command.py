@@ -44,7 +44,7 @@ CHECKPOINTS = "checkpoints"
 
 
 def checkpoints_of(session: Session) -> Path | None:
-    """Where the run keeps its trainings' checkpoints, with those of the run to resume; None without a run."""
+    """Folder of the trainings' checkpoints, with those of the run to resume. None without a run."""
     stopped, run = session.inputs.runs().get("resume"), session.findings.run
     if run is None:
         if stopped is not None:
@@ -81,10 +81,10 @@ def train_networks(
         for name, settings in wanted.items()
         for trial, seed in enumerate(seeds)
     ]
-    found: dict[str, list[TrainingResult]] = {}
+    trials: dict[str, list[TrainingResult]] = {}
     for trial in _train_all(session, "training", samples, jobs, checkpoints):
-        found.setdefault(trial.job.name.rpartition("-")[0], []).append(trial)
-    return found
+        trials.setdefault(trial.job.name.rpartition("-")[0], []).append(trial)
+    return trials
 
 
 def chosen_by_folds(session: Session, samples: Samples, split: Split, checkpoints: Path | None) -> Choice:
@@ -103,7 +103,7 @@ def chosen_by_folds(session: Session, samples: Samples, split: Split, checkpoint
 
 
 def _train_all(
-    session: Session, what: str, samples: Samples, jobs: list[Job], checkpoints: Path | None
+    session: Session, activity: str, samples: Samples, jobs: list[Job], checkpoints: Path | None
 ) -> list[TrainingResult]:
     """The jobs' trials, with progress and checkpoints."""
     import numpy as np
@@ -120,11 +120,11 @@ def _train_all(
     workers = settings.workers or cores()
     session.findings.numerics(dtype="float64", torch_threads=1, device=device)
     epochs = [0] * len(jobs)
-    with session.progress(what, sum(job.settings.epochs for job in jobs), "epochs") as done:
+    with session.progress(activity, sum(job.settings.epochs for job in jobs), "epochs") as advance:
 
         def report(number: int, epoch: Epoch) -> None:
             epochs[number] = epoch.epoch
-            done(sum(epochs), rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
+            advance(sum(epochs), rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
 
         return train_all(samples, jobs, workers, device, checkpoints, report)
 
@@ -142,7 +142,7 @@ class Trained(StudyResult):
     samples: Samples
     split: Split
     choice: Choice | None
-    """What a search over the grid chose, and why; None without one."""
+    """Choice of a search over the grid, with its reason. None without a search."""
     measures: pd.DataFrame
 
     def frame(self) -> pd.DataFrame:
@@ -151,7 +151,7 @@ class Trained(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """What a run would train; a split that leaves no samples to judge by is an error here."""
+    """Plan of a training. Raises UserError for a split that leaves no samples to judge by."""
     import numpy as np
 
     from wristctl.learning.dataset import split_samples
@@ -233,14 +233,14 @@ def train(session: Session) -> Trained:
     trials = train_networks(session, samples, split, wanted, checkpoints)
     seconds = time.perf_counter() - began
 
-    name, own = best_row(trials)
-    kept = best_of(own)
+    name, row_trials = best_row(trials)
+    kept = best_of(row_trials)
     keep_network(session, kept.network, name, choice.reason if choice else "")
-    if any(trial.interrupted for each in trials.values() for trial in each):
-        keep_curves(findings, own)
+    if any(trial.interrupted for row_results in trials.values() for trial in row_results):
+        keep_curves(findings, row_trials)
         raise KeyboardInterrupt  # at once: to judge a network on very many samples takes longer than anybody waits
     where = places(samples, split)
-    tables.append(trial_table(findings, own, kept))
+    tables.append(trial_table(findings, row_trials, kept))
     measures = trials_frame(trials, where)
     tables += ranking_tables(findings, settings, trials, measures)
     tables.append(error_table(findings, kept, samples, split, where))

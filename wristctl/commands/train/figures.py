@@ -24,11 +24,11 @@ from wristctl.plotting.style import (
     title,
 )
 
+# Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright.
 ANGLES, ERRORS = "PuOr", "cividis"
-"""Colour maps, safe for the colour-blind: angles to either side of a middle, errors from dark (none) to bright."""
 
+# More dots than this are drawn as pixels, or an SVG would hold a path for each.
 MOST_PATHS = 5000
-"""More dots than this are drawn as pixels, or an SVG would hold a path for each."""
 
 
 def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
@@ -37,7 +37,7 @@ def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
     It may be a part of the data set, which has `count` samples.
     """
     shown = f"{len(samples)} of {count}" if count not in (None, len(samples)) else f"{len(samples)}"
-    made, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
+    picture, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
     bend = float(np.degrees(samples["theta"].abs().max()))
     dots = axes.scatter(
         1e3 * samples["y"],
@@ -50,13 +50,13 @@ def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
         linewidths=0.0,
         rasterized=len(samples) > MOST_PATHS,
     )
-    made.colorbar(dots, ax=axes, label="bending angle [deg]")
-    return made
+    picture.colorbar(dots, ax=axes, label="bending angle [deg]")
+    return picture
 
 
 def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
     """Errors over the epochs, the kept trial bold; a table with trial, epoch, train_loss, validation_loss [rad^2]."""
-    made, ((axes,),) = figure()
+    picture, ((axes,),) = figure()
     lines = (("train_loss", BLUE, "training"), ("validation_loss", VERMILLION, "validation"))
     for trial, rows in curves.groupby("trial"):
         bold = trial == kept
@@ -71,13 +71,13 @@ def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     legend(axes, loc="upper right")
-    return made
+    return picture
 
 
 def predicted_angles(predictions: pd.DataFrame) -> Figure:
     """The network's angle over the true one, and its error; a table with theta and theta_network [rad]."""
     true, network = (np.degrees(predictions[name]) for name in ("theta", "theta_network"))
-    made, axes = figure(1, 2, height=3.2)
+    picture, axes = figure(1, 2, height=3.2)
     left, right = axes[0]
     ends = [true.min(), true.max()]
     left.plot(ends, ends, color=BLACK, linewidth=0.8, label="equal")
@@ -90,34 +90,34 @@ def predicted_angles(predictions: pd.DataFrame) -> Figure:
     right.plot(true, network - true, **dots)
     right.set(xlabel="true angle [deg]", ylabel="error of the network [deg]")
     right.set_box_aspect(1)
-    return made
+    return picture
 
 
 def error_over_workspace(tip: Array, error: Array) -> Figure:
     """Absolute error of a network on a grid of tips (A, L, 2) [m]; errors (A, L) [rad]."""
     degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[..., 0], 1e3 * tip[..., 1]
-    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, at the circle")
+    picture, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, at the circle")
     image = axes.pcolormesh(y, x, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
     worst = np.unravel_index(degrees.argmax(), degrees.shape)
     axes.plot(y[worst], x[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
-    made.colorbar(image, ax=axes, label="absolute error [deg]")
-    return made
+    picture.colorbar(image, ax=axes, label="absolute error [deg]")
+    return picture
 
 
 def errors_at_samples(tip: Array, error: Array) -> Figure:
     """Absolute error of a network at tips (N, 2) [m] that fill no grid; errors (N,) [rad]."""
     degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[:, 0], 1e3 * tip[:, 1]
-    made, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, on the test samples")
+    picture, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, on the test samples")
     order = np.argsort(degrees)
     options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(x) > MOST_PATHS}
     dots = axes.scatter(y[order], x[order], c=degrees[order], **options)
-    made.colorbar(dots, ax=axes, label="absolute error [deg]")
-    return made
+    picture.colorbar(dots, ax=axes, label="absolute error [deg]")
+    return picture
 
 
 def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
     """Cross-validated RMSE over multiply-adds: a table with activation, hidden, multiply_adds, rmse_deg, error_deg."""
-    made, ((axes,),) = figure(height=4.2)
+    picture, ((axes,),) = figure(height=4.2)
     colours = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
     for colour, (activation, rows) in zip(colours, grid.groupby("activation", sort=False), strict=False):
         rows = rows.sort_values("multiply_adds")
@@ -125,23 +125,31 @@ def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
             rows["multiply_adds"], rows["rmse_deg"], rows["error_deg"], color=colour, marker="o", markersize=4,
             linewidth=0.8, capsize=2.0, label=str(activation),
         )  # fmt: skip
-    at = grid.iloc[chosen]
-    axes.plot(at["multiply_adds"], at["rmse_deg"], "o", color=BLACK, fillstyle="none", markersize=12, label="chosen")
+    chosen_row = grid.iloc[chosen]
+    axes.plot(
+        chosen_row["multiply_adds"],
+        chosen_row["rmse_deg"],
+        "o",
+        color=BLACK,
+        fillstyle="none",
+        markersize=12,
+        label="chosen",
+    )
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)
     axes.set(xlabel="multiply-adds of one angle", ylabel="cross-validated RMSE [deg]")
     title(axes, "mean over the folds with its standard error")
     legend(axes, loc="best")
-    return made
+    return picture
 
 
 def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, Axes]:
     """A figure as tall as a map of these positions [mm] needs at equal scales."""
     low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
     width, height = high - low
-    made, ((axes,),) = figure(height=float(np.clip(5.6 * height / width + 1.1, 2.4, 7.0)))
+    picture, ((axes,),) = figure(height=float(np.clip(5.6 * height / width + 1.1, 2.4, 7.0)))
     edge = 0.04 * width
     axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
     title(axes, heading)
-    return made, axes
+    return picture, axes

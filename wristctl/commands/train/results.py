@@ -1,4 +1,4 @@
-"""What comes of a training: the kept network, its errors beside the baselines, and what the seeds support."""
+"""Results of a training: the kept network, its errors beside the baselines, and the tests over seeds."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def trials_frame(trials: dict[str, list[TrainingResult]], where: list[Place]) ->
 
     records = [
         {"row": name, "trial": trial.job.trial} | measures(trial, where)
-        for name, each in trials.items()
-        for trial in each
+        for name, results in trials.items()
+        for trial in results
     ]
     return pd.DataFrame(records).dropna(axis="columns", how="all")
 
@@ -48,24 +48,24 @@ def ranking_tables(
         return []
     shown, count = [name for name in MEASURES if name in table], settings.seeds
     rows = []
-    for name, own in table.groupby("row", sort=False):
+    for name, row in table.groupby("row", sort=False):
         for measure in shown:
-            mean, low, high = mean_interval(own[measure].to_numpy())
+            mean, low, high = mean_interval(row[measure].to_numpy())
             unit, text = MEASURES[measure]
             says = f"{name}: {text}; mean over the seeds with its 95 % interval"
-            ends = (low, high) if len(own) > 1 else None
-            findings.metric(f"{name}_mean_{measure}", mean, unit, n=len(own), interval=ends, meaning=says)
-            middle = spread(own[measure].to_numpy())
+            ends = (low, high) if len(row) > 1 else None
+            findings.metric(f"{name}_mean_{measure}", mean, unit, n=len(row), interval=ends, meaning=says)
+            middle = spread(row[measure].to_numpy())
             says = f"{name}: {text}; median over the seeds with its 95 % interval by order statistics"
             findings.metric(f"{name}_median_{measure}", middle.median, unit, "", middle.n, middle.interval, says)
             rows.append((name, measure, unit, mean, low, high, middle.median, _printed(settings, str(name), measure)))
     heads = ("network", "measure", "unit", "mean", "95 % low", "95 % high", "median", "paper's T1")
     title = f"Over {count} seed{'s' * (count > 1)} (initial weights and order of samples; one split)"
     tables = [Table(title, heads, rows)]
-    complete = min(len(each) for each in trials.values()) == count
+    complete = min(len(results) for results in trials.values()) == count
     if count < 2 or not complete:
         return tables
-    alike = trained_alike({name: each[0].job.settings for name, each in trials.items()})
+    alike = trained_alike({name: results[0].job.settings for name, results in trials.items()})
     return tables + [_ranked(findings, settings, table, label, names) for label, names in alike.items()]
 
 
@@ -78,14 +78,18 @@ def depth_table(findings: Findings, choice: Choice) -> Table:
     rows = []
     for compared in compare_depths(choice.found):
         activation = compared.activation
-        for each in compared.depths:
-            depth, folds, rmse = each.best.depth, len(each.best.rmse), float(np.degrees(each.best.mean))
-            rows.append((activation, depth, each.best.multiply_adds, rmse, each.p, each.than_three))
+        for comparison in compared.depths:
+            depth, folds, rmse = (
+                comparison.best.depth,
+                len(comparison.best.rmse),
+                float(np.degrees(comparison.best.mean)),
+            )
+            rows.append((activation, depth, comparison.best.multiply_adds, rmse, comparison.p, comparison.than_three))
             says = f"C15: cross-validated RMSE of {depth} hidden layers, {activation}"
             findings.metric(f"c15_{activation}_depth_{depth}_rmse_deg", rmse, "deg", "lower", folds, meaning=says)
             if depth != THREE:
                 says = "C15: paired t-test over the folds against three layers, Holm's correction"
-                findings.metric(f"c15_{activation}_depth_{depth}_p", each.p, "", n=folds, meaning=says)
+                findings.metric(f"c15_{activation}_depth_{depth}_p", comparison.p, "", n=folds, meaning=says)
         if compared.three_is_best is not None:
             says = f"C15: 1 where three layers of {activation} are better than every other depth at the 5 % level"
             folds = len(choice.chosen.rmse)
@@ -103,24 +107,24 @@ def _ranked(findings: Findings, settings: TrainSettings, table: pd.DataFrame, la
     from wristctl.learning.ranking import LEVEL, rank
 
     count = settings.seeds
-    found = rank({name: table.loc[table["row"] == name, "rmse_deg"].to_numpy() for name in names})
-    for place, name in enumerate(found.order, start=1):
+    ranking = rank({name: table.loc[table["row"] == name, "rmse_deg"].to_numpy() for name in names})
+    for place, name in enumerate(ranking.order, start=1):
         findings.metric(f"{name}_rank_{label}", place, n=count, meaning=f"place by mean RMSE among {label}")
     says = f"Friedman's test that all of {label} are alike"
-    findings.metric(f"friedman_p_{label}", found.friedman_p, n=count, meaning=says)
+    findings.metric(f"friedman_p_{label}", ranking.friedman_p, n=count, meaning=says)
     rows = []
-    for pair in found.pairs:
+    for pair in ranking.pairs:
         rows.append((pair.better, pair.worse, pair.difference, pair.p, pair.p < LEVEL))
         says = "RMSE: Wilcoxon's signed-rank test over the seeds, Holm's correction"
         findings.metric(f"p_{pair.better}_before_{pair.worse}", pair.p, n=count, meaning=says)
     rows_by_name = {row.name: row for row in settings.rows}
     for name in (name for name in names if rows_by_name[name].activation == "sigmoid"):
         says = f"C16: 1 where sigmoid's RMSE is below every other's of {label} at the 5 % level"
-        findings.metric(f"c16_{name}_is_best", int(found.supports_best(name)), n=count, meaning=says)
+        findings.metric(f"c16_{name}_is_best", int(ranking.supports_best(name)), n=count, meaning=says)
         says = f"C16: 1 where some other's RMSE of {label} is below sigmoid's at the 5 % level"
-        findings.metric(f"c16_{name}_is_beaten", int(found.supports_better(name)), n=count, meaning=says)
+        findings.metric(f"c16_{name}_is_beaten", int(ranking.supports_better(name)), n=count, meaning=says)
     heads = ("better", "worse", "median difference of RMSE [deg]", "p", "supported")
-    title = f"Ranking of {label}: {' < '.join(found.order)} by mean RMSE; Friedman p = {found.friedman_p:.2g}"
+    title = f"Ranking of {label}: {' < '.join(ranking.order)} by mean RMSE; Friedman p = {ranking.friedman_p:.2g}"
     return Table(title, heads, rows)
 
 
@@ -266,7 +270,7 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
 
 
 def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, split: Split, seconds: float) -> Table:
-    """What one angle costs; `seconds` is what the training took."""
+    """Time to compute one angle. `seconds` is the time of the training [s]."""
     from wristctl.learning.inference import (
         Polynomial,
         compiled_exact,
@@ -283,7 +287,7 @@ def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, spl
         ("polynomial", compiled_polynomial(polynomial), inputs),
         ("exact inverse, 2 atan2(y, x)", compiled_exact, inputs),
     )
-    rows = [(name, microseconds(angles, given)) for name, angles, given in timed]
+    rows = [(name, microseconds(angles, points)) for name, angles, points in timed]
     findings.plain("timing.json", {"training_s": seconds, "compiled_us_per_angle": dict(rows)})
     return Table("Time for one angle in compiled code on this machine (C13)", ("inverse", "median [us]"), rows)
 

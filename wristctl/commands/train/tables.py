@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from wristctl.learning.selection import CrossValidated
     from wristctl.learning.training_result import Epoch
 
+# Units of the columns of all tables here.
 UNITS = {
     "x": "m",
     "y": "m",
@@ -32,8 +33,8 @@ UNITS = {
     "train_loss": "rad^2",
     "validation_loss": "rad^2",
 }
-"""Units of the columns of all tables here."""
 
+# Meaning of the columns of all training tables.
 MEANING = {
     "x": "tip position along the straight wrist",
     "y": "tip position across it, toward positive bending",
@@ -51,20 +52,19 @@ MEANING = {
     "train_loss": "mean squared error of the angle over the epoch's batches, each before its own step",
     "validation_loss": "mean squared error of the angle on the validation samples, after the epoch",
 }
-"""What the columns of all tables here mean."""
 
 
+# Units of grid_table's columns.
 GRID_UNITS = {"rmse_deg": "deg", "error_deg": "deg"}
-"""Units of grid_table's columns."""
 
 
 def samples_table(samples: Samples) -> pd.DataFrame:
     """One row per sample: x, y, the other inputs, theta, arc_length; held_out where any is, recording if measured."""
     x, y = samples.tip.T
-    others = dict(zip(samples.names, samples.others.T, strict=True))
+    measured = dict(zip(samples.names, samples.others.T, strict=True))
     held = {"held_out": samples.held_out} if samples.held_out.any() else {}
     held |= {} if samples.recording is None else {"recording": samples.recording}
-    return pd.DataFrame({"x": x, "y": y} | others | {"theta": samples.theta, "arc_length": samples.arc_length} | held)
+    return pd.DataFrame({"x": x, "y": y} | measured | {"theta": samples.theta, "arc_length": samples.arc_length} | held)
 
 
 def curves_table(epochs: Sequence[Epoch]) -> pd.DataFrame:
@@ -76,26 +76,26 @@ def predictions_table(
     inputs: Array, names: Sequence[str], theta: Array, theta_network: Array, theta_polynomial: Array, theta_exact: Array
 ) -> pd.DataFrame:
     """One row per sample: x, y, the inputs `names` after them, theta, theta_network, theta_polynomial, theta_exact."""
-    own = dict(zip(("x", "y", *names), inputs.T, strict=True))
+    inputs_of = dict(zip(("x", "y", *names), inputs.T, strict=True))
     angles = {"theta_network": theta_network, "theta_polynomial": theta_polynomial, "theta_exact": theta_exact}
-    return pd.DataFrame(own | {"theta": theta} | angles)
+    return pd.DataFrame(inputs_of | {"theta": theta} | angles)
 
 
-def grid_table(found: Sequence[CrossValidated]) -> pd.DataFrame:
+def grid_table(results: Sequence[CrossValidated]) -> pd.DataFrame:
     """One row per point of the grid: its settings, cost, and cross-validated RMSE with its standard error."""
     return pd.DataFrame(
         [
             {
-                "hidden": "-".join(map(str, each.settings.hidden)),
-                "depth": each.depth,
-                "activation": each.settings.activation,
-                "learning_rate": each.settings.learning_rate,
-                "weight_decay": each.settings.weight_decay,
-                "multiply_adds": each.multiply_adds,
-                "rmse_deg": np.degrees(each.mean),
-                "error_deg": np.degrees(each.standard_error),
+                "hidden": "-".join(map(str, result.settings.hidden)),
+                "depth": result.depth,
+                "activation": result.settings.activation,
+                "learning_rate": result.settings.learning_rate,
+                "weight_decay": result.settings.weight_decay,
+                "multiply_adds": result.multiply_adds,
+                "rmse_deg": np.degrees(result.mean),
+                "error_deg": np.degrees(result.standard_error),
             }
-            | {f"fold_{fold}_rmse_deg": np.degrees(value) for fold, value in enumerate(each.rmse)}
-            for each in found
+            | {f"fold_{fold}_rmse_deg": np.degrees(value) for fold, value in enumerate(result.rmse)}
+            for result in results
         ]
     )

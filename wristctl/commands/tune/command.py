@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tuned(StudyResult):
-    """What the search of each controller found."""
+    """Result of the search of each controller."""
 
     kind = "tune"
 
@@ -60,8 +60,8 @@ class Tuned(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """Of which controllers the best gains fail, swing, chatter or do not converge in some case."""
-        return [f"{name}: {', '.join(known)}" for name, known in self.lost.items() if known]
+        """Controllers whose best gains fail, swing, chatter or do not converge in some case."""
+        return [f"{name}: {', '.join(marks)}" for name, marks in self.lost.items() if marks]
 
     @property
     def gains(self) -> dict[str, dict[str, float]]:
@@ -83,17 +83,17 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.commands.truth_table import truth_told
 
     with under("tune"):
-        known = identified(study, "tune", inputs)
-        told = truth_told(known.wrist, judged_loops(study, study.tune))
-        planned = planned_search(study.tune, study.families, known.wrist, inputs)
-    check_family_reach(known, study.tune.worlds.family)
-    return planned + told
+        identified_study = identified(study, "tune", inputs)
+        truth_text = truth_told(identified_study.wrist, judged_loops(study, study.tune))
+        planned = planned_search(study.tune, study.families, identified_study.wrist, inputs)
+    check_family_reach(identified_study, study.tune.worlds.family)
+    return planned + truth_text
 
 
 def planned_search(
     settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters, inputs: Inputs
 ) -> str:
-    """What a search costs. UserError, naming the key, for a controller or a scenario that it cannot have.
+    """Cost of a search. Raises UserError, naming the key, for a controller or a scenario that it cannot have.
 
     That is an unknown controller, one without gains, a scenario on an unknown loop, an unknown family, or a network
     that none of the inputs is.
@@ -115,7 +115,7 @@ def planned_search(
         family_of(families, settings.worlds.family, "worlds.family")
     else:
         check_loops(settings)
-        check_reach([each.reference for each in settings.scenarios], wrist, "scenarios.{}.reference")
+        check_reach([scenario.reference for scenario in settings.scenarios], wrist, "scenarios.{}.reference")
     asked = _size(settings, families)
     check_size(asked)
     check_inverses(inverses_of(_references(settings, families)), inputs)
@@ -124,7 +124,7 @@ def planned_search(
 
 
 def size(study: Study) -> Size:
-    """What all its searches run."""
+    """Size of all searches of the study."""
     return _size(study.tune, study.families)
 
 
@@ -137,8 +137,8 @@ def _size(settings: TuneSettings, families: Mapping[str, Family]) -> Size:
         family = families[settings.worlds.family]
         return Size([family.loop], family.horizon, searched * settings.worlds.draws * len(family.references))
     loops = [settings.loops[scenario.loop] for scenario in settings.scenarios]
-    each = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
-    return Size(loops, settings.horizon, searched * each)
+    rollouts = sum(settings.repetitions if is_random(loop) else 1 for loop in loops)
+    return Size(loops, settings.horizon, searched * rollouts)
 
 
 def tune(session: Session) -> Tuned:
@@ -156,25 +156,25 @@ def tune(session: Session) -> Tuned:
     warn_if_coarse(loops)
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     network = network_for(session.inputs, study.wrist, loops)
-    found = search_all(session, study, network)
+    searches = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
     lost = {
-        name: marks_of(controller(name), np.array(list(each.gains.values())), cases, study.wrist)
-        for name, each in found.items()
+        name: marks_of(controller(name), np.array(list(best.gains.values())), cases, study.wrist)
+        for name, best in searches.items()
     }
     fates = {
-        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in known.items())
-        for name, known in lost.items()
+        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in marks.items())
+        for name, marks in lost.items()
     }
     rows = [
         (name, result.objective, fates[name], result.finalists[0].origin, result.evaluations, _told(result.gains))
-        for name, result in sorted(found.items(), key=lambda each: each[1].objective)
+        for name, result in sorted(searches.items(), key=lambda named_search: named_search[1].objective)
     ]
     columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
     tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    return Tuned(session.study, session.findings, tables, found, lost)
+    return Tuned(session.study, session.findings, tables, searches, lost)
 
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
@@ -188,26 +188,26 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
     searched, chosen = tuning_cases(study, network)
     judge = Judge(searched, study.wrist, settings.objective)
     choose = Judge(chosen, study.wrist, settings.objective) if chosen else None
-    found: dict[str, Search] = {}
+    searches: dict[str, Search] = {}
     try:
         for name in settings.controllers:
             total = settings.iterations * settings.restarts
-            with session.progress(f"tuning {name}", total=total, unit="iterations") as done:
+            with session.progress(f"tuning {name}", total=total, unit="iterations") as advance:
 
-                def so_far(result: Search, name: str = name, done: Done = done) -> None:
-                    found[name] = result
-                    done(len(result.tried.values), best=result.objective)
+                def so_far(result: Search, name: str = name, report: Done = advance) -> None:
+                    searches[name] = result
+                    report(len(result.tried.values), best=result.objective)
 
-                law, known = controller(name), _known(session, name)
-                found[name] = search(study, law, session.findings.stream, (judge, choose), so_far, known)
+                law, tried = controller(name), _known(session, name)
+                searches[name] = search(study, law, session.findings.stream, (judge, choose), so_far, tried)
     finally:
-        _keep(session.findings, found, choose or judge)
-    return found
+        _keep(session.findings, searches, choose or judge)
+    return searches
 
 
 def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
     family = settings.worlds.family
-    return list(families[family].references) if family else [each.reference for each in settings.scenarios]
+    return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
 
 
 def _note_streams(session: Session, study: Study) -> None:
@@ -229,7 +229,7 @@ def _note_streams(session: Session, study: Study) -> None:
 
 
 def _known(session: Session, name: str) -> Tried | None:
-    """What the run to resume has tried of a controller."""
+    """Gains of a controller that the run to resume has tried."""
     from wristctl.control.table import controller
     from wristctl.tuning.search import tried_of
 
@@ -243,17 +243,17 @@ def _told(gains: Mapping[str, float]) -> str:
     return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
 
 
-def _keep(findings: Findings, found: dict[str, Search], judge: Judge) -> None:
+def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None:
     """Keep what was found, also of a search that was cut short."""
     from wristctl.commands.tune.figures import convergence, gain_history
     from wristctl.control.table import controller, write_gains
     from wristctl.tuning.search import finalists, history
 
-    if not found:
+    if not searches:
         return
     if file := findings.file("data/gains.json"):
-        write_gains(file, {name: result.gains for name, result in found.items()})
-    for name, result in found.items():
+        write_gains(file, {name: result.gains for name, result in searches.items()})
+    for name, result in searches.items():
         gains = controller(name).gains
         units = {k: g.unit or "1" for k, g in gains.items()}
         counted = dict.fromkeys(("restart", "iteration", "candidate", "objective"), "1")
@@ -267,12 +267,12 @@ def _keep(findings: Findings, found: dict[str, Search], judge: Judge) -> None:
         findings.figure(f"gains-{name}", gain_history, result, gains, caption=f"Gains of {name} over the search")
         caption = f"What one gain of {name} by itself does to the objective"
         findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
-    findings.headline(*(f"{name}_objective" for name in sorted(found, key=lambda name: found[name].objective)))
-    findings.figure("convergence", convergence, list(found.values()), caption="Best objective against the budget")
+    findings.headline(*(f"{name}_objective" for name in sorted(searches, key=lambda name: searches[name].objective)))
+    findings.figure("convergence", convergence, list(searches.values()), caption="Best objective against the budget")
 
 
+# Factor by which gains are less or more.
 _APART = 1.5
-"""Factor by which gains are less or more."""
 
 
 def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
@@ -285,9 +285,9 @@ def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
     law = controller(name)
     base = np.array(law.values(gains))
     tried = np.tile(base, (1 + 2 * len(base), 1))
-    for at in range(len(base)):
-        tried[1 + 2 * at, at] /= _APART
-        tried[2 + 2 * at, at] *= _APART
+    for index in range(len(base)):
+        tried[1 + 2 * index, index] /= _APART
+        tried[2 + 2 * index, index] *= _APART
     return gain_sensitivity(name, list(law.gains), _APART, judge(law, tried))
 
 

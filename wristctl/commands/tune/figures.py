@@ -15,38 +15,40 @@ from wristctl.tuning.search import Search
 
 def convergence(searches: Sequence[Search]) -> Figure:
     """Best objective against the budget of each search; a thin line for each restart, a thick one for their median."""
-    made, ((axes,),) = figure(height=3.6)
+    picture, ((axes,),) = figure(height=3.6)
     for search in searches:
-        best, own = search.best_so_far, colour(search.controller)
+        best, line_colour = search.best_so_far, colour(search.controller)
         budget = search.tried.values.shape[1] * np.arange(1, best.shape[1] + 1)
         if len(best) > 1:
-            axes.plot(budget, best.T, color=own, linewidth=0.6, alpha=0.6)
-        whole = best[np.isfinite(best).all(axis=1)] if np.isfinite(best).all(axis=1).any() else best[:1]
-        axes.plot(budget, np.median(whole, axis=0), color=own, linewidth=1.6, label=search.controller)
+            axes.plot(budget, best.T, color=line_colour, linewidth=0.6, alpha=0.6)
+        complete = best[np.isfinite(best).all(axis=1)] if np.isfinite(best).all(axis=1).any() else best[:1]
+        axes.plot(budget, np.median(complete, axis=0), color=line_colour, linewidth=1.6, label=search.controller)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle=":", label="feedforward")
     axes.set_xscale("log")
     axes.set(xlabel="candidates tried [1]", ylabel="objective [decades beside feedforward]")
-    legend_below(made, 4)
-    return made
+    legend_below(picture, 4)
+    return picture
 
 
 def gain_history(search: Search, gains: Mapping[str, Gain]) -> Figure:
     """Every gain over the iterations, on the decades of its search box: best so far, the swarm's median and 10-90 %."""
-    made, axes = figure(len(gains), 1, height=0.9 + 1.6 * len(gains), sharex=True)
+    picture, axes = figure(len(gains), 1, height=0.9 + 1.6 * len(gains), sharex=True)
     iterations, best = _iterations(search), _best_so_far(search)
-    for at, (panel, (name, gain)) in enumerate(zip(axes[:, 0], gains.items(), strict=True)):
-        low, median, high = np.percentile(search.tried.gains[:, :, at], (10.0, 50.0, 90.0), axis=1)
-        own = colour(search.controller)
-        panel.fill_between(iterations, low, high, color=own, alpha=0.2, linewidth=0.0, label="10-90 % of the swarm")
-        panel.plot(iterations, median, color=own, linewidth=1.0, linestyle=":", label="median of the swarm")
-        panel.step(iterations, best[:, at], color=BLACK, where="post", label="best so far")
+    for index, (panel, (name, gain)) in enumerate(zip(axes[:, 0], gains.items(), strict=True)):
+        low, median, high = np.percentile(search.tried.gains[:, :, index], (10.0, 50.0, 90.0), axis=1)
+        line_colour = colour(search.controller)
+        panel.fill_between(
+            iterations, low, high, color=line_colour, alpha=0.2, linewidth=0.0, label="10-90 % of the swarm"
+        )
+        panel.plot(iterations, median, color=line_colour, linewidth=1.0, linestyle=":", label="median of the swarm")
+        panel.step(iterations, best[:, index], color=BLACK, where="post", label="best so far")
         logarithmic(panel.yaxis)
         panel.set(ylim=(gain.low / 1.5, gain.high * 1.5), ylabel=f"{name} [{gain.unit or '1'}]")
     axes[-1, 0].xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[-1, 0].set_xlabel("iteration")
     title(axes[0, 0], f"Gains of {search.controller} in their search boxes")
-    legend_below(made)
-    return made
+    legend_below(picture)
+    return picture
 
 
 def _iterations(search: Search) -> NDArray[np.int_]:
@@ -57,11 +59,11 @@ def _iterations(search: Search) -> NDArray[np.int_]:
 def _best_so_far(search: Search) -> Array:
     """Gains of the best candidate up to each iteration, (I, g)."""
     values = search.tried.values
-    each = search.tried.gains[_iterations(search) - 1, values.argmin(axis=1)]
+    gains_of_least = search.tried.gains[_iterations(search) - 1, values.argmin(axis=1)]
     least = np.minimum.accumulate(values.min(axis=1))
     better = np.concatenate([[True], least[1:] < least[:-1]])
-    found: Array = each[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]
-    return found
+    best_gains: Array = gains_of_least[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]
+    return best_gains
 
 
 def gain_sensitivity(name: str, gains: Sequence[str], factor: float, values: Array) -> Figure:
@@ -69,16 +71,21 @@ def gain_sensitivity(name: str, gains: Sequence[str], factor: float, values: Arr
 
     `values` (1 + 2 g,) are of the gains found, then of each gain less and more; the most sensitive is on top.
     """
-    found, less, more = values[0], values[1::2], values[2::2]
-    order = np.argsort(np.maximum(np.abs(less - found), np.abs(more - found)))
-    made, ((axes,),) = figure(height=1.5 + 0.35 * len(gains))
-    for side, own, shade in (("less", less, SKY), ("more", more, ORANGE)):
+    nominal, less, more = values[0], values[1::2], values[2::2]
+    order = np.argsort(np.maximum(np.abs(less - nominal), np.abs(more - nominal)))
+    picture, ((axes,),) = figure(height=1.5 + 0.35 * len(gains))
+    for side, shifted, shade in (("less", less, SKY), ("more", more, ORANGE)):
         axes.barh(
-            range(len(gains)), own[order] - found, left=found, color=shade, label=f"{factor:g} times {side}", alpha=0.85
+            range(len(gains)),
+            shifted[order] - nominal,
+            left=nominal,
+            color=shade,
+            label=f"{factor:g} times {side}",
+            alpha=0.85,
         )
-    axes.axvline(found, color=BLACK, linewidth=0.8)
-    axes.set_yticks(range(len(gains)), [gains[at] for at in order])
+    axes.axvline(nominal, color=BLACK, linewidth=0.8)
+    axes.set_yticks(range(len(gains)), [gains[index] for index in order])
     axes.set_xlabel("objective [decades beside feedforward]")
     title(axes, f"{name}: what one gain by itself does to the objective")
-    legend_below(made, 2)
-    return made
+    legend_below(picture, 2)
+    return picture
