@@ -20,11 +20,11 @@ from wristctl.wrist.moving import advance_or_stop
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, kernel_of, parameters_of, tip_angle, travel
 
+# Row of a tendon's stiffness, before what each has reeled in more.
 _STIFFNESS = len(Nonideal._fields)
-"""Row of a tendon's stiffness, before what each has reeled in more."""
 
+# Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast.
 SETTLE = 0.5
-"""Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast."""
 
 
 class SupposedWrist(NamedTuple):
@@ -41,8 +41,11 @@ class SupposedWrist(NamedTuple):
 
 
 class Reeled(NamedTuple):
-    """What the spools have reeled in (T, 4) [m], held over each step of h [s], and how many steps a wrist has to settle
-    on the first of them; `clock` is the time at first [s], None where nothing slips, breaks or has backlash."""
+    """Tendon lengths reeled in by the spools (T, 4) [m], held over each step of h [s].
+
+    A wrist has `settle` steps to settle on the first lengths. `clock` is the time at first [s], None where nothing
+    slips, breaks or has backlash.
+    """
 
     lengths: Any
     h: float
@@ -52,7 +55,7 @@ class Reeled(NamedTuple):
 
 @compiled
 def _worn(clock: Any, tendons: Any, plant: Any, q: Any, given: Any, time: Any) -> Any:
-    """What four tendons have reeled in of what their spools have; the very same where nothing wears them."""
+    """Lengths of four tendons behind their spools; the spools' lengths where the tendons are ideal."""
     if clock is None:
         return given
     path = travel(plant, q)
@@ -66,9 +69,9 @@ def _worn(clock: Any, tendons: Any, plant: Any, q: Any, given: Any, time: Any) -
 
 
 def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
-    plant, own = parameters_of(model, rows_of(values)), rows_of(tendon)
-    zero = 0.0 * own[0]
-    tendons = Tendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
+    plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
+    zero = 0.0 * tendon_rows[0]
+    tendons = Tendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive = 1.0 + zero
@@ -79,10 +82,10 @@ def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, sta
             total, _ = tip_angle(plant, q, rate)
             rows_of(angle)[k] = total
         given = (
-            reeled[now, 0] + own[taut],
-            reeled[now, 2] + own[taut + 2],
-            reeled[now, 1] + own[taut + 1],
-            reeled[now, 3] + own[taut + 3],
+            reeled[now, 0] + tendon_rows[taut],
+            reeled[now, 2] + tendon_rows[taut + 2],
+            reeled[now, 1] + tendon_rows[taut + 1],
+            reeled[now, 3] + tendon_rows[taut + 3],
         )
         reached = _worn(spools.clock, tendons, plant, q, given, k * spools.h + zero)
         alive, _ = advance_or_stop(plant, q, rate, reached, tendons, spools.h + zero, alive)
@@ -95,16 +98,18 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     tension, held over each step: two tendons of the + side, then the two of the - side. At first the wrist is at rest.
     A candidate that bends a segment beyond a full turn stays where it was.
     """
-    values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
-    nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h) for each in candidates]
+    values = to_blocks(np.array([model.values(candidate.wrist, n) for candidate in candidates]))
+    nonideal = [nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h) for candidate in candidates]
     clock = 0.0 if any(map(wears, nonideal)) else None
-    own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
-    tendons, k = to_blocks(np.array(own)), model.coordinates(n)
-    found = np.empty((len(values), len(reeled), *values.shape[2:]))
+    tendon_values = [
+        (*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)
+    ]
+    tendons, k = to_blocks(np.array(tendon_values)), model.coordinates(n)
+    trajectories = np.empty((len(values), len(reeled), *values.shape[2:]))
     spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), clock)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
-    for value, tendon, angle in zip(values, tendons, found, strict=True):
+    for value, tendon, angle in zip(values, tendons, trajectories, strict=True):
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
         advance(model, value, tendon, spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
-    return to_rows(found, len(candidates))
+    return to_rows(trajectories, len(candidates))
