@@ -27,19 +27,19 @@ from wristctl.wrist.holding import shortfall
 from wristctl.wrist.segments import segments
 
 Reading = Literal["strict", "usual"]
+# Further angles that the wrist must follow [deg]: to both sides, as "all movements were symmetrical", and less far.
 GUARD_DEG = (-30.0, 15.0, -15.0, 20.0, -20.0)
-"""What the wrist must follow as well: to both sides, as "all movements were symmetrical", and less far."""
 _WITHIN_DEG = 1.5
+# Share of the horizon that must be left after settling, and half a second.
 _LEAST_REST = 0.1
-"""Share of the horizon that must be left after settling, and half a second."""
 _NEAR = 0.05
+# A factor beyond which nobody asks what else a setting follows.
 _HOPEFUL = 3.0
-"""A factor beyond which nobody asks what else a setting follows."""
 
 
 @dataclass(frozen=True)
 class BestCase:
-    """What a search found for one row."""
+    """Best setting of one row of T2, with the factor that separates it from the paper."""
 
     row: str
     reading: Reading
@@ -59,7 +59,7 @@ class BestCase:
     """Share of neighbours, every number moved by up to 5 %, within FACTOR of all three."""
 
     def values(self) -> Mapping[str, object]:
-        """What each unknown is there."""
+        """Value of each unknown at this setting; empty without a setting."""
         return {} if self.setting is None else self.setting.values
 
 
@@ -67,9 +67,9 @@ def closest(of: Courses, controller: str, reading: Reading) -> tuple[Array, Arra
     """The factor (N,) of each course in its best reading, its three numbers (N, 3), and how they are read."""
     printed = np.array(T2[controller])
     if reading == "strict":
-        found = readings(of)
+        values = readings(of)
         names = ["strict"]
-        numbers = np.stack([found[name] for name in ("rmse", "settling", "steady_state")], axis=1)[:, None, :]
+        numbers = np.stack([values[name] for name in ("rmse", "settling", "steady_state")], axis=1)[:, None, :]
     else:
         names, numbers = usual(of)
     left = of.horizons[:, None] - numbers[:, :, 1]
@@ -78,14 +78,14 @@ def closest(of: Courses, controller: str, reading: Reading) -> tuple[Array, Arra
     rests = left >= np.maximum(0.5, _LEAST_REST * of.horizons)[:, None]
     factors = np.where(np.isfinite(factors) & rests & of.converged[:, None], factors, np.inf)
     best, every = factors.argmin(axis=1), np.arange(len(factors))
-    return factors[every, best], numbers[every, best], [names[each] for each in best]
+    return factors[every, best], numbers[every, best], [names[choice] for choice in best]
 
 
 def follows(row: Row, settings: Sequence[PaperSetting]) -> NDArray[np.bool_]:
     """Whether each setting brings the wrist to other angles too, (settings,)."""
     kept = np.ones(len(settings), bool)
     for angle in GUARD_DEG:
-        references = [each.reference.model_copy(update={"angle_deg": angle}) for each in settings]
+        references = [setting.reference.model_copy(update={"angle_deg": angle}) for setting in settings]
         of = courses(row, settings, references)
         error = readings(of)["steady_state"]
         kept &= of.converged & (np.nan_to_num(error, nan=np.inf) < np.radians(_WITHIN_DEG))
@@ -105,7 +105,7 @@ def search(
 ) -> BestCase:
     """Differential evolution on an island of so many segments and one control period, ideal measurement."""
     fixed = box.model_copy(
-        update={"unknowns": {name: each for name, each in box.unknowns.items() if name not in STRATA}}
+        update={"unknowns": {name: unknown for name, unknown in box.unknowns.items() if name not in STRATA}}
     )
     names = list(fixed.unknowns)
     rng = np.random.default_rng(stream(seed, f"best case: {row.label} {reading} {island}"))
@@ -117,7 +117,7 @@ def search(
         factors, numbers, read = closest(_courses(row, settings), row.controller, reading)
         hopeful = np.flatnonzero(factors < min(_HOPEFUL, best[0]))  # only the best must be honest
         if len(hopeful):
-            honest = follows(row, [settings[each] for each in hopeful])
+            honest = follows(row, [settings[candidate] for candidate in hopeful])
             stopped += int((factors[hopeful[~honest]] < FACTOR).sum())
             factors[hopeful[~honest]] = np.inf
         least = int(factors.argmin())
@@ -126,45 +126,45 @@ def search(
         optimiser.tell(np.log(factors))
         if progress is not None:
             progress((generation + 1) / generations)
-    factor, ours, how, point = best
-    done, rmse, settling, steady = generations * candidates, *(float(each) for each in ours)
+    factor, ours, read_as, point = best
+    rollouts, rmse, settling, steady = generations * candidates, *(float(number) for number in ours)
     if not np.isfinite(factor):
         return BestCase(
-            row.label, reading, *island, seed, factor, (rmse, settling, steady), "", None, done, stopped, 0.0
+            row.label, reading, *island, seed, factor, (rmse, settling, steady), "", None, rollouts, stopped, 0.0
         )
-    there = _at(fixed, wrist, names, point, island)
-    near = _near(fixed, wrist, row, reading, there, rng)
+    setting = _at(fixed, wrist, names, point, island)
+    near = _near(fixed, wrist, row, reading, setting, rng)
     return BestCase(
-        row.label, reading, *island, seed, factor, (rmse, settling, steady), how, there, done, stopped, near
+        row.label, reading, *island, seed, factor, (rmse, settling, steady), read_as, setting, rollouts, stopped, near
     )
 
 
 def _at(
     box: Box, wrist: WristParameters, names: Sequence[str], point: Array, island: tuple[int, float]
 ) -> PaperSetting:
-    found = box.setting(wrist, dict(zip(names, np.minimum(point, 1.0 - 1e-12).tolist(), strict=True)))
-    loop = found.loop.model_copy(update={"plant_segments": island[0], "control_period": island[1]})
-    return found._replace(loop=loop)
+    drawn = box.setting(wrist, dict(zip(names, np.minimum(point, 1.0 - 1e-12).tolist(), strict=True)))
+    loop = drawn.loop.model_copy(update={"plant_segments": island[0], "control_period": island[1]})
+    return drawn._replace(loop=loop)
 
 
 def _courses(row: Row, settings: Sequence[PaperSetting]) -> Courses:
-    return courses(row, settings, [each.reference for each in settings])
+    return courses(row, settings, [setting.reference for setting in settings])
 
 
 def _near(
-    box: Box, wrist: WristParameters, row: Row, reading: Reading, there: PaperSetting, rng: np.random.Generator
+    box: Box, wrist: WristParameters, row: Row, reading: Reading, setting: PaperSetting, rng: np.random.Generator
 ) -> float:
     """Share of neighbours within FACTOR: every number of wrist, reference and horizon moved by up to 5 % of itself."""
     moved = []
     for _ in range(64):
-        own, motion = there.wrist, there.reference
+        parameters, motion = setting.wrist, setting.reference
         leaves = [name.partition(".")[2] for name in box.unknowns if name.startswith("wrist.")]
         leaves += ["stiffness", "damping"]
-        changed = {leaf: getattr(own, leaf) * float(rng.uniform(1 - _NEAR, 1 + _NEAR)) for leaf in leaves}
+        changed = {leaf: getattr(parameters, leaf) * float(rng.uniform(1 - _NEAR, 1 + _NEAR)) for leaf in leaves}
         duration = motion.duration * float(rng.uniform(1 - _NEAR, 1 + _NEAR))
         moved.append(
-            there._replace(
-                wrist=own.model_copy(update=changed), reference=motion.model_copy(update={"duration": duration})
+            setting._replace(
+                wrist=parameters.model_copy(update=changed), reference=motion.model_copy(update={"duration": duration})
             )
         )
     factors, _, _ = closest(_courses(row, moved), row.controller, reading)
@@ -172,8 +172,8 @@ def _near(
 
 
 def overshoot_of_a_tick(setting: PaperSetting, gains: str = "exchanged") -> float:
-    """How many times too far one held tick goes; infinite without a tension limit."""
-    wrist, loop, own = setting.wrist, setting.loop, SMC.presets[gains]
+    """Ratio of the travel during one held control tick to the travel asked for; infinite without a tension limit."""
+    wrist, loop, preset = setting.wrist, setting.loop, SMC.presets[gains]
     if not loop.limits:
         return math.inf
     n = loop.plant_segments
@@ -181,7 +181,7 @@ def overshoot_of_a_tick(setting: PaperSetting, gains: str = "exchanged") -> floa
     turned = 1.0 - float(arms.mean() ** 2 / (arms**2).mean())
     inertia = float(terms(segments(wrist, 1), [0.0], [0.0]).mass[0, 0])
     pull = 2.0 * wrist.tendon_offset * wrist.tension_limit
-    return pull * (turned / wrist.damping + 0.5 * loop.control_period / inertia) / (own["P3"] / own["P1"])
+    return pull * (turned / wrist.damping + 0.5 * loop.control_period / inertia) / (preset["P3"] / preset["P1"])
 
 
 def holds(setting: PaperSetting) -> bool:

@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Evidence that a train run gives, and the experiment it is a run of.
 TRAININGS = {"table1": "experiments/table1.yaml", "selection": "experiments/model_selection.yaml"}
-"""Evidence that a train run gives, and the experiment it is a run of."""
 
+# value, interval and n of a training's metrics, by name
 Metrics = Mapping[str, Mapping[str, Any]]
-"""value, interval and n of a training's metrics, by name"""
 
+# A loop's name, and the springs' stiffness over what the controller knows.
 LoopCondition = tuple[str, float]
-"""A loop's name, and the springs' stiffness over what the controller knows."""
 
+# Springs as stiff as the controller knows them; beside it stands what is asked of others.
 NOMINAL = 1.0
-"""Springs as stiff as the controller knows them; beside it stands what is asked of others."""
 _BY_LOOPS = ("comparison", "ordering", "arrival")
 
 
@@ -40,19 +40,19 @@ class TrialsDone(NamedTuple):
 
     trials: pd.DataFrame
     motion: float
-    """How long their reference moves [s]; 0 for a step."""
+    """Duration of the reference's motion [s]; 0 for a step."""
     emulated: bool
 
 
 @dataclass(frozen=True)
 class Grounds:
-    """What there is to judge by."""
+    """Evidence for judging claims: loops, trainings and trials."""
 
     loops: Mapping[LoopCondition, pd.DataFrame] = field(default_factory=dict)
     trainings: Mapping[str, Metrics] = field(default_factory=dict)
     hardware: TrialsDone | None = None
     tension_limit: float = np.inf
-    """Of the wrist [N], which a loop without limits may pass."""
+    """Tension limit of the wrist [N]. A loop without limits may pass it."""
 
 
 def conditions_of(claims: Sequence[Claim]) -> list[LoopCondition]:
@@ -63,8 +63,8 @@ def conditions_of(claims: Sequence[Claim]) -> list[LoopCondition]:
 
 def rows_of(claims: Sequence[Claim], scale: float) -> list[Row]:
     """The controllers with their gains that the claims ask for, each once."""
-    own = [each for each in claims if each.evidence in _BY_LOOPS and scale in (NOMINAL, each.stiffness_scale)]
-    labels = dict.fromkeys(label for each in own for label in (each.label, each.than) if label)
+    asked = [claim for claim in claims if claim.evidence in _BY_LOOPS and scale in (NOMINAL, claim.stiffness_scale)]
+    labels = dict.fromkeys(label for claim in asked for label in (claim.label, claim.than) if label)
     pairs = [label.split("/") for label in labels]
     return [Row(controller=name, gains=gains) for name, gains in pairs]
 
@@ -84,10 +84,10 @@ def evidence_study(study: Study, claims: Sequence[Claim], condition: LoopConditi
     return study.model_copy(update={"compare": compared})
 
 
+# The loop on which the paper's equations are solved as they stand: exact model, continuous time, no limits.
 DERIVED_ON = "exact"
-"""The loop on which the paper's equations are solved as they stand: exact model, continuous time, no limits."""
+# So many parts are told one by one, more are counted.
 _FEW = 4
-"""So many parts are told one by one, more are counted."""
 
 
 @dataclass(frozen=True)
@@ -105,44 +105,50 @@ class Judgement:
 
         What fails on all of them is one verdict, whatever the word on each.
         """
-        return joint(each.verdict for each in self.found.values())
+        return joint(finding.verdict for finding in self.found.values())
 
     @property
     def reason(self) -> str:
         """Why, over all loops."""
         by_loop = [
-            f"{name}: {each.reason}" if name else each.reason for name, each in self.found.items() if each.reason
+            f"{name}: {finding.reason}" if name else finding.reason
+            for name, finding in self.found.items()
+            if finding.reason
         ]
-        differ = len({each.verdict for each in self.found.values()}) > 1 and self.verdict == "not specified enough"
+        differ = (
+            len({finding.verdict for finding in self.found.values()}) > 1 and self.verdict == "not specified enough"
+        )
         parts = ("the loop decides" if differ else "", self.claim.unspecified, self.claim.reason, *by_loop)
         return "; ".join(part for part in parts if part)
 
 
 def judge_all(claims: Sequence[Claim], shown: Grounds) -> list[Judgement]:
     """Judge every claim by what is shown, and each statement that has parts by these; in the order of the claims."""
-    whole = {claim.id for claim in claims if claim.evidence == "parts"}
-    single = {claim.id: judge(claim, shown) for claim in claims if claim.id not in whole}
-    of = {name: [single[each.id] for each in claims if each.part_of == name] for name in whole}
-    return [_by_parts(claim, of[claim.id]) if claim.id in whole else single[claim.id] for claim in claims]
+    divided = {claim.id for claim in claims if claim.evidence == "parts"}
+    single = {claim.id: judge(claim, shown) for claim in claims if claim.id not in divided}
+    of = {name: [single[claim.id] for claim in claims if claim.part_of == name] for name in divided}
+    return [_by_parts(claim, of[claim.id]) if claim.id in divided else single[claim.id] for claim in claims]
 
 
 def _by_parts(claim: Claim, parts: Sequence[Judgement]) -> Judgement:
-    """Where all parts agree that is the verdict; else what tells them apart decides, which the paper does not give."""
-    found = {}
+    """Judge a claim by its parts. Parts that disagree depend on a detail that the paper does not give."""
+    findings = {}
     for place in dict.fromkeys(name for part in parts for name in part.found):
-        own = [(part.claim, part.found[place]) for part in parts if place in part.found]
-        verdict = joint(each.verdict for _, each in own)
+        on_loop = [(part.claim, part.found[place]) for part in parts if place in part.found]
+        verdict = joint(finding.verdict for _, finding in on_loop)
         assert verdict is not None
-        if len(own) <= _FEW:
-            said = "; ".join(f"{part.says}: {worded(part, each.beside or each.verdict)}" for part, each in own)
+        if len(on_loop) <= _FEW:
+            reason = "; ".join(
+                f"{part.says}: {worded(part, finding.beside or finding.verdict)}" for part, finding in on_loop
+            )
         else:
-            counted = Counter(each.beside or each.verdict for _, each in own)
-            beside = "with ours " * any(each.beside for _, each in own)
-            said = beside + ", ".join(f"{count} of {len(own)} {name}" for name, count in counted.most_common())
+            counted = Counter(finding.beside or finding.verdict for _, finding in on_loop)
+            beside = "with ours " * any(finding.beside for _, finding in on_loop)
+            reason = beside + ", ".join(f"{count} of {len(on_loop)} {name}" for name, count in counted.most_common())
         if verdict == "open":
-            said = next(each.reason for _, each in own if each.verdict == "open")
-        found[place] = Finding(verdict, reason=said)
-    return Judgement(claim, found, tuple(dict.fromkeys(name for part in parts for name in part.shown_by)))
+            reason = next(finding.reason for _, finding in on_loop if finding.verdict == "open")
+        findings[place] = Finding(verdict, reason=reason)
+    return Judgement(claim, findings, tuple(dict.fromkeys(name for part in parts for name in part.shown_by)))
 
 
 def worded(claim: Claim, verdict: str) -> str:
@@ -166,28 +172,30 @@ def judge(claim: Claim, shown: Grounds) -> Judgement:
     if claim.evidence in TRAININGS:
         return _judgement(claim, {"": _by_training(claim, shown.trainings.get(claim.evidence))}, claim.evidence)
     loops = [loop for loop, scale in shown.loops if scale == claim.stiffness_scale]
-    found = {loop: _on_loop(claim, loop, shown) for loop in loops}
-    known = {loop: each for loop, each in found.items() if each is not None}
-    if not known:
+    findings = {loop: _on_loop(claim, loop, shown) for loop in loops}
+    judged = {loop: finding for loop, finding in findings.items() if finding is not None}
+    if not judged:
         return Judgement(claim, {"": Finding("open", reason=f"no controller '{claim.controller}' to run")})
-    return _judgement(claim, known, *known)
+    return _judgement(claim, judged, *judged)
 
 
-def _judgement(claim: Claim, found: Mapping[str, Finding], *shown_by: str) -> Judgement:
-    """What the paper leaves open stays so, with the verdict by our choice of it beside."""
-    if all(each.verdict == "open" and np.isnan(each.low) for each in found.values()):
-        return Judgement(claim, found)
+def _judgement(claim: Claim, findings: Mapping[str, Finding], *shown_by: str) -> Judgement:
+    """Keep a claim open where the paper does, with the verdict under our choice beside it."""
+    if all(finding.verdict == "open" and np.isnan(finding.low) for finding in findings.values()):
+        return Judgement(claim, findings)
     if claim.unspecified or claim.assuming:
         choice = f"assuming {claim.assuming}:" if claim.assuming else "with ours"
-        found = {
-            name: each._replace(
+        findings = {
+            name: finding._replace(
                 verdict="not specified enough",
-                beside=each.verdict,
-                reason="; ".join(part for part in (f"{choice} {worded(claim, each.verdict)}", each.reason) if part),
+                beside=finding.verdict,
+                reason="; ".join(
+                    part for part in (f"{choice} {worded(claim, finding.verdict)}", finding.reason) if part
+                ),
             )
-            for name, each in found.items()
+            for name, finding in findings.items()
         }
-    return Judgement(claim, found, shown_by)
+    return Judgement(claim, findings, shown_by)
 
 
 def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
@@ -195,48 +203,48 @@ def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
     table = shown.loops[loop, claim.stiffness_scale]
     moves = _moves(table, claim.label)
     metric = "missing" if claim.evidence == "arrival" else str(claim.metric)
-    others = _moves(table, claim.than) if claim.than else moves
-    if moves.empty or others.empty:
+    than_moves = _moves(table, claim.than) if claim.than else moves
+    if moves.empty or than_moves.empty:
         return None
     ours = moves[metric].to_numpy(float)
     if claim.evidence == "arrival":
-        found = of_numbers(SHORT, ours, "at most")
+        finding = of_numbers(SHORT, ours, "at most")
     elif claim.than is not None:
-        found = of_ordering(ours, others[metric].to_numpy(float))
+        finding = of_ordering(ours, than_moves[metric].to_numpy(float))
     elif claim.stiffness_scale != NOMINAL:
         before = _moves(shown.loops[loop, NOMINAL], claim.label)[metric].to_numpy(float)
-        found = _explained(of_numbers(printed(claim), np.maximum(ours - before, 0.0)))
+        finding = _explained(of_numbers(printed(claim), np.maximum(ours - before, 0.0)))
     elif metric == "settling_after":
-        found = of_settling(printed(claim), ours, _durations(moves))
+        finding = of_settling(printed(claim), ours, _durations(moves))
     else:
-        found = of_numbers(printed(claim), ours, claim.sense)
-    if claim.derived and loop == DERIVED_ON and found.verdict in ("worse than the paper", "does not hold"):
-        found = found._replace(verdict="contradicted")
+        finding = of_numbers(printed(claim), ours, claim.sense)
+    if claim.derived and loop == DERIVED_ON and finding.verdict in ("worse than the paper", "does not hold"):
+        finding = finding._replace(verdict="contradicted")
     strongest = _unphysical(table, (claim.label, claim.than), shown.tension_limit)
     if not strongest:
-        return found
-    return found._replace(mark="not physical", reason="; ".join(part for part in (found.reason, strongest) if part))
+        return finding
+    return finding._replace(mark="not physical", reason="; ".join(part for part in (finding.reason, strongest) if part))
 
 
 def _unphysical(table: pd.DataFrame, labels: Sequence[str | None], limit: float) -> str:
-    """What passes the wrist's tension limit, on whichever motion; empty where nothing does."""
+    """Largest tension above the wrist's limit and its motion; empty where no tension passes the limit."""
     if "peak_tension" not in table:
         return ""
-    own = table[(table["controller"] + "/" + table["gains"]).isin(labels)]
-    peaks = own["peak_tension"].to_numpy(float)
-    at = int(peaks.argmax())
-    return "" if peaks[at] <= limit * (1.0 + 1e-9) else f"{peaks[at]:.3g} N on a {own['reference'].iloc[at]}"
+    selected = table[(table["controller"] + "/" + table["gains"]).isin(labels)]
+    peaks = selected["peak_tension"].to_numpy(float)
+    peak = int(peaks.argmax())
+    return "" if peaks[peak] <= limit * (1.0 + 1e-9) else f"{peaks[peak]:.3g} N on a {selected['reference'].iloc[peak]}"
 
 
 def _moves(table: pd.DataFrame, label: str) -> pd.DataFrame:
     """A row's smooth motions; what has failed has no numbers."""
     name, gains = label.split("/")
-    own = table[(table["controller"] == name) & (table["gains"] == gains)]
-    moves = own[~own["reference"].str.startswith("step")]
+    selected = table[(table["controller"] == name) & (table["gains"] == gains)]
+    moves = selected[~selected["reference"].str.startswith("step")]
     if "failed" not in moves:
         return moves
-    metrics = [each for each in moves.columns if each in _of_error()]
-    return moves.assign(**{each: moves[each].mask(moves["failed"]) for each in metrics})
+    metrics = [column for column in moves.columns if column in _of_error()]
+    return moves.assign(**{column: moves[column].mask(moves["failed"]) for column in metrics})
 
 
 def _of_error() -> set[str]:
@@ -246,8 +254,8 @@ def _of_error() -> set[str]:
 
 
 def _durations(moves: pd.DataFrame) -> list[float]:
-    """Of minimum-jerk motions, by their names [s]."""
-    return [float(each.split()[2]) for each in moves["reference"]]
+    """Durations of minimum-jerk motions, by their names [s]."""
+    return [float(label.split()[2]) for label in moves["reference"]]
 
 
 def printed(claim: Claim) -> Ends:
@@ -260,57 +268,57 @@ def printed(claim: Claim) -> Ends:
 
 def _explained(growth: Finding) -> Finding:
     """An explanation of an error fails where what it adds is less, or more, than what it is to explain."""
-    said = {"better than the paper": "explains too little", "worse than the paper": "explains too much"}
-    if growth.verdict not in said:
+    wording = {"better than the paper": "explains too little", "worse than the paper": "explains too much"}
+    if growth.verdict not in wording:
         return growth
-    return growth._replace(verdict="does not hold", reason=growth.reason or said[growth.verdict])
+    return growth._replace(verdict="does not hold", reason=growth.reason or wording[growth.verdict])
 
 
 def _by_equation(claim: Claim) -> Finding:
     from wristctl.comparison.derived_claims import EQUATIONS
 
-    found = of_numbers(printed(claim), EQUATIONS[str(claim.metric)].ends(), claim.sense)
-    if found.verdict == "not specified enough":
-        return found._replace(reason="within the rounding of what is printed")
-    return found._replace(verdict="reproduced" if found.verdict == "reproduced" else "contradicted")
+    finding = of_numbers(printed(claim), EQUATIONS[str(claim.metric)].ends(), claim.sense)
+    if finding.verdict == "not specified enough":
+        return finding._replace(reason="within the rounding of what is printed")
+    return finding._replace(verdict="reproduced" if finding.verdict == "reproduced" else "contradicted")
 
 
 def _by_training(claim: Claim, metrics: Metrics | None) -> Finding:
     if metrics is None:
-        how = f"needs --{claim.evidence} with a run of `wristctl train {TRAININGS[claim.evidence]}`"
-        return Finding("open", reason=how)
-    own = metrics[str(claim.metric)]
-    middle = np.nan if own["value"] is None else float(own["value"])
-    ends = own.get("interval")
-    found = of_sample(printed(claim), middle, tuple(ends) if ends else None, claim.sense)
-    said = f"{claim.metric} is {middle:.3g}" + (f" (n = {own['n']})" if own.get("n") else "")
-    return found._replace(reason="; ".join(part for part in (found.reason, said) if part))
+        missing = f"needs --{claim.evidence} with a run of `wristctl train {TRAININGS[claim.evidence]}`"
+        return Finding("open", reason=missing)
+    metric = metrics[str(claim.metric)]
+    middle = np.nan if metric["value"] is None else float(metric["value"])
+    ends = metric.get("interval")
+    finding = of_sample(printed(claim), middle, tuple(ends) if ends else None, claim.sense)
+    measured = f"{claim.metric} is {middle:.3g}" + (f" (n = {metric['n']})" if metric.get("n") else "")
+    return finding._replace(reason="; ".join(part for part in (finding.reason, measured) if part))
 
 
-def _by_trials(claim: Claim, done: TrialsDone | None) -> Finding:
-    if done is None:
+def _by_trials(claim: Claim, trials_done: TrialsDone | None) -> Finding:
+    if trials_done is None:
         return Finding("open", reason="needs --hardware with a run of `wristctl hw-run`")
-    trials = done.trials
-    own = trials[
+    trials = trials_done.trials
+    selected = trials[
         (trials["controller"] == "smc") & (trials["outcome"] == "ok") & ((trials["push"] != 0.0) == claim.pushed)
     ]
     if claim.direction is not None:
-        own = own[own["direction"] == claim.direction]
-    if own.empty:
+        selected = selected[selected["direction"] == claim.direction]
+    if selected.empty:
         where = (
             f" {'pushed ' * claim.pushed}toward {claim.direction}" if claim.direction else " with a push" * claim.pushed
         )
         return Finding("open", reason=f"no trial of the paper's law{where} in this run")
-    values = own[str(claim.metric)].to_numpy(float)
+    values = selected[str(claim.metric)].to_numpy(float)
     if claim.metric == "settling_after":
-        found = of_settling(printed(claim), [float(np.mean(values))], [done.motion])
+        finding = of_settling(printed(claim), [float(np.mean(values))], [trials_done.motion])
     else:
-        found = of_numbers(printed(claim), [float(np.mean(values))])
-    rig = "an emulated rig" if done.emulated else "a rig"
-    gains = ", ".join(f"smc/{each}" for each in dict.fromkeys(own["gains"]))
-    said = f"mean of {len(own)} trials of {gains} on {rig}"
-    return found._replace(
-        reason="; ".join(part for part in (said, found.reason) if part), mark="emulated" * done.emulated
+        finding = of_numbers(printed(claim), [float(np.mean(values))])
+    rig = "an emulated rig" if trials_done.emulated else "a rig"
+    gains = ", ".join(f"smc/{preset}" for preset in dict.fromkeys(selected["gains"]))
+    measured = f"mean of {len(selected)} trials of {gains} on {rig}"
+    return finding._replace(
+        reason="; ".join(part for part in (measured, finding.reason) if part), mark="emulated" * trials_done.emulated
     )
 
 
@@ -339,12 +347,12 @@ def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
             "verdict": j.verdict or "",
         }
         for name in loops or [""]:
-            each = j.found.get(name) or j.found.get("")
+            finding = j.found.get(name) or j.found.get("")
             row |= {
-                f"{name}_verdict".strip("_"): each.verdict if each else "",
-                "_".join(part for part in (name, "low") if part): each.low if each else np.nan,
-                "_".join(part for part in (name, "high") if part): each.high if each else np.nan,
-                "_".join(part for part in (name, "mark") if part): each.mark if each else "",
+                f"{name}_verdict".strip("_"): finding.verdict if finding else "",
+                "_".join(part for part in (name, "low") if part): finding.low if finding else np.nan,
+                "_".join(part for part in (name, "high") if part): finding.high if finding else np.nan,
+                "_".join(part for part in (name, "mark") if part): finding.mark if finding else "",
             }
         rows.append(row | {"shown_by": ", ".join(j.shown_by), "reason": j.reason})
     return pd.DataFrame(rows)

@@ -31,10 +31,10 @@ from wristctl.simulation.repetitions import Repeated
 if TYPE_CHECKING:
     import pandas as pd
 
+# Seed stream of the resampling: the same rows give the same intervals.
 _STREAM = 20_041
-"""Of the resampling: the same rows give the same intervals."""
+# Inverses in order of preference for judging a class: control is judged by itself, and a network's error by `train`.
 _INVERSES = ("none", "closed-form", "network")
-"""Which of several a class is judged through: control is judged by itself, and a network's error by `train`."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class ClassStanding:
     """Rows over the cells of one class: every loop, motion and direction of it; or over the worlds of a family."""
 
     name: str
-    """Of the class; with `, steps` where the motions are jumps."""
+    """Name of the class; with `, steps` where the motions are jumps."""
     cells: str
-    """What rows are compared over, counted: 8 motions, 30 repetitions, 60 worlds."""
+    """Number and kind of the cells in which rows are compared: 8 motions, 30 repetitions, 60 worlds."""
     labels: list[str]
     """controller/gains of each row."""
     loops: list[str]
@@ -53,7 +53,7 @@ class ClassStanding:
     """RMSE [rad] over W motions, repetitions or worlds, (R, W); inf where the row failed."""
     standing: Standing
     means: list[GeometricMean]
-    """Of each row's RMSE [rad]; a failure counts as 90 deg."""
+    """Geometric mean of each row's RMSE [rad]; a failure counts as 90 deg."""
     swing: Array
     """Half of the largest swing at rest [rad], (R,); 0 where all rest."""
     peak: Array
@@ -61,9 +61,9 @@ class ClassStanding:
     away: NDArray[np.int_]
     """In how many motions each row stays within its range and does not arrive, (R,)."""
     motions: int
-    """How many motions there are."""
+    """Number of motions."""
     chatter: Array
-    """How often a row's tensions go from limit to limit and back where it chatters, at most, (R,) [1/s]; else 0."""
+    """Largest rate at which a chattering row's tensions go from limit to limit and back, (R,) [1/s]; else 0."""
     unsound: dict[str, NDArray[np.int_]]
     """In how many of the W each row, where it does not fail, is in a limit cycle, chatters, or has not converged, (R,)
     each."""
@@ -71,63 +71,63 @@ class ClassStanding:
     """Whether they are steps."""
 
     def of(self, results: Sequence[ComparedRow]) -> list[ComparedRow]:
-        """Those of a comparison's rows that are in this class and of its kind of motion."""
-        return [each for each in results if each.loop in self.loops and each.jumps == self.jumps]
+        """Rows of a comparison in this class with its kind of motion."""
+        return [result for result in results if result.loop in self.loops and result.jumps == self.jumps]
 
     def best(self, controller: str) -> int | None:
         """The best row of a controller; None where it has none."""
         return next((row for row in self.standing.order if self.labels[row].split("/")[0] == controller), None)
 
-    def times_better(self, row: int, other: int) -> GeometricMean:
-        """How many times less one row's RMSE is than another's in the same cells."""
-        known = penalised(self.scores)
-        return paired_ratio(known[other], known[row], _STREAM)
+    def times_better(self, row: int, reference_row: int) -> GeometricMean:
+        """Ratio of a reference row's RMSE to another row's in the same cells."""
+        penalised_scores = penalised(self.scores)
+        return paired_ratio(penalised_scores[reference_row], penalised_scores[row], _STREAM)
 
 
 def class_standings(
     results: Sequence[ComparedRow], settings: CompareSettings, wrist: WristParameters
 ) -> list[ClassStanding]:
     """The rows of a comparison in each class of conditions that it has, in the order of CLASSES, steps last."""
-    through = next(each for each in _INVERSES if any(result.inverse == each for result in results))
+    through = next(inverse for inverse in _INVERSES if any(result.inverse == inverse for result in results))
     classes = {name: class_of(loop, wrist) for name, loop in settings.loops.items()}
-    own = [result for result in results if result.inverse == through]
-    found = []
+    compared = [result for result in results if result.inverse == through]
+    standings = []
     for jumps in (False, True):
         for name in CLASSES:
-            if here := [result for result in own if classes[result.loop] == name and result.jumps == jumps]:
-                found.append(_standing(f"{name}, steps" if jumps else name, here, jumps))
-    return found
+            if in_class := [result for result in compared if classes[result.loop] == name and result.jumps == jumps]:
+                standings.append(_standing(f"{name}, steps" if jumps else name, in_class, jumps))
+    return standings
 
 
 def _standing(name: str, results: Sequence[ComparedRow], jumps: bool) -> ClassStanding:
     """Rows of one class; over its motions, or over repetitions where all motions have more of them."""
     labels = list(dict.fromkeys(result.label for result in results))
     cells = list(dict.fromkeys((result.loop, result.reference) for result in results))
-    at = {(each.label, each.loop, each.reference): each.repeated for each in results}
-    table = [[at[label, *cell] for cell in cells] for label in labels]
-    repetitions = {len(each.failed) for row in table for each in row}
+    repeated = {(result.label, result.loop, result.reference): result.repeated for result in results}
+    table = [[repeated[label, *cell] for cell in cells] for label in labels]
+    repetitions = {len(cell.failed) for row in table for cell in row}
     redrawn = len(repetitions) == 1 and max(repetitions) > len(cells)
-    logs = [[np.log(_rmse(each)) for each in row] for row in table]
-    scores = np.exp([np.mean(row, axis=0) if redrawn else [each.mean() for each in row] for row in logs])
-    ripples = [[_ripple(each) for each in row] for row in table]
-    ripple = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in ripples])
-    tensions = [[_chatter(each) for each in row] for row in table]
-    slams = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in tensions])
-    drift = [[each.metrics.get("drift", np.zeros(len(each.failed))) for each in row] for row in table]
-    drifts = np.array([np.max(row, axis=0) if redrawn else [each.max() for each in row] for row in drift]) > 0.0
+    logs = [[np.log(_rmse(cell)) for cell in row] for row in table]
+    scores = np.exp([np.mean(row, axis=0) if redrawn else [log_rmse.mean() for log_rmse in row] for row in logs])
+    ripples = [[_ripple(cell) for cell in row] for row in table]
+    ripple = np.array([np.max(row, axis=0) if redrawn else [values.max() for values in row] for row in ripples])
+    tensions = [[_chatter(cell) for cell in row] for row in table]
+    slams = np.array([np.max(row, axis=0) if redrawn else [values.max() for values in row] for row in tensions])
+    drift = [[cell.metrics.get("drift", np.zeros(len(cell.failed))) for cell in row] for row in table]
+    drifts = np.array([np.max(row, axis=0) if redrawn else [values.max() for values in row] for row in drift]) > 0.0
     unsound: dict[str, NDArray[np.bool_]] = {
         "limit cycle": ripple > 0.0,
         "chatters": slams > 0.0,
         "not converged": drifts,
     }
-    away = np.array([sum(not each.arrives and not each.failed.any() for each in row) for row in table])
-    peak = np.array([max(each.beyond for each in row) for row in table])
-    what = "repetition" if redrawn else "motion"
+    away = np.array([sum(not cell.arrives and not cell.failed.any() for cell in row) for row in table])
+    peak = np.array([max(cell.beyond for cell in row) for row in table])
+    unit = "repetition" if redrawn else "motion"
     return ClassStanding(
-        name, f"{scores.shape[1]} {what}{'s' * (scores.shape[1] > 1)}", labels,
+        name, f"{scores.shape[1]} {unit}{'s' * (scores.shape[1] > 1)}", labels,
         list(dict.fromkeys(loop for loop, _ in cells)), scores,
         standing(scores, np.any(list(unsound.values()), axis=0), _STREAM, short=away > 0, unphysical=peak > 0.0),
-        [geometric_mean(each, _STREAM) for each in penalised(scores)],
+        [geometric_mean(row_scores, _STREAM) for row_scores in penalised(scores)],
         ripple.max(axis=1), peak, away, len(cells), slams.max(axis=1), _counted(unsound, scores), jumps,
     )  # fmt: skip
 
@@ -145,51 +145,51 @@ def _ripple(repeated: Repeated) -> Array:
 
 
 def _chatter(repeated: Repeated) -> Array:
-    """How often each repetition's tensions go from limit to limit and back, where it chatters [1/s]; else 0."""
+    """Rate at which a chattering repetition's tensions go from limit to limit and back [1/s]; else 0."""
     return chatter(repeated.metrics.get("chattering", np.zeros(len(repeated.failed))), repeated.tension_range)
 
 
 def _counted(unsound: dict[str, NDArray[np.bool_]], scores: Array) -> dict[str, NDArray[np.int_]]:
-    """Of what holds (R, W) how often it does where a row does not fail, (R,)."""
+    """Number of cells (R,) in which a flag (R, W) holds and the row does not fail."""
     return {name: (holds & np.isfinite(scores)).sum(axis=1) for name, holds in unsound.items()}
 
 
-def of_ranking(found: WorldRanking) -> ClassStanding:
-    """The same of a ranking over worlds."""
-    every, none = [row.measured for row in found.rows], np.zeros(len(found.rows))
+def of_ranking(ranking: WorldRanking) -> ClassStanding:
+    """Standing of a class from a ranking over worlds."""
+    every, none = [row.measured for row in ranking.rows], np.zeros(len(ranking.rows))
     swings, slams = (
-        [each.metrics["oscillation"] * each.limit_cycles for each in every],
-        [each.chatter for each in every],
+        [measured.metrics["oscillation"] * measured.limit_cycles for measured in every],
+        [measured.chatter for measured in every],
     )
     cases = {
-        "limit cycle": [each.limit_cycles for each in every],
-        "chatters": [each > 0.0 for each in slams],
-        "not converged": [each.unconverged for each in every],
+        "limit cycle": [measured.limit_cycles for measured in every],
+        "chatters": [slam > 0.0 for slam in slams],
+        "not converged": [measured.unconverged for measured in every],
     }
-    shape = len(every), found.worlds, -1
-    worlds = {name: np.asarray(np.reshape(each, shape).any(axis=2)) for name, each in cases.items()}
-    scores = np.array([row.rmse for row in found.rows])
+    shape = len(every), ranking.worlds, -1
+    worlds = {name: np.asarray(np.reshape(flags, shape).any(axis=2)) for name, flags in cases.items()}
+    scores = np.array([row.rmse for row in ranking.rows])
     return ClassStanding(
-        found.name, f"{found.worlds} worlds", [row.label for row in found.rows], [],
-        scores, found.standing, found.means, np.array([np.nanmax(each, initial=0.0) for each in swings]),
-        none, none.astype(int), found.motions, np.array([each.max(initial=0.0) for each in slams]),
-        _counted(worlds, scores), found.jumps,
+        ranking.name, f"{ranking.worlds} worlds", [row.label for row in ranking.rows], [],
+        scores, ranking.standing, ranking.means, np.array([np.nanmax(swing, initial=0.0) for swing in swings]),
+        none, none.astype(int), ranking.motions, np.array([slam.max(initial=0.0) for slam in slams]),
+        _counted(worlds, scores), ranking.jumps,
     )  # fmt: skip
 
 
-def standings_frame(found: Sequence[ClassStanding]) -> pd.DataFrame:
+def standings_frame(standings: Sequence[ClassStanding]) -> pd.DataFrame:
     """A row for each row of each class, in order: its group, what becomes of it, its mean, and how often it is lost."""
     import pandas as pd
 
     lines = []
-    for each in found:
-        stands = each.standing
+    for class_standing in standings:
+        stands = class_standing.standing
         for row in stands.order:
-            mean, lost = each.means[row], stands.lost[row]
+            mean, lost = class_standing.means[row], stands.lost[row]
             lines.append(
                 {
-                    "class": each.name,
-                    "row": each.labels[row],
+                    "class": class_standing.name,
+                    "row": class_standing.labels[row],
                     "group": stands.group(row),
                     "fate": stands.fate(row),
                     "rmse": mean.value,
@@ -200,11 +200,11 @@ def standings_frame(found: Sequence[ClassStanding]) -> pd.DataFrame:
                     "swings": stands.swings[row].times,
                     "lost_low": lost.low,
                     "lost_high": lost.high,
-                    "motions": each.motions,
-                    "does_not_arrive": int(each.away[row]),
-                    "swing": each.swing[row],
-                    "chatter": each.chatter[row],
-                    "peak": each.peak[row],
+                    "motions": class_standing.motions,
+                    "does_not_arrive": int(class_standing.away[row]),
+                    "swing": class_standing.swing[row],
+                    "chatter": class_standing.chatter[row],
+                    "peak": class_standing.peak[row],
                 }
             )
     return pd.DataFrame(lines)

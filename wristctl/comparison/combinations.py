@@ -90,18 +90,20 @@ class ReferenceCourse:
 
 
 def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
-    """What the study's `compare` section asks for: every row follows each course of each of these."""
+    """Conditions of the study's `compare` section: every row follows every course of every condition."""
     chosen = study.compare
     return [
-        Condition(name, own, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network))
+        Condition(
+            name, facing_loop, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network)
+        )
         for name, loop in chosen.loops.items()
         for direction in chosen.directions
-        for wrist, own in [loop_facing(study.wrist, loop, direction)]
+        for wrist, facing_loop in [loop_facing(study.wrist, loop, direction)]
     ]
 
 
 def count_rollouts(chosen: CompareSettings) -> int:
-    """How many rollouts the section asks for."""
+    """Number of rollouts in a `compare` section."""
     courses = len(chosen.directions) * len(chosen.references) * len(chosen.inverses)
     times = [chosen.repetitions if is_random(loop) else 1 for loop in chosen.loops.values()]
     return len(chosen.rows) * courses * sum(times)
@@ -135,15 +137,15 @@ def compare(
                 if progress is not None:
                     progress(base + share / (len(names) * len(conditions)))
 
-            done = repeat(
+            repetitions = repeat(
                 controller(name), batch, motions, which, condition.loop, condition.wrist, scenarios, draws,
                 chosen.repetitions, progress=report,
             )  # fmt: skip
-            for index, repeated in enumerate(done):
+            for index, repeated in enumerate(repetitions):
                 row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]
-                own = repeated.labelled(f"{name}/{row.gains_name}")
-                found = (condition.name, course.reference, course.inverse, name, row.gains_name)
-                results.append(ComparedRow(*found, own, course.jumps))
+                labelled = repeated.labelled(f"{name}/{row.gains_name}")
+                combination = (condition.name, course.reference, course.inverse, name, row.gains_name)
+                results.append(ComparedRow(*combination, labelled, course.jumps))
     return _in_order(results, chosen)
 
 
@@ -151,14 +153,14 @@ def _courses(
     study: Study, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
 ) -> list[ReferenceCourse]:
     chosen = study.compare
-    found: list[ReferenceCourse] = []
+    reference_courses: list[ReferenceCourse] = []
     for reference in chosen.references:
         for inverse in chosen.inverses:
-            own = toward(reference, direction).model_copy(update={"inverse": inverse})
+            directed = toward(reference, direction).model_copy(update={"inverse": inverse})
             name, scenario = course_name(reference, direction, chosen), scenario_of(reference, direction)
-            course = motion(own, wrist, chosen.horizon, period, network)
-            found.append(ReferenceCourse(name, inverse, scenario, course, jumps(reference)))
-    return found
+            course = motion(directed, wrist, chosen.horizon, period, network)
+            reference_courses.append(ReferenceCourse(name, inverse, scenario, course, jumps(reference)))
+    return reference_courses
 
 
 def course_name(reference: Reference, direction: DirectionName, chosen: CompareSettings) -> str:
@@ -182,10 +184,10 @@ def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[C
     )
 
 
+# From what a law is designed for to what it meets.
 CLASSES = ("ideal", "sampled", "camera and tendons", "pushed", "off-nominal")
-"""From what a law is designed for to what it meets."""
+# Control period [s] up to which a torque is held so briefly that a law need not know of it.
 _CONTINUOUS = 1e-4
-"""Control period [s] up to which a torque is held so briefly that a law need not know of it."""
 
 
 def class_of(loop: Loop, wrist: WristParameters) -> str:
@@ -195,8 +197,8 @@ def class_of(loop: Loop, wrist: WristParameters) -> str:
     not what its controller believes. ideal: it is, to the last segment, in nearly continuous time and without a limit
     of tension. sampled: the rest.
     """
-    acting = [each for each in DISTURBANCES.values() if each.acts(loop.disturbances)]
-    if any(each.force is not None for each in acting):
+    acting = [disturbance for disturbance in DISTURBANCES.values() if disturbance.acts(loop.disturbances)]
+    if any(disturbance.force is not None for disturbance in acting):
         return "pushed"
     if loop.actuator.level == "tendon" or loop.sensor.level == "camera":
         return "camera and tendons"
@@ -206,8 +208,8 @@ def class_of(loop: Loop, wrist: WristParameters) -> str:
     return "ideal" if nearly else "sampled"
 
 
+# Wrist parameters that the paper prints. Those that it does not print (C10) are free.
 _PRINTED = ("discs", "springs", "tendons", "stiffness", "damping")
-"""Of the wrist what the paper prints; what it does not (C10) may be anything."""
 _MOVE_DEG = 30.0
 
 
@@ -220,8 +222,8 @@ def paper_cells(study: Study) -> frozenset[tuple[str, str]]:
     if any(_differs(study.wrist, name) for name in _PRINTED):
         return frozenset()
     loops = [name for name, loop in chosen.loops.items() if class_of(loop, study.wrist) in ("ideal", "sampled")]
-    moves = [each for each in chosen.references if _papers_move(each)]
-    names = [course_name(each, "ulnar", chosen) for each in moves if "ulnar" in chosen.directions]
+    moves = [reference for reference in chosen.references if _papers_move(reference)]
+    names = [course_name(reference, "ulnar", chosen) for reference in moves if "ulnar" in chosen.directions]
     return frozenset((loop, name) for loop in loops for name in names)
 
 

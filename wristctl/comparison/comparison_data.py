@@ -39,13 +39,14 @@ def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[
         np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
     ]
     stacked = {
-        name: np.stack([each[own] for each, own in zip(values, kept, strict=True)]) for name, values in columns.items()
+        name: np.stack([values_of_run[indices] for values_of_run, indices in zip(values, kept, strict=True)])
+        for name, values in columns.items()
     }
     return stacked | {"segment_theta": stacked["segment_theta"].astype(np.float32)}
 
 
 def _kept(times: Sequence[NDArray[np.float64]], every: int) -> list[NDArray[np.intp]]:
-    """Which samples of each course are kept: at instants that all have in common, as nearly as they can."""
+    """Indices of the kept samples of each course, at instants as nearly common to all as possible."""
     steps = [float(time[1] - time[0]) for time in times]
     apart = max(every * min(steps), max(steps))
     end = min(float(time[-1]) for time in times)

@@ -1,4 +1,4 @@
-"""What the paper's own equations and tables come to, worked out: evidence that asks for no rollout.
+"""Consequences of the paper's own equations and tables: evidence that asks for no rollout.
 
 What they take from print is rounded to its last digit, so that each comes to a range.
 """
@@ -16,13 +16,13 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
 
+# Time constants until 2 % are left.
 _TWO_PERCENT = math.log(50.0)
-"""Time constants until 2 % are left."""
 _STEP = math.radians(30.0)
+# The longest horizon that is granted to T2 [s]: the longer, the less its bound asks for.
 _HORIZON = 10.0
-"""The longest horizon that is granted to T2 [s]: the longer, the less its bound asks for."""
+# The narrowest usual settling band, likewise.
 _BAND = 0.01
-"""The narrowest usual settling band, likewise."""
 
 
 def chain_difference() -> float:
@@ -30,11 +30,13 @@ def chain_difference() -> float:
     from wristctl.wrist.augmented import frames, joints
     from wristctl.wrist.kinematics import chain_tip
 
-    length, found = 0.08, 0.0
+    length, largest_error = 0.08, 0.0
     for theta in np.radians(np.linspace(-90.0, 90.0, 37)):
         mu, _, _ = joints([theta], length)
-        found = max(found, float(np.abs(frames(mu)[-1][:2, 2] - chain_tip(np.array([[theta]]), length)[0]).max()))
-    return found
+        largest_error = max(
+            largest_error, float(np.abs(frames(mu)[-1][:2, 2] - chain_tip(np.array([[theta]]), length)[0]).max())
+        )
+    return largest_error
 
 
 def time_to_settle(slow: float, fast: float) -> float:
@@ -70,12 +72,13 @@ class Equation(NamedTuple):
 
     def ends(self) -> Ends:
         """Between which it comes out, over all that the printed digits may stand for."""
-        found = [self.of(*corner) for corner in product(*(rounded(each) for each in self.printed))]
-        return Ends(min(found), max(found))
+        corners = [self.of(*corner) for corner in product(*(rounded(number) for number in self.printed))]
+        return Ends(min(corners), max(corners))
 
 
 _SMC, _PID = SMC.presets["printed"], PID.presets["printed"]
 
+# By the name that a claim's `metric` gives.
 EQUATIONS: dict[str, Equation] = {
     "chain_difference": Equation(chain_difference),
     # C1: the springs and dampers alone, by words and by units
@@ -90,4 +93,3 @@ EQUATIONS: dict[str, Equation] = {
         f"rmse_over_steady_{name}": Equation(operator.truediv, (row.rmse, row.steady_state)) for name, row in T2.items()
     },
 }
-"""By the name that a claim's `metric` gives."""

@@ -13,13 +13,13 @@ from wristctl.arrays import Array
 from wristctl.seeds import Entropy
 
 LEVEL = 0.95
+# Worlds below which no interval is given: it would hold the truth too seldom, whatever its level.
 FEWEST_WORLDS = 8
-"""Worlds below which no interval is given: it would hold the truth too seldom, whatever its level."""
 _RESAMPLES, _AT_ONCE = 9999, 500
+# RMSE [rad] that a failure counts as in means.
 FAILURE = float(np.deg2rad(90.0))
-"""RMSE [rad] that a failure counts as in means."""
+# RMSE [rad] below which errors are equal: no rig measures less, and a simulation has its own rounding there.
 MEASURABLE = float(np.deg2rad(0.001))
-"""RMSE [rad] below which errors are equal: no rig measures less, and a simulation has its own rounding there."""
 _GRID = 2.0**-40
 
 
@@ -49,10 +49,10 @@ def penalised(scores: ArrayLike, failure: float = FAILURE, floor: float = MEASUR
     and stay when a row joins: the penalised average of algorithm configuration (Hutter et al., J. Artif. Intell. Res.
     36 (2009) 267). ValueError for a score that is not positive.
     """
-    given = np.asarray(scores, float)
-    if not failure > 0.0 or np.any(given <= 0.0):
+    score_array = np.asarray(scores, float)
+    if not failure > 0.0 or np.any(score_array <= 0.0):
         raise ValueError("geometric means are of positive scores")
-    return np.maximum(np.where(given < failure, given, failure), floor)
+    return np.maximum(np.where(score_array < failure, score_array, failure), floor)
 
 
 def on_grid(logarithms: Array) -> Array:
@@ -78,22 +78,22 @@ class Resampled:
         """Ends of the means' intervals, (2, m); without end for fewer worlds than FEWEST_WORLDS."""
         if not self._enough:
             return np.stack([np.full(len(self.means), -np.inf), np.full(len(self.means), np.inf)])
-        found = np.stack([self.means, self.means])
+        interval = np.stack([self.means, self.means])
         if self._varied.any():
-            found[:, self._varied] = self._bca(_widened(level, self._rows.shape[1]))
-        return found
+            interval[:, self._varied] = self._bca(_widened(level, self._rows.shape[1]))
+        return interval
 
     def _bca(self, level: float) -> Array:
         from scipy.stats import bootstrap
 
-        found: Any = bootstrap(
+        resampled: Any = bootstrap(
             (self._rows[self._varied],), np.mean, axis=-1, batch=_AT_ONCE, confidence_level=level, method="BCa",
             n_resamples=_RESAMPLES, rng=np.random.default_rng(self._seed),
         )  # fmt: skip
-        return np.stack(found.confidence_interval)
+        return np.stack(resampled.confidence_interval)
 
     def estimates(self, level: float = LEVEL) -> list[GeometricMean]:
-        """Each row's exponential with its interval."""
+        """Geometric mean of each row with its interval."""
         ends = zip(np.exp(self.means), *np.exp(self.intervals(level)), strict=True)
         return [GeometricMean(float(value), float(low), float(high), level) for value, low, high in ends]
 
@@ -106,10 +106,14 @@ def _widened(level: float, n: int) -> float:
 
 
 def geometric_mean(scores: ArrayLike, seed: int | Entropy, level: float = LEVEL) -> GeometricMean:
-    """Of positive scores (W,) over worlds."""
+    """Geometric mean of positive scores (W,) over worlds, with its interval."""
     return Resampled(np.log(np.asarray(scores, float)), seed).estimates(level)[0]
 
 
-def paired_ratio(scores: ArrayLike, others: ArrayLike, seed: int | Entropy, level: float = LEVEL) -> GeometricMean:
+def paired_ratio(
+    scores: ArrayLike, other_scores: ArrayLike, seed: int | Entropy, level: float = LEVEL
+) -> GeometricMean:
     """Geometric mean of positive scores (W,) over that of others in the same worlds."""
-    return Resampled(np.log(np.asarray(scores, float)) - np.log(np.asarray(others, float)), seed).estimates(level)[0]
+    return Resampled(np.log(np.asarray(scores, float)) - np.log(np.asarray(other_scores, float)), seed).estimates(
+        level
+    )[0]

@@ -1,4 +1,4 @@
-"""Which rows may be best: the model confidence set of Hansen, Lunde and Nason (Econometrica 79 (2011) 453).
+"""Rows that may be best: the model confidence set of Hansen, Lunde and Nason (Econometrica 79 (2011) 453).
 
 All pairs of rows are compared on the same worlds by the largest of their statistics (max-T), whose joint distribution
 comes of flips of the signs of whole worlds. So the rate at which an equally good row is left out does not grow with
@@ -15,12 +15,12 @@ from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import LEVEL, on_grid
 from wristctl.seeds import Entropy
 
+# Worlds or motions below which no outcome tells two rows apart: 2 of 2^5 flips are 6 %, and 2 of 2^6 are 3 %.
 LEAST_PAIRS = 6
-"""Worlds or motions below which no outcome tells two rows apart: 2 of 2^5 flips are 6 %, and 2 of 2^6 are 3 %."""
 _FLIPS, _AT_ONCE = 4999, 500
 _MOST_SKEWED = 2.0
+# Worlds up to which all flips are tried, half of which mirror the other half.
 _EVERY_FLIP = 13
-"""Worlds up to which all flips are tried, half of which mirror the other half."""
 
 
 class PairedComparisons:
@@ -32,17 +32,17 @@ class PairedComparisons:
     """
 
     def __init__(self, logarithms: Array, seed: int | Entropy) -> None:
-        known = on_grid(logarithms)
-        self._means: Array = known.mean(axis=1)
-        self._pairs = np.array(list(combinations(range(len(known)), 2)), int).reshape(-1, 2)
-        self._differences: Array = known[self._pairs[:, 0]] - known[self._pairs[:, 1]]
+        gridded = on_grid(logarithms)
+        self._means: Array = gridded.mean(axis=1)
+        self._pairs = np.array(list(combinations(range(len(gridded)), 2)), int).reshape(-1, 2)
+        self._differences: Array = gridded[self._pairs[:, 0]] - gridded[self._pairs[:, 1]]
         self._statistics = _flipped(self._differences, seed)
-        """Of each flip and pair, (F, P); the first flip leaves all signs as they are."""
-        self._level = (1.0 - LEVEL) * (1.0 - 2.0 / known.shape[1])
+        """Statistic of every sign flip and pair, (F, P); the first flip leaves all signs as they are."""
+        self._level = (1.0 - LEVEL) * (1.0 - 2.0 / gridded.shape[1])
         """Share of the flips; less than 5 % for few worlds, of which the rare bad ones may all be missing."""
 
     def best(self, rows: Sequence[int]) -> list[int]:
-        """Those of the rows that may be best, the best first: with 95 % all that are as good as the best of them.
+        """Rows that may be best, the best first: with 95 % all that are as good as the best of them.
 
         While the largest statistic among those left is larger than in all but `_level` of the flips, its worse row
         goes.
@@ -75,13 +75,13 @@ class PairedComparisons:
 def _flipped(differences: Array, seed: int | Entropy) -> Array:
     """Size of each pair's statistic, in standard deviations of its differences (P, W), under every flip, (F, P)."""
     signs = _signs(differences.shape[1], seed)
-    found = np.empty((len(signs), len(differences)))
+    statistics = np.empty((len(signs), len(differences)))
     squares, cubes = (differences**2).mean(axis=1), differences**3
     for first in range(0, len(signs), _AT_ONCE):
         some = signs[first : first + _AT_ONCE]
         n = some.shape[1]
-        found[first : first + _AT_ONCE] = _transformed(some @ differences.T / n, squares, some @ cubes.T / n, n)
-    return found
+        statistics[first : first + _AT_ONCE] = _transformed(some @ differences.T / n, squares, some @ cubes.T / n, n)
+    return statistics
 
 
 def _transformed(first: Array, second: Array, third: Array, n: int) -> Array:
@@ -98,8 +98,8 @@ def _transformed(first: Array, second: Array, third: Array, n: int) -> Array:
         skewness = (third - first * (3.0 * second - 2.0 * first * first)) / (variance * deviation)
         skewness = np.clip((1.0 + 6.0 / n) * skewness, -_MOST_SKEWED, _MOST_SKEWED)
         bent = skewness * t / 3.0
-        found = np.abs(t * (1.0 + bent * (1.0 + bent / 3.0)) + skewness / (6.0 * n))
-    return np.where(second > 0.0, found, 0.0)
+        statistics = np.abs(t * (1.0 + bent * (1.0 + bent / 3.0)) + skewness / (6.0 * n))
+    return np.where(second > 0.0, statistics, 0.0)
 
 
 @lru_cache(maxsize=4)

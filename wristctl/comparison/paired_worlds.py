@@ -1,4 +1,4 @@
-"""The same worlds twice: what a term of a law buys, and whether the order of laws hangs on their tuning."""
+"""Comparisons on the same worlds: what a term of a law buys, and whether the order of laws hangs on their tuning."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ _TERM_STREAM = 20_032
 
 
 class TermValue(NamedTuple):
-    """How many times less a row's error is than that of the row without the term, on a family's worlds."""
+    """Ratio of the errors without and with a term of a law, on a family's worlds."""
 
     term: str
     family: str
@@ -28,7 +28,7 @@ class TermValue(NamedTuple):
     @property
     def told(self) -> str:
         """The ratio with its interval; undecided where that holds 1, worse below; and the worlds that are lost."""
-        value, low, high = (_ratio(each) for each in self.times[:3])
+        value, low, high = (_ratio(ratio) for ratio in self.times[:3])
         word = "undecided " if self.times.is_one else "worse " if self.times.value < 1.0 else ""
         lost = f", lost {self.swings[0]} -> {self.swings[1]}" if any(self.swings) else ""
         return f"{word}{value} [{low}, {high}]{lost}"
@@ -40,17 +40,17 @@ def _ratio(value: float) -> str:
     return f"{value:.3f}" if 0.9 <= value <= 1.1 else plain(value)
 
 
-def term_values(found: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:
-    """Of the terms, by the labels of the rows without and with each, those of which the ranking has both."""
-    places, lost = {row.label: at for at, row in enumerate(found.rows)}, found.standing.lost
+def term_values(ranking: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> list[TermValue]:
+    """Value of every term whose rows without and with it are both in the ranking."""
+    places, lost = {row.label: index for index, row in enumerate(ranking.rows)}, ranking.standing.lost
     values = []
-    for term, (without, given) in terms.items():
-        if without in places and given in places:
-            pair = places[without], places[given]
-            scores, others = (penalised(found.rows[at].rmse) for at in pair)
-            times = paired_ratio(scores, others, _TERM_STREAM)
+    for term, (without, with_term) in terms.items():
+        if without in places and with_term in places:
+            pair = places[without], places[with_term]
+            scores, other_scores = (penalised(ranking.rows[index].rmse) for index in pair)
+            times = paired_ratio(scores, other_scores, _TERM_STREAM)
             values.append(
-                TermValue(term, found.name, without, given, times, (lost[pair[0]].times, lost[pair[1]].times))
+                TermValue(term, ranking.name, without, with_term, times, (lost[pair[0]].times, lost[pair[1]].times))
             )
     return values
 
@@ -59,7 +59,7 @@ _SHIFT_STREAM = 20_033
 
 
 class OrderShift(NamedTuple):
-    """What another way to tune does to the order of the same laws."""
+    """Change in the order of the same laws under another way to tune."""
 
     variant: str
     tau: float
@@ -68,7 +68,7 @@ class OrderShift(NamedTuple):
     resolved: int
     """Pairs of laws that can be told apart under both."""
     reversed: int
-    """Of these, pairs that change places."""
+    """Number of those pairs that change places."""
     best: tuple[str, str]
     """Before and after."""
     ratio: float
@@ -79,11 +79,11 @@ def order_shift(variant: str, before: list[RankedRow], after: list[RankedRow]) -
     """Compare rows of the same laws, in the same order, on the same worlds."""
     from scipy.stats import kendalltau
 
-    known, other = (np.log([penalised(row.rmse) for row in rows]) for rows in (before, after))
-    means = known.mean(axis=1), other.mean(axis=1)
-    signs = _signs(known) * _signs(other)
-    best = tuple(rows[int(np.argmin(each))].label for rows, each in zip((before, after), means, strict=True))
-    tau = float(kendalltau(*means).statistic) if len(known) > 1 else float("nan")
+    logs_before, logs_after = (np.log([penalised(row.rmse) for row in rows]) for rows in (before, after))
+    means = logs_before.mean(axis=1), logs_after.mean(axis=1)
+    signs = _signs(logs_before) * _signs(logs_after)
+    best = tuple(rows[int(np.argmin(mean))].label for rows, mean in zip((before, after), means, strict=True))
+    tau = float(kendalltau(*means).statistic) if len(logs_before) > 1 else float("nan")
     ratio = float(np.exp(np.mean(means[1] - means[0])))
     return OrderShift(
         variant, tau, len(signs), int(np.sum(signs != 0)), int(np.sum(signs < 0)), (best[0], best[1]), ratio
@@ -91,7 +91,7 @@ def order_shift(variant: str, before: list[RankedRow], after: list[RankedRow]) -
 
 
 def _signs(logarithms: Array) -> Array:
-    """Of each pair of rows who is better, 0 where that cannot be told."""
+    """Sign of the better row in every pair of rows; 0 where the worlds do not decide."""
     pairs = list(combinations(range(len(logarithms)), 2))
     if not pairs:
         return np.zeros(0)

@@ -36,12 +36,12 @@ T2: dict[str, Printed] = {
     "nc": Printed(5.0e-2, 1.02, 1.9e-2),
 }
 
+# The experiment: the mean of the directions, and two with a person's push (whose units are printed as m and s).
 EXPERIMENT: dict[str, Printed] = {
     "four directions": Printed(0.157, 3.0, 0.032),
     "pushed, radial": Printed(0.207, 3.0, 0.029),
     "pushed, flexion": Printed(0.291, 3.0, 0.031),
 }
-"""The experiment: the mean of the directions, and two with a person's push (whose units are printed as m and s)."""
 
 
 class TrainingColumn(NamedTuple):
@@ -61,19 +61,18 @@ T1: dict[str, TrainingColumn] = {
     "tanh": TrainingColumn(0.011, 98.8, 0.22, 0.09),
 }
 
+# RMSE and settling time within this factor of the paper's, steady-state error not above that, count as reproduced.
+#
+# The factor counts from the ends of what the printed digits may stand for (`rounded`). The paper states neither
+# reference, nor sampling, nor limits (C10), so a tighter band would claim more than it says.
 FACTOR = 1.5
-"""RMSE and settling time within this factor of the paper's, steady-state error not above that, count as reproduced.
-
-The factor counts from the ends of what the printed digits may stand for (`rounded`). The paper states neither
-reference, nor sampling, nor limits (C10), so a tighter band would claim more than it says.
-"""
 
 
 def verdict(controller: str, rmse: float, settling: float, steady_state: float) -> str:
     """`reproduced`, `not reproduced`, or "" for a controller that the paper does not have."""
     if controller not in T2:
         return ""
-    printed = [rounded(each) for each in T2[controller]]
+    printed = [rounded(number) for number in T2[controller]]
     within = all(
         math.isfinite(ours) and paper.low / FACTOR <= ours <= paper.high * FACTOR
         for ours, paper in zip((rmse, settling), printed, strict=False)

@@ -50,15 +50,15 @@ def deciding(yes: NDArray[np.bool_], values: Mapping[str, Sequence[Any]]) -> lis
     It is omega squared over bins, an estimate of the first-order Sobol index that is 0 on average where there is
     nothing to explain (Hays, Statistics (1963); Sobol', Math. Comput. Simul. 55 (2001) 271).
     """
-    found = [Leaf(name, _explained(yes.astype(float), _bins(each))) for name, each in values.items()]
-    return sorted(found, key=lambda leaf: -leaf.share)
+    leaves = [Leaf(name, _explained(yes.astype(float), _bins(column))) for name, column in values.items()]
+    return sorted(leaves, key=lambda leaf: -leaf.share)
 
 
 def _bins(values: Sequence[Any]) -> NDArray[np.int64]:
-    """Which bin each is in: of few values each its own, of many as many in each; infinity has its own."""
+    """Bin number of every value: one bin a value for few values, equally full bins for many; infinity has its own."""
     if isinstance(values[0], str) or len(set(values)) <= _BINS:
         known = {value: number for number, value in enumerate(dict.fromkeys(values))}
-        return np.array([known[each] for each in values])
+        return np.array([known[value] for value in values])
     numbers = np.array(values, float)
     finite = np.isfinite(numbers)
     edges = np.quantile(numbers[finite], np.linspace(0.0, 1.0, _BINS + 1)[1:-1])
@@ -83,18 +83,18 @@ def split(yes: NDArray[np.bool_], values: Sequence[float], seed: int = 0) -> Thr
     None where all say the same.
     """
     x = np.array(values, float)
-    known = np.isfinite(x)
-    order = np.argsort(x[known], kind="stable")
-    x, y = x[known][order], yes[known][order]
-    at = _threshold(x, y)
-    if at is None:
+    finite = np.isfinite(x)
+    order = np.argsort(x[finite], kind="stable")
+    x, y = x[finite][order], yes[finite][order]
+    threshold = _threshold(x, y)
+    if threshold is None:
         return None
     rng = np.random.default_rng(seed)
     drawn = [np.sort(rng.integers(0, len(x), len(x))) for _ in range(_RESAMPLES)]
-    again = [each for each in (_threshold(x[own], y[own]) for own in drawn) if each is not None]
+    again = [cut for cut in (_threshold(x[indices], y[indices]) for indices in drawn) if cut is not None]
     low, high = np.quantile(again, (0.025, 0.975))
-    under = x < at
-    return Threshold(at, float(low), float(high), float(y[under].mean()), float(y[~under].mean()))
+    under = x < threshold
+    return Threshold(threshold, float(low), float(high), float(y[under].mean()), float(y[~under].mean()))
 
 
 def _threshold(x: Array, y: NDArray[np.bool_]) -> float | None:
@@ -105,14 +105,14 @@ def _threshold(x: Array, y: NDArray[np.bool_]) -> float | None:
     if not possible.any() or y.all() or not y.any():
         return None
     best = int(np.where(possible, gain, -1.0).argmax())
-    one, other = float(x[best]), float(x[best + 1])
-    return float(np.sqrt(one * other)) if one > 0.0 else 0.5 * (one + other)
+    one, upper = float(x[best]), float(x[best + 1])
+    return float(np.sqrt(one * upper)) if one > 0.0 else 0.5 * (one + upper)
 
 
+# Evidence that draws give.
 IN_BOX = ("comparison", "ordering", "arrival", "together", "symmetry")
-"""Evidence that draws give."""
+# Share of the variance below which no unknown decides.
 _LEAST = 0.01
-"""Share of the variance below which no unknown decides."""
 
 
 @dataclass(frozen=True)
@@ -126,47 +126,48 @@ class Strip:
     leaves: Sequence[Leaf]
     """Unknowns by what they explain of whether the claim holds."""
     split: Threshold | None
-    """Of the first of them, where it is a number."""
+    """Threshold of the first leaf, where it is a number."""
     told: str
-    """Where the claim holds by the first of them, in words."""
+    """Description of where the claim holds by the first leaf."""
 
     def share(self, *verdicts: VerdictName) -> Share:
-        """Of the draws that have a verdict, those with one of these."""
-        return share(np.array([each in verdicts for each in self.verdicts if each is not None], bool))
+        """Share of the draws with one of these verdicts, among those that have a verdict."""
+        return share(np.array([verdict in verdicts for verdict in self.verdicts if verdict is not None], bool))
 
     @property
     def uncounted(self) -> int:
         """Draws that have none, since they did not converge."""
-        return sum(each is None for each in self.verdicts)
+        return sum(verdict is None for verdict in self.verdicts)
 
 
 def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
     """The rows that the claims need, each once; those of a symmetry are run to both sides."""
-    own = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
-    labels = dict.fromkeys(label for claim in own for label in (claim.label, claim.than) if label)
+    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
+    labels = dict.fromkeys(label for claim in boxed for label in (claim.label, claim.than) if label)
     return [Row(controller=name, gains=gains) for name, gains in (label.split("/") for label in labels)]
 
 
 def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None = None) -> list[Strip]:
     """Every claim that draws can judge, by those of its rows."""
-    own = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
+    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
     values = {name: drawn.values(name) for name in drawn.settings[0].values}
     found = []
-    for claim in own:
+    for claim in boxed:
         if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
             continue
         ratios, judged = _judged(claim, drawn, mirrored)
         sound = _converged(claim, drawn, mirrored)
-        verdicts = [each if counts else None for each, counts in zip(judged, sound, strict=True)]
-        yes = np.array([each == "reproduced" for each in judged])[sound]
+        verdicts = [verdict if counts else None for verdict, counts in zip(judged, sound, strict=True)]
+        yes = np.array([verdict == "reproduced" for verdict in judged])[sound]
         counted = {
-            name: [each for each, counts in zip(own, sound, strict=True) if counts] for name, own in values.items()
+            name: [value for value, counts in zip(column, sound, strict=True) if counts]
+            for name, column in values.items()
         }
         leaves = deciding(yes, counted) if sound.any() else []
         first = counted[leaves[0].name] if leaves and leaves[0].share >= _LEAST else []
         cut = split(yes, first) if first and not isinstance(first[0], str) else None
-        told = _worded(leaves[0].name, yes, first, cut) if first else ""
-        found.append(Strip(claim, ratios, verdicts, leaves, cut, told))
+        description = _worded(leaves[0].name, yes, first, cut) if first else ""
+        found.append(Strip(claim, ratios, verdicts, leaves, cut, description))
     return found
 
 
@@ -181,13 +182,13 @@ def _converged(claim: Claim, drawn: Reactions, mirrored: Reactions | None) -> ND
 
 
 def _worded(name: str, yes: NDArray[np.bool_], values: Sequence[Any], cut: Threshold | None) -> str:
-    """Where it holds by one unknown, with the shares there and elsewhere."""
+    """Description of where a claim holds by one unknown, with the shares there and elsewhere."""
     kept = np.array(values, object)
     if cut is None:
-        shares = {each: float(yes[kept == each].mean()) for each in dict.fromkeys(values)}
-        best = max(shares, key=lambda each: shares[each])
-        other = float(yes[kept != best].mean())
-        return f"{100 * shares[best]:.0f} % where {name} is {best}, {100 * other:.0f} % elsewhere"
+        shares = {value: float(yes[kept == value].mean()) for value in dict.fromkeys(values)}
+        best = max(shares, key=lambda value: shares[value])
+        other_share = float(yes[kept != best].mean())
+        return f"{100 * shares[best]:.0f} % where {name} is {best}, {100 * other_share:.0f} % elsewhere"
     parts = [f"{100 * cut.below:.0f} % where {name} < {cut.at:.3g}", f"{100 * cut.above:.0f} % above"]
     none = yes[kept == np.inf]
     return ", ".join([*parts, f"{100 * float(none.mean()):.0f} % where there is none"] if len(none) else parts)
@@ -201,22 +202,22 @@ def _judged(
         return _together(claim, drawn.found[claim.label])
     if claim.evidence == "arrival":
         missing = drawn.found[claim.label]["missing"]
-        return missing / SHORT, [of_numbers(SHORT, [each], "at most").verdict for each in missing]
+        return missing / SHORT, [of_numbers(SHORT, [shortfall], "at most").verdict for shortfall in missing]
     metric = "settling" if claim.metric == "settling_after" else str(claim.metric)
     ours = drawn.found[claim.label][metric]
     if claim.evidence == "symmetry":
         assert mirrored is not None
-        other = mirrored.found[claim.label][metric]
-        orders = [of_ordering([a], [b]) for a, b in zip(ours, other, strict=True)]
-        alike = [each.reason.startswith("alike") for each in orders]
-        return other / ours, ["reproduced" if each else "does not hold" for each in alike]
+        than_metric = mirrored.found[claim.label][metric]
+        orders = [of_ordering([a], [b]) for a, b in zip(ours, than_metric, strict=True)]
+        alike = [order.reason.startswith("alike") for order in orders]
+        return than_metric / ours, ["reproduced" if tied else "does not hold" for tied in alike]
     if claim.than is not None:
-        other = drawn.found[claim.than][metric]
+        than_metric = drawn.found[claim.than][metric]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = other / ours
-        return ratios, [of_ordering([a], [b]).verdict for a, b in zip(ours, other, strict=True)]
+            ratios = than_metric / ours
+        return ratios, [of_ordering([a], [b]).verdict for a, b in zip(ours, than_metric, strict=True)]
     assert claim.value is not None
-    return ours / claim.value, [of_numbers(printed(claim), [each], claim.sense).verdict for each in ours]
+    return ours / claim.value, [of_numbers(printed(claim), [value], claim.sense).verdict for value in ours]
 
 
 def _together(claim: Claim, ours: Mapping[str, NDArray[np.float64]]) -> tuple[NDArray[np.float64], list[VerdictName]]:
@@ -224,9 +225,9 @@ def _together(claim: Claim, ours: Mapping[str, NDArray[np.float64]]) -> tuple[ND
     row = T2[str(claim.controller)]._asdict()
     with np.errstate(divide="ignore"):
         ratios = np.exp(np.max([np.abs(np.log(ours[name] / value)) for name, value in row.items()], axis=0))
-    single = [[of_numbers(rounded(value), [each]).verdict for each in ours[name]] for name, value in row.items()]
-    held = [set(each) == {"reproduced"} for each in zip(*single, strict=True)]
-    return ratios, ["reproduced" if each else "does not hold" for each in held]
+    single = [[of_numbers(rounded(value), [number]).verdict for number in ours[name]] for name, value in row.items()]
+    held = [set(verdict_names) == {"reproduced"} for verdict_names in zip(*single, strict=True)]
+    return ratios, ["reproduced" if reproduced else "does not hold" for reproduced in held]
 
 
 def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
@@ -235,17 +236,17 @@ def strips_frame(found: Sequence[Strip]) -> pd.DataFrame:
     import pandas as pd
 
     rows = []
-    for each in found:
-        row: dict[str, Any] = {"claim": each.claim.id, "draws": len(each.verdicts), "not_converged": each.uncounted}
-        for key, own in (
-            ("reproduced", each.share("reproduced")),
-            ("better", each.share("better than the paper")),
-            ("fails", each.share(*FAILING)),
+    for strip in found:
+        row: dict[str, Any] = {"claim": strip.claim.id, "draws": len(strip.verdicts), "not_converged": strip.uncounted}
+        for key, proportion in (
+            ("reproduced", strip.share("reproduced")),
+            ("better", strip.share("better than the paper")),
+            ("fails", strip.share(*FAILING)),
         ):
-            row |= {key: own.value, f"{key}_low": own.low, f"{key}_high": own.high}
-        for at, leaf in enumerate(each.leaves[:2], start=1):
-            row |= {f"leaf_{at}": leaf.name, f"explained_{at}": leaf.share}
-        rows.append(row | {"decided": each.told})
+            row |= {key: proportion.value, f"{key}_low": proportion.low, f"{key}_high": proportion.high}
+        for rank, leaf in enumerate(strip.leaves[:2], start=1):
+            row |= {f"leaf_{rank}": leaf.name, f"explained_{rank}": leaf.share}
+        rows.append(row | {"decided": strip.told})
     return pd.DataFrame(rows)
 
 
@@ -255,7 +256,7 @@ def draws_frame(drawn: Reactions) -> pd.DataFrame:
 
     columns: dict[str, Any] = {name: drawn.values(name) for name in drawn.settings[0].values}
     readings: Mapping[str, Any] = {
-        f"{row} {name}": values for row, each in drawn.found.items() for name, values in each.items()
+        f"{row} {name}": values for row, metrics in drawn.found.items() for name, values in metrics.items()
     }
-    converged: Mapping[str, Any] = {f"{row} converged": each for row, each in drawn.converged.items()}
+    converged: Mapping[str, Any] = {f"{row} converged": flags for row, flags in drawn.converged.items()}
     return pd.DataFrame(columns | dict(readings) | dict(converged))

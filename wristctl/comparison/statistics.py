@@ -1,4 +1,4 @@
-"""What several repetitions say of a number."""
+"""Statistics of a number over several repetitions."""
 
 from typing import Any, NamedTuple
 
@@ -22,8 +22,8 @@ class Spread(NamedTuple):
         return None if self.n < FEWEST else (self.low, self.high)
 
 
+# Repetitions below which no interval holds the median with 95 %: half of them lie on one side of it all too often.
 FEWEST = 6
-"""Repetitions below which no interval holds the median with 95 %: half of them lie on one side of it all too often."""
 
 
 def spread(values: NDArray[np.float64]) -> Spread:
@@ -40,8 +40,8 @@ def spread(values: NDArray[np.float64]) -> Spread:
         return Spread(_never(median), np.nan, np.nan, n)
     from scipy.stats import quantile_test
 
-    found: Any = quantile_test(ordered, q=0.0, p=0.5).confidence_interval(LEVEL)
-    return Spread(_never(median), _never(float(found.low)), _never(float(found.high)), n)
+    interval: Any = quantile_test(ordered, q=0.0, p=0.5).confidence_interval(LEVEL)
+    return Spread(_never(median), _never(float(interval.low)), _never(float(interval.high)), n)
 
 
 def spread_over_time(courses: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
@@ -53,7 +53,7 @@ def spread_over_time(courses: NDArray[np.float64]) -> tuple[NDArray[np.float64],
         median = 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2])
     if ranks.interval is None:
         return median, np.full_like(median, np.nan), np.full_like(median, np.nan)
-    low, high = (ordered[int(each)] for each in ranks.interval)
+    low, high = (ordered[int(rank)] for rank in ranks.interval)
     return median, low, high
 
 

@@ -1,4 +1,4 @@
-"""What a control step costs on this machine: the law and its allocation, for one wrist."""
+"""Cost of a control step on this machine: the law and its allocation, for one wrist."""
 
 import time
 from typing import Any, NamedTuple
@@ -22,19 +22,19 @@ class StepTime(NamedTuple):
     p99: float
 
 
+# Chunks that are timed, and the steps of each: enough to hide the call.
 _CHUNKS, _STEPS = 400, 500
-"""Chunks that are timed, and the steps of each: enough to hide the call."""
+# Repetitions for plain Python, where the call costs little beside the step.
 _PLAIN_CHUNKS, _PLAIN_STEPS = 50, 2
-"""Of plain Python, where the call is nothing beside the step."""
 
 
 @kernel
 def _steps(law: Any, count: int, now: Any, wrist: Any, limits: Any, gains: Any, memory: Any) -> None:
-    known, view, signals = load_segments(rows_of(wrist)), now_of(now), rows_of(now)
+    segment_rows, view, signals = load_segments(rows_of(wrist)), now_of(now), rows_of(now)
     low, high = rows_of(limits)[0], rows_of(limits)[1]
     for _ in range(count):
         torque = law(view, wrist_of(wrist), rows_of(gains), rows_of(memory))
-        plus, minus = allocate(view.theta, known, torque, low, high)
+        plus, minus = allocate(view.theta, segment_rows, torque, low, high)
         signals[0] = view.theta + 0.0 * (plus - minus)  # the next step waits for this one, as in a loop
 
 

@@ -28,7 +28,7 @@ class Share(NamedTuple):
 
 
 def share(happened: NDArray[np.bool_]) -> Share:
-    """Of worlds (W,) in which something happened, with the interval of Clopper and Pearson (Biometrika 26 (1934) 404).
+    """Share of worlds (W,) with an event, with the interval of Clopper and Pearson (Biometrika 26 (1934) 404).
 
     It holds the true share in 95 % of cases or more, whatever that share: what lies outside of it is shown.
     """
@@ -47,24 +47,24 @@ def performance_profiles(scores: ArrayLike, factors: ArrayLike) -> Array:
 
     A failure (inf or nan) is within none, also where all fail. (Dolan and More, Math. Program. 91 (2002) 201.)
     """
-    given = np.asarray(scores, float)
-    known = np.where(np.isnan(given), np.inf, given)
-    best = known.min(axis=0)
+    score_array = np.asarray(scores, float)
+    scores_or_inf = np.where(np.isnan(score_array), np.inf, score_array)
+    best = scores_or_inf.min(axis=0)
     with np.errstate(invalid="ignore"):  # where all fail
-        ratios = known / best
+        ratios = scores_or_inf / best
     within: Array = (ratios[:, :, None] <= np.asarray(factors, float)).mean(axis=1)
     return within
 
 
+# Outcome of a row in a ranking; every row has one.
 Fate = Literal["ranked", "too few to tell", "not physical", "does not arrive", "unreliable"]
-"""What may become of a row; each row has one."""
 
 
 class Standing(NamedTuple):
     """Rows of scores in order; each row stands in exactly one of the five lists."""
 
     groups: list[list[int]]
-    """Of ranked rows, the best group first, each from best to worst: with 95 % all that are as good as its first."""
+    """Ranked rows by group, the best group first, best row first: with 95 % all that are as good as its first."""
     untold: list[int]
     """Rows that could be ranked, from best to worst, were there worlds enough to tell them apart."""
     unphysical: list[int]
@@ -76,9 +76,9 @@ class Standing(NamedTuple):
     lost: list[Share]
     """Worlds in which each row fails, swings or chatters."""
     failures: list[Share]
-    """Of each row."""
+    """Share of worlds in which a row fails, by row."""
     swings: list[Share]
-    """Of each row, where it does not fail: those in which it swings, chatters or has not converged."""
+    """Share of worlds, by row, in which a row does not fail but swings, chatters or has not converged."""
     floor: float
     """The smallest ratio of scores that the ranked rows are told apart by as a rule; nan for fewer than two."""
 
@@ -89,7 +89,7 @@ class Standing(NamedTuple):
 
     def group(self, row: int) -> int | None:
         """The number of a row's group, from 1; None where it stands in none."""
-        return next((at for at, rows in enumerate(self.groups, start=1) if row in rows), None)
+        return next((group for group, rows in enumerate(self.groups, start=1) if row in rows), None)
 
     def fate(self, row: int) -> Fate:
         """In which of the lists a row stands."""
@@ -121,22 +121,22 @@ def standing(
 
     Two rows or more of fewer worlds than LEAST_PAIRS are not told apart, nor called a tie.
     """
-    given = np.asarray(scores, float)
-    failed = ~np.isfinite(given)
-    known = np.log(penalised(given, failure, floor))
-    lost = [share(each) for each in failed | swings]
-    means = known.mean(axis=1)
+    score_array = np.asarray(scores, float)
+    failed = ~np.isfinite(score_array)
+    logs = np.log(penalised(score_array, failure, floor))
+    lost = [share(flags) for flags in failed | swings]
+    means = logs.mean(axis=1)
     by_mean = np.argsort(means, kind="stable").tolist()
-    rarest = np.lexsort((means, [each.value for each in lost])).tolist()
+    rarest = np.lexsort((means, [interval.value for interval in lost])).tolist()
     marks = [np.broadcast_to(each, len(lost)) for each in ([each.low > tolerated for each in lost], short, unphysical)]
     fates = np.select(marks, ["unreliable", "short", "unphysical"], "sound")
     sound, far, strained = ([row for row in by_mean if fates[row] == fate] for fate in ("sound", "short", "unphysical"))
-    compared = PairedComparisons(known, seed)
-    enough = len(sound) < 2 or given.shape[1] >= LEAST_PAIRS
+    compared = PairedComparisons(logs, seed)
+    enough = len(sound) < 2 or score_array.shape[1] >= LEAST_PAIRS
     return Standing(
         _groups(compared, sound) if enough else [], [] if enough else sound, strained, far,
         [row for row in rarest if fates[row] == "unreliable"],
-        lost, [share(each) for each in failed], [share(each) for each in swings & ~failed],
+        lost, [share(flags) for flags in failed], [share(flags) for flags in swings & ~failed],
         compared.resolution(sound),
     )  # fmt: skip
 

@@ -24,8 +24,8 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
 
 READINGS = ("rmse", "rmse_move", "settling", "settling_after", "steady_state", "missing")
+# About the final reference, over the move.
 BAND = 0.02
-"""About the final reference, over the move."""
 
 
 class Courses(NamedTuple):
@@ -38,10 +38,10 @@ class Courses(NamedTuple):
     rests: Array
     """When each reference rests, (N,) [s]"""
     horizons: Array
-    """How much of each counts, (N,) [s]"""
+    """Horizon of every course, (N,) [s]"""
     period: float
     converged: NDArray[np.bool_]
-    """Whose numbers do not depend on the integration step, (N,)"""
+    """Courses whose numbers do not depend on the integration step, (N,)"""
 
 
 def readings(of: Courses) -> dict[str, Array]:
@@ -66,15 +66,15 @@ def readings(of: Courses) -> dict[str, Array]:
     rmse = np.sqrt((kept**2).sum(axis=1) / count)
     of_move = np.sqrt((kept**2 * moving).sum(axis=1) / np.maximum(moving.sum(axis=1), 1))
     settling = np.where(settled, last, np.nan)
-    found = {
+    metrics = {
         "rmse": rmse,
         "rmse_move": np.where(rests <= 0.0, rmse, of_move),
         "settling": settling,
         "settling_after": np.maximum(settling - rests, 0.0),
         "steady_state": (np.abs(kept) * late).sum(axis=1) / late.sum(axis=1),
     }
-    found["missing"] = found["steady_state"] / np.abs(np.where(inside, wanted, 0.0)).max(axis=1)
-    return {name: np.where(alive, values, np.nan) for name, values in found.items()}
+    metrics["missing"] = metrics["steady_state"] / np.abs(np.where(inside, wanted, 0.0)).max(axis=1)
+    return {name: np.where(alive, values, np.nan) for name, values in metrics.items()}
 
 
 def _last_exit(away: Array, band: Array, time: Array) -> Array:
@@ -105,32 +105,32 @@ def usual(of: Courses) -> tuple[list[str], Array]:
         late = inside & (time >= (of.horizons - lasting)[:, None] - 1e-9)
         steady[name] = (size * late).sum(axis=1) / late.sum(axis=1)
     names, columns = [], []
-    for what, away in (("angle", np.where(inside, np.abs(theta - final), 0.0)), ("error", size)):
+    for reading, away in (("angle", np.where(inside, np.abs(theta - final), 0.0)), ("error", size)):
         for band in (0.01, 0.02, 0.05):
             last = _last_exit(away, band * np.abs(final), time)
             settled = (of.rests < of.horizons) & (last < of.horizons - 1.5 * of.period) & alive
             for name, error in steady.items():
-                names.append(f"{what} within {100 * band:.0f} %, {name}")
+                names.append(f"{reading} within {100 * band:.0f} %, {name}")
                 columns.append(np.where(settled[:, None], np.stack([rmse, last, error], axis=1), np.nan))
     return names, np.stack(columns, axis=1)
 
 
+# Control period that counts as none [s].
 CONTINUOUS = 1e-6
-"""Control period that counts as none [s]."""
 
 
 @dataclass(frozen=True)
 class Reactions:
-    """What each row did in each setting, (settings,) for each of READINGS by the row's name."""
+    """Readings of every row in every setting: (settings,) for each of READINGS, by the row's name."""
 
     settings: Sequence[PaperSetting]
     found: Mapping[str, Mapping[str, Array]]
     converged: Mapping[str, NDArray[np.bool_]]
-    """Where a row's numbers do not depend on the integration step; the others tell nothing."""
+    """Settings in which a row's numbers do not depend on the integration step; the others decide nothing."""
 
     def values(self, unknown: str) -> list[Any]:
-        """What an unknown is in each setting."""
-        return [each.values[unknown] for each in self.settings]
+        """Value of an unknown in every setting."""
+        return [setting.values[unknown] for setting in self.settings]
 
 
 def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSetting]:
@@ -139,28 +139,30 @@ def drawn_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSet
     cells = list(product(*(range(_alternatives(box, name)) for name in strata)))
     count = -(-box.draws // len(cells)) * len(cells)
     shares = {name: _latin(count, seed, name) for name in box.unknowns if name not in strata}
-    for at, name in enumerate(strata):
-        own = np.array([cell[at] for cell in cells])
-        shares[name] = (np.tile(own, count // len(cells)) + 0.5) / _alternatives(box, name)
-    return [box.setting(wrist, {name: float(each[k]) for name, each in shares.items()}) for k in range(count)]
+    for column, name in enumerate(strata):
+        levels = np.array([cell[column] for cell in cells])
+        shares[name] = (np.tile(levels, count // len(cells)) + 0.5) / _alternatives(box, name)
+    return [box.setting(wrist, {name: float(share[k]) for name, share in shares.items()}) for k in range(count)]
 
 
 def continuous_settings(box: Box, wrist: WristParameters, seed: int) -> list[PaperSetting]:
     """As many of them as asked for with ideal measurement in nearly continuous time: of one segment, then of four."""
-    found = []
+    settings = []
     for segments, count in zip((1, 4), box.continuous, strict=False):
         shares = {name: _latin(count, seed, f"{name}, continuous {segments}") for name in box.unknowns}
         for k in range(count):
-            given = box.setting(wrist, {name: float(each[k]) for name, each in shares.items()})
+            setting = box.setting(wrist, {name: float(share[k]) for name, share in shares.items()})
             plain = box.model_copy(update={"unknowns": {}}).setting(wrist, {})
             update = {"control_period": CONTINUOUS, "plant_segments": segments, "sensor": plain.loop.sensor}
-            values = {**given.values, "loop.control_period": CONTINUOUS, "loop.plant_segments": segments}
-            found.append(
-                given._replace(
-                    loop=given.loop.model_copy(update=update), measured="ideal", values={**values, "measured": "ideal"}
+            values = {**setting.values, "loop.control_period": CONTINUOUS, "loop.plant_segments": segments}
+            settings.append(
+                setting._replace(
+                    loop=setting.loop.model_copy(update=update),
+                    measured="ideal",
+                    values={**values, "measured": "ideal"},
                 )
             )
-    return found
+    return settings
 
 
 def react(
@@ -170,49 +172,51 @@ def react(
     mirrored: bool = False,
 ) -> Reactions:
     """Every row in every setting; `mirrored` turns the references to the other side."""
-    found = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
+    metrics = {row.label: {name: np.full(len(settings), np.nan) for name in READINGS} for row in rows}
     converged = {row.label: np.zeros(len(settings), bool) for row in rows}
-    work = [(own, row) for own in _alike(settings) for row in rows]
+    work = [(batch, row) for batch in _alike(settings) for row in rows]
 
-    done, stop = 0, Event()
+    finished, stop = 0, Event()
 
     def ran(task: tuple[NDArray[np.intp], Row]) -> Courses:
-        return _ran(task[1], [settings[each] for each in task[0]], mirrored, stop)
+        return _ran(task[1], [settings[index] for index in task[0]], mirrored, stop)
 
     with stoppable(cores(), stop) as pool:
         for (own, row), done_there in zip(work, pool.map(ran, work), strict=True):
-            for name, each in readings(done_there).items():
-                found[row.label][name][own] = each
+            for name, values in readings(done_there).items():
+                metrics[row.label][name][own] = values
             converged[row.label][own] = done_there.converged
-            done += len(own)
+            finished += len(own)
             if progress is not None:
-                progress(done / (len(settings) * len(rows)))
-    return Reactions(settings, found, converged)
+                progress(finished / (len(settings) * len(rows)))
+    return Reactions(settings, metrics, converged)
 
 
 def courses(
     row: Row, settings: Sequence[PaperSetting], references: Sequence[Reference], threads: int | None = None,
     stop: Event | None = None,
 ) -> Courses:  # fmt: skip
-    """What one row does in settings that can run in one batch, each with a reference of its own."""
+    """Courses of one row in settings that can run in one batch, with one reference a setting."""
     law = controller(row.controller)
     gains = np.tile(gains_of(law, row.gains, None), (len(settings), 1))
     if settings[0].measured == "differenced":
         law = differenced(law)
     period = sample_period(settings[0].loop.control_period)
-    horizons = np.array([each.horizon for each in settings])
-    motions = [motion(ref, each.wrist, horizons.max(), period) for ref, each in zip(references, settings, strict=True)]
+    horizons = np.array([setting.horizon for setting in settings])
+    motions = [
+        motion(ref, setting.wrist, horizons.max(), period) for ref, setting in zip(references, settings, strict=True)
+    ]
     out = rollout(
-        law, gains, motions, np.arange(len(settings)), [each.loop for each in settings],
-        [each.wrist for each in settings], record="briefly", threads=threads, stop=stop,
+        law, gains, motions, np.arange(len(settings)), [setting.loop for setting in settings],
+        [setting.wrist for setting in settings], record="briefly", threads=threads, stop=stop,
     )  # fmt: skip
-    rests = np.array([each.rest for each in motions])
+    rests = np.array([move.rest for move in motions])
     return Courses(out.columns("theta"), out.references[:, 0], rests, horizons, period, ~out.unconverged)
 
 
 def _ran(row: Row, settings: Sequence[PaperSetting], mirrored: bool, stop: Event) -> Courses:
-    """What one row does."""
-    references = [each.reference.mirrored() if mirrored else each.reference for each in settings]
+    """Courses of one row in a batch of settings."""
+    references = [setting.reference.mirrored() if mirrored else setting.reference for setting in settings]
     return courses(row, settings, references, 1, stop)
 
 
@@ -223,8 +227,8 @@ def _alike(settings: Sequence[PaperSetting]) -> list[NDArray[np.intp]]:
         each = settings[number]
         groups.setdefault((*structure(each.loop), each.measured), []).append(number)
     # a core runs so many side by side, until the longest horizon among them
-    found = [np.array(own[k : k + LANES]) for own in groups.values() for k in range(0, len(own), LANES)]
-    return sorted(found, key=lambda own: -settings[own[0]].loop.control_period)
+    batches = [np.array(group[k : k + LANES]) for group in groups.values() for k in range(0, len(group), LANES)]
+    return sorted(batches, key=lambda own: -settings[own[0]].loop.control_period)
 
 
 def _alternatives(box: Box, name: str) -> int:

@@ -1,4 +1,4 @@
-"""What a number of ours says about one of the paper's: the rules, which know neither loops nor laws.
+"""Verdicts on the paper's numbers from ours: the rules, which know neither loops nor laws.
 
 All are two-sided and on a log scale. What fails or never settles is nan, worse than any number, and no part of a range.
 A printed number stands for all that its digits may have been rounded from: no verdict turns on them.
@@ -14,10 +14,10 @@ from wristctl.arrays import Array
 from wristctl.comparison.paper import FACTOR, Ends
 from wristctl.config.audit import SenseName, VerdictName
 
+# Ratio between motions beyond which ours are open: the motion decides, and the paper does not give it.
 SPREAD = 4.0
-"""Where ours differ by as much from one motion to another, the motion decides, and the paper does not give it."""
+# Ratio below which two numbers stand in no order.
 TIE = 1.05
-"""Ratio below which two numbers stand in no order."""
 _OPEN: Final = "not specified enough"
 _NEVER = "fails or never settles"
 
@@ -30,13 +30,13 @@ class Finding(NamedTuple):
     high: float = np.nan
     reason: str = ""
     mark: str = ""
-    """What stands beside the verdict, as `not physical`."""
+    """Mark beside the verdict, as `not physical`."""
     beside: VerdictName | None = None
-    """Where the paper leaves open what decides: the verdict with our choice of it."""
+    """Verdict under our choice of a detail that the paper leaves open."""
 
 
+# Verdicts of what fails, the gravest first.
 FAILING: tuple[VerdictName, ...] = ("contradicted", "does not hold", "worse than the paper")
-"""Verdicts of what fails, the gravest first."""
 
 
 def joint(verdicts: Iterable[VerdictName]) -> VerdictName | None:
@@ -48,25 +48,25 @@ def joint(verdicts: Iterable[VerdictName]) -> VerdictName | None:
     if len(different) <= 1:
         return next(iter(different), None)
     if "open" in different:
-        others = joint(different - {"open"})
-        return others if others == _OPEN else "open"
+        decided = joint(different - {"open"})
+        return decided if decided == _OPEN else "open"
     if different <= set(FAILING):
-        return next(each for each in FAILING if each in different)
+        return next(verdict for verdict in FAILING if verdict in different)
     return _OPEN
 
 
 def of_numbers(paper: float | Ends, ours: ArrayLike, sense: SenseName = "about") -> Finding:
     """Our values, one for each stated motion, beside the paper's; of all of them less is better."""
     values, printed = np.asarray(ours, float), _ends(paper)
-    known = values[np.isfinite(values)]
-    if not len(known):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return Finding("worse than the paper" if sense == "about" else "does not hold", reason=_NEVER)
-    low, high = float(known.min()), float(known.max())
+    low, high = float(finite.min()), float(finite.max())
     if sense != "about":
         return _bounded(printed, values, sense)._replace(low=low, high=high)
     if low > FACTOR * printed.high:
         return Finding("worse than the paper", low, high)
-    if len(known) < len(values):
+    if len(finite) < len(values):
         return Finding(_OPEN, low, high, "on one motion it fails or never settles, on another not")
     if high < printed.low / FACTOR:
         return Finding("better than the paper", low, high)
@@ -87,7 +87,7 @@ def _bounded(paper: Ends, values: Array, sense: SenseName) -> Finding:
 
 
 def _kept(paper: Ends, values: Array, sense: SenseName) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which values keep a bound wherever it lies between its ends, and which break it wherever; nan breaks it."""
+    """Values that keep, and values that break, a bound wherever it lies between its ends; nan breaks it."""
     if sense == "at most":
         return values <= paper.low, ~(values <= paper.high)
     if sense == "at least":
@@ -109,10 +109,10 @@ def of_settling(paper: float | Ends, after: ArrayLike, motions: ArrayLike) -> Fi
     if not moving.any():
         return of_numbers(paper, after)
     values = np.asarray(after, float)
-    known = values[np.isfinite(values)]
-    if not len(known):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return Finding("worse than the paper", reason=_NEVER)
-    low, high = float(known.min()), float(known.max())
+    low, high = float(finite.min()), float(finite.max())
     if low > FACTOR * _ends(paper).high:
         return Finding("worse than the paper", low, high, "from the end of the motion alone")
     return Finding(_OPEN, low, high, "counted from the end of the motion; how long the paper's lasts is not given")
@@ -121,13 +121,13 @@ def of_settling(paper: float | Ends, after: ArrayLike, motions: ArrayLike) -> Fi
 def of_ordering(less: ArrayLike, more: ArrayLike) -> Finding:
     """Whether the one is less than the other on every stated motion; low and high are the ratios more / less."""
     ratios = [_ratio(a, b) for a, b in zip(np.asarray(less).tolist(), np.asarray(more).tolist(), strict=True)]
-    known = [each for each in ratios if np.isfinite(each) and each > 0.0]
-    ends = (min(known), max(known)) if known else (np.nan, np.nan)
-    if all(each > TIE for each in ratios):
+    positive = [ratio for ratio in ratios if np.isfinite(ratio) and ratio > 0.0]
+    ends = (min(positive), max(positive)) if positive else (np.nan, np.nan)
+    if all(ratio > TIE for ratio in ratios):
         return Finding("reproduced", *ends)
-    if all(each < 1.0 / TIE for each in ratios):
+    if all(ratio < 1.0 / TIE for ratio in ratios):
         return Finding("does not hold", *ends, "the other way round")
-    tied = all(1.0 / TIE <= each <= TIE for each in ratios)
+    tied = all(1.0 / TIE <= ratio <= TIE for ratio in ratios)
     return Finding(_OPEN, *ends, "alike within 5 %" if tied else "the motion decides, and the paper does not give it")
 
 

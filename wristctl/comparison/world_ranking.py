@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Metrics that are kept of every row in every case.
 RANKED = (
     "rmse",
     "steady_state",
@@ -44,9 +45,8 @@ RANKED = (
     "energy",
     "drift",
 )
-"""Metrics that are kept of every row in every case."""
+# Seed stream of the resampling: the same worlds give the same intervals.
 _STREAM = 20_031
-"""Of the resampling: the same worlds give the same intervals."""
 
 
 class RankedRow(NamedTuple):
@@ -65,10 +65,10 @@ class WorldRanking:
     """Rows over a family's worlds; `yardstick` is the number of feedforward's."""
 
     name: str
-    """Of the family; with `, steps` where it has smooth motions too, and these are its others."""
+    """Name of the family; with `, steps` for the steps of a family that has smooth motions too."""
     family: Family
     motions: int
-    """How many of the family's motions these are."""
+    """Number of the family's motions in the ranking."""
     jumps: bool
     """Whether they are steps."""
     worlds: int
@@ -76,20 +76,20 @@ class WorldRanking:
     yardstick: int
     standing: Standing
     means: list[GeometricMean]
-    """Of each row's RMSE [rad]."""
+    """Geometric mean of every row's RMSE [rad]."""
     gains: list[GeometricMean]
-    """How many times less each row's RMSE is than feedforward's."""
+    """Ratio of feedforward's RMSE to every row's."""
 
 
 def kinds_of(family: Family) -> dict[bool, list[int]]:
     """The numbers of a family's references by whether they are steps, smooth ones first; no mean is of both."""
     numbers = range(len(family.references))
-    kinds = {kind: [at for at in numbers if jumps(family.references[at]) == kind] for kind in (False, True)}
+    kinds = {kind: [index for index in numbers if jumps(family.references[index]) == kind] for kind in (False, True)}
     return {kind: chosen for kind, chosen in kinds.items() if chosen}
 
 
 def seed_of(study: Study, worlds: Worlds) -> int:
-    """What its split is drawn from."""
+    """Seed of the split that the worlds are drawn from."""
     return study.seed if worlds.sealed is None else worlds.sealed
 
 
@@ -119,21 +119,21 @@ def rank(
                 progress((number + share) / len(rows))
 
         gains = np.array([gains_of(law, row.gains, tuned)])
-        found = measure(law, gains, cases, study.wrist, RANKED, report)
+        measured = measure(law, gains, cases, study.wrist, RANKED, report)
         for kind, chosen in kinds.items():
-            ranked[kind].append(_row(row.label, found.of_motions(chosen, len(family.references)), worlds.draws))
+            ranked[kind].append(_row(row.label, measured.of_motions(chosen, len(family.references)), worlds.draws))
     yardstick = next(k for k, row in enumerate(rows) if row.controller == YARDSTICK)
     return [ranking(name, family, ranked[kind], yardstick, steps=kind) for kind in kinds]
 
 
-def _row(label: str, found: Measured, worlds: int) -> RankedRow:
-    swings = np.any(found.swings.reshape(worlds, -1), axis=1)
-    return RankedRow(label, world_scores(found, worlds)[0], swings, found)
+def _row(label: str, measured: Measured, worlds: int) -> RankedRow:
+    swings = np.any(measured.swings.reshape(worlds, -1), axis=1)
+    return RankedRow(label, world_scores(measured, worlds)[0], swings, measured)
 
 
-def world_scores(found: Measured, worlds: int) -> Array:
+def world_scores(measured: Measured, worlds: int) -> Array:
     """Geometric mean of the RMSE [rad] over the motions of each world, (P, worlds); inf where one failed."""
-    rmse = np.where(found.failed, np.inf, found.metrics["rmse"])
+    rmse = np.where(measured.failed, np.inf, measured.metrics["rmse"])
     scores: Array = np.exp(np.log(rmse).reshape(len(rmse), worlds, -1).mean(axis=2))
     return scores
 
@@ -154,29 +154,33 @@ def ranking(
     kinds = kinds_of(family)
     kind = next(iter(kinds)) if steps is None else steps
     scores = np.array([row.rmse for row in rows])
-    known = penalised(scores)
+    penalised_scores = penalised(scores)
     stands = standing(scores, np.array([row.swings for row in rows]), _STREAM, tolerated)
-    means = [geometric_mean(each, _STREAM) for each in known]
-    gains = [paired_ratio(known[yardstick], each, _STREAM) for each in known]
+    means = [geometric_mean(row_scores, _STREAM) for row_scores in penalised_scores]
+    gains = [paired_ratio(penalised_scores[yardstick], row_scores, _STREAM) for row_scores in penalised_scores]
     shown = f"{name}, steps" if kind and len(kinds) > 1 else name
     return WorldRanking(
         shown, family, len(kinds[kind]), kind, scores.shape[1], list(rows), yardstick, stands, means, gains
     )  # fmt: skip
 
 
-def ranking_frame(found: WorldRanking) -> pd.DataFrame:
+def ranking_frame(ranked: WorldRanking) -> pd.DataFrame:
     """A row for each, from best to worst, with intervals; angles in rad."""
     import pandas as pd
 
     lines = []
-    for at in found.standing.order:
-        row, mean, gain = found.rows[at], found.means[at], found.gains[at]
-        failures, swings, lost = found.standing.failures[at], found.standing.swings[at], found.standing.lost[at]
+    for index in ranked.standing.order:
+        row, mean, gain = ranked.rows[index], ranked.means[index], ranked.gains[index]
+        failures, swings, lost = (
+            ranked.standing.failures[index],
+            ranked.standing.swings[index],
+            ranked.standing.lost[index],
+        )
         lines.append(
             {
                 "row": row.label,
-                "group": found.standing.group(at),
-                "fate": found.standing.fate(at),
+                "group": ranked.standing.group(index),
+                "fate": ranked.standing.fate(index),
                 "rmse": mean.value,
                 "rmse_low": mean.low,
                 "rmse_high": mean.high,
@@ -198,30 +202,30 @@ def ranking_frame(found: WorldRanking) -> pd.DataFrame:
 
 
 def _median(values: Array) -> float:
-    """Of what there is; nan where there is nothing."""
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if known.size else np.nan
+    """Median of the finite values; nan without any."""
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else np.nan
 
 
-def worlds_frame(found: WorldRanking) -> pd.DataFrame:
+def worlds_frame(ranked: WorldRanking) -> pd.DataFrame:
     """Every row in every world and motion; motions by their number among the family's references."""
     import pandas as pd
 
     parts = []
-    numbers = kinds_of(found.family)[found.jumps]
-    for row in found.rows:
+    numbers = kinds_of(ranked.family)[ranked.jumps]
+    for row in ranked.rows:
         where = {
             "row": row.label,
-            "world": np.repeat(np.arange(found.worlds), found.motions),
-            "motion": np.tile(numbers, found.worlds),
+            "world": np.repeat(np.arange(ranked.worlds), ranked.motions),
+            "motion": np.tile(numbers, ranked.worlds),
         }
         values = {name: values[0] for name, values in row.measured.metrics.items()}
         parts.append(pd.DataFrame(where | {"failed": row.measured.failed[0]} | values))
     return pd.concat(parts, ignore_index=True)
 
 
+# Largest number of rollouts of one unit: some ten seconds of one core.
 _ROLLOUTS = 8_000
-"""Of one unit, at most: some ten seconds of one core."""
 
 
 def judge_units(
@@ -234,8 +238,8 @@ def judge_units(
     needed = study.model_copy(update={"families": {family: study.families[family]}})
     content = json.loads(needed.model_dump_json(by_alias=True, include={"seed", "wrist", "families"}))
     times = noises_of(study.families[family], noises)
-    each = len(study.families[family].references) * times
-    together = max(1, _ROLLOUTS // each)
+    rollouts = len(study.families[family].references) * times
+    together = max(1, _ROLLOUTS // rollouts)
     units = []
     for first in range(0, worlds, together):
         many = min(together, worlds - first)
@@ -244,30 +248,30 @@ def judge_units(
             "noises": times,
         }  # fmt: skip
         name = f"{law} on worlds {first} to {first + many - 1} of {family}"
-        units.append(Unit("wristctl.comparison.world_ranking:judged", spec, name, many * each))
+        units.append(Unit("wristctl.comparison.world_ranking:judged", spec, name, many * rollouts))
     return units
 
 
 def noises_of(family: Family, noises: int) -> int:
-    """How often a motion in a world is worth running: once where no camera adds noise."""
+    """Number of noise streams for a motion in a world: once where no camera adds noise."""
     return noises if family.loop.sensor.level == "camera" else 1
 
 
 def judged(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """What `judge_units` asks for: metrics (worlds, motions, noises) by name, and which have failed."""
+    """Result of one unit of `judge_units`: metrics (worlds, motions, noises) by name, and which have failed."""
     study, law = Study.model_validate_json(json.dumps(spec["study"])), controller(spec["law"])
     name, noises, worlds = spec["family"], spec["noises"], spec["worlds"]
     family = study.families[name]
     cases = drawn_cases(
         family, name, "test", study.seed, worlds, study.wrist, first=spec["first"], noises=noises
     )  # fmt: skip
-    found = measure(law, np.array([law.values(spec["gains"])]), cases, study.wrist, RANKED)
+    measured = measure(law, np.array([law.values(spec["gains"])]), cases, study.wrist, RANKED)
     shape = worlds, len(family.references), noises
-    arrays = {metric: values.reshape(shape) for metric, values in found.metrics.items()}
+    arrays = {metric: values.reshape(shape) for metric, values in measured.metrics.items()}
     return arrays | {
-        "failed": found.failed.reshape(shape),
-        "lasted": found.lasted.reshape(shape),
-        "rests": found.rests.reshape(shape),
+        "failed": measured.failed.reshape(shape),
+        "lasted": measured.lasted.reshape(shape),
+        "rests": measured.rests.reshape(shape),
     }
 
 
@@ -285,14 +289,22 @@ def row_of(
     wrist's, from pretension to limit [N].
     """
     chosen = slice(None) if motions is None else list(motions)
-    whole = {name: np.concatenate([each[name] for each in pieces])[:, chosen, :noises] for name in pieces[0]}
-    failed, worlds = whole["failed"], len(whole["failed"])
-    rmse = np.where(failed, np.inf, whole["rmse"])
+    metrics_of_worlds = {
+        name: np.concatenate([piece[name] for piece in pieces])[:, chosen, :noises] for name in pieces[0]
+    }
+    failed, worlds = metrics_of_worlds["failed"], len(metrics_of_worlds["failed"])
+    rmse = np.where(failed, np.inf, metrics_of_worlds["rmse"])
     scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))
-    left = np.median(np.where(np.isnan(whole["oscillation"]), 0.0, whole["oscillation"]), axis=2)
-    chatters = chatter(np.median(whole["chattering"], axis=2), tension_range) > 0.0
-    unsound = ((left > LIMIT_CYCLE) & whole["rests"][:, :, 0]) | chatters | (whole["drift"] > 0.0).any(axis=2)
-    metrics = {name: whole[name].reshape(1, -1) for name in RANKED}
-    lasted, rests = whole["lasted"].reshape(1, -1), whole["rests"].ravel()
+    left = np.median(
+        np.where(np.isnan(metrics_of_worlds["oscillation"]), 0.0, metrics_of_worlds["oscillation"]), axis=2
+    )
+    chatters = chatter(np.median(metrics_of_worlds["chattering"], axis=2), tension_range) > 0.0
+    unsound = (
+        ((left > LIMIT_CYCLE) & metrics_of_worlds["rests"][:, :, 0])
+        | chatters
+        | (metrics_of_worlds["drift"] > 0.0).any(axis=2)
+    )
+    metrics = {name: metrics_of_worlds[name].reshape(1, -1) for name in RANKED}
+    lasted, rests = metrics_of_worlds["lasted"].reshape(1, -1), metrics_of_worlds["rests"].ravel()
     measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range)
     return RankedRow(label, scores, unsound.any(axis=1), measured)

@@ -18,20 +18,20 @@ from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, tendons_of_values
 from wristctl.processes import cores
 
+# Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves.
 _NUDGE, _NUDGE_M = 1e-4, 1e-6
-"""Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves."""
+# Friction with which a search begins that believes in none.
 _OFF_THE_EDGE = 0.02
-"""Friction with which a search begins that believes in none."""
+# Evaluations of one search; 10 to 20 are usual.
 _MOST = 200
-"""Evaluations of one search; 10 to 20 are usual."""
 
 
+# Least noise of a marker's angle [rad].
 _LEAST_NOISE = 1e-6
-"""Of an angle [rad]: what a marker's angle is never better than."""
 
 
 class Coordinate(NamedTuple):
-    """What one coordinate of a search is: a parameter by name, or a small error of one place in one run.
+    """Coordinate of a search: a parameter by name, or a small error of one place in one run.
 
     That is the camera's zero in a bending plane (ZERO), or what a tendon's spool has reeled in unknown (SPOOL).
     """
@@ -67,61 +67,61 @@ class Problem:
 
     @cached_property
     def coordinates(self) -> dict[Coordinate, int]:
-        """Where each coordinate of the search stands: free parameters, zeros, spools."""
+        """Index of every coordinate of the search: free parameters, zeros, spools."""
         free = [Coordinate(name) for name in self.free]
         zeros = [_zero(trial) for trial in self.trials]
         spools = [_spool(trial, tendon) for trial in self.trials for tendon in trial.tendons]
-        return {each: at for at, each in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
+        return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
 
     def begin(self) -> Array:
         """The coordinates at the start; at an edge the search would stay there."""
         x = np.zeros(len(self.coordinates))
-        for at, name in enumerate(self.free):
-            x[at] = UNKNOWNS[name].coordinate(self.start[name], self.start[name])
+        for index, name in enumerate(self.free):
+            x[index] = UNKNOWNS[name].coordinate(self.start[name], self.start[name])
             if name in NOT_NEGATIVE:
-                x[at] = max(x[at], _OFF_THE_EDGE)
+                x[index] = max(x[index], _OFF_THE_EDGE)
         return x
 
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest coordinates."""
-        widest = np.array([_WIDEST[each.kind] for each in self.coordinates if each.kind in _WIDEST])
+        widest = np.array([_WIDEST[coordinate.kind] for coordinate in self.coordinates if coordinate.kind in _WIDEST])
         low, high = np.array([UNKNOWNS[name].bounds() for name in self.free]).reshape(-1, 2).T
         return np.concatenate([low, -widest]), np.concatenate([high, widest])
 
     def prior(self) -> Array:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
-        known = {
+        beginning = {
             "tendon_radius": 1.0 / self.settings.radius_error,
             "presliding": 1.0 / self.settings.presliding_error,
             ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
             SPOOL: 1.0 / self.settings.spool_error,
         }
-        return np.array([known.get(each.kind, 0.0) for each in self.coordinates])
+        return np.array([beginning.get(coordinate.kind, 0.0) for coordinate in self.coordinates])
 
     def values(self, x: Array) -> dict[str, float]:
         """Every parameter at coordinates x, found or held."""
         held = {**self.start, **self.settings.fixed}
-        for name, at in zip(self.free, x, strict=False):
-            held[name] = UNKNOWNS[name].value(float(at), self.start[name])
+        for name, value in zip(self.free, x, strict=False):
+            held[name] = UNKNOWNS[name].value(float(value), self.start[name])
         return {name: held[name] for name in UNKNOWNS}
 
     def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
         """The trial's wrist and tendons at coordinates x."""
         values = self.values(x)
-        own = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
+        wrist_values = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
         if trial.plane == "flexion":
-            own["stiffness"] *= values["flexion_ratio"]
+            wrist_values["stiffness"] *= values["flexion_ratio"]
         one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
-        return SupposedWrist(trial.wrist.model_copy(update=own), tendons, (one, two, three, four))
+        return SupposedWrist(trial.wrist.model_copy(update=wrist_values), tendons, (one, two, three, four))
 
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
         """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""
         return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
 
 
+# Largest of these errors [rad, m].
 _WIDEST = {ZERO: 0.2, SPOOL: 2e-3}
-"""Largest of these errors [rad, m]."""
 
 
 def _zero(trial: MeasuredTrial) -> Coordinate:
@@ -137,9 +137,9 @@ class Linearisation:
     """The angles that the model expects in the frames, and their derivatives by the coordinates."""
 
     expected: list[Array]
-    """Of each trial (F,) [rad], the camera's zero included."""
+    """Expected angles of every trial (F,) [rad], the camera's zero included."""
     slopes: list[Array]
-    """Of each trial (F, coordinates)."""
+    """Derivatives of every trial's angles (F, coordinates)."""
 
 
 def linearise(problem: Problem, x: Array) -> Linearisation:
@@ -148,14 +148,17 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
         moved = [Coordinate(name) for name in problem.free if name in SIMULATED]
-        moved += [_spool(trial, each) for each in trial.tendons]
-        nudges = [_NUDGE_M if each.kind == SPOOL else _NUDGE for each in moved]
-        near = [x + nudge * (np.arange(len(x)) == coordinates[each]) for each, nudge in zip(moved, nudges, strict=True)]
-        course = problem.simulate(trial, [problem.candidate(trial, each) for each in (x, *near)])
-        expected, *others = (trial.shown(each, delay) for each in course)
+        moved += [_spool(trial, tendon) for tendon in trial.tendons]
+        nudges = [_NUDGE_M if coordinate.kind == SPOOL else _NUDGE for coordinate in moved]
+        near = [
+            x + nudge * (np.arange(len(x)) == coordinates[coordinate])
+            for coordinate, nudge in zip(moved, nudges, strict=True)
+        ]
+        course = problem.simulate(trial, [problem.candidate(trial, point) for point in (x, *near)])
+        expected, *nudged = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
-        for each, nudge, other in zip(moved, nudges, others, strict=True):
-            slopes[:, coordinates[each]] = (other - expected) / nudge
+        for coordinate, nudge, nudged_angle in zip(moved, nudges, nudged, strict=True):
+            slopes[:, coordinates[coordinate]] = (nudged_angle - expected) / nudge
         if "delay" in problem.free:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
@@ -164,13 +167,13 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         return expected + x[coordinates[_zero(trial)]], slopes
 
     with ThreadPoolExecutor(cores()) as pool:
-        done = list(pool.map(one, problem.trials))
-    return Linearisation([each for each, _ in done], [each for _, each in done])
+        columns = list(pool.map(one, problem.trials))
+    return Linearisation([each for each, _ in columns], [each for _, each in columns])
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Where the search ended."""
+    """Result of a search over a wrist's parameters."""
 
     problem: Problem
     x: Array
@@ -192,7 +195,7 @@ def frame_noise(courses: Sequence[Array]) -> float:
 
     Neither a trend nor what lasts longer than a few frames counts. Medians: quick moves do not either.
     """
-    second = np.concatenate([np.diff(each, 2) for each in courses])
+    second = np.concatenate([np.diff(course, 2) for course in courses])
     return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))
 
 
@@ -203,7 +206,7 @@ def fit(problem: Problem) -> Fit:
     BLAS has one thread: on matrices this small its others only wait for each other, on cores that simulate.
     """
     weights, evaluations = problem.prior(), 0
-    known = weights > 0.0
+    weighted = weights > 0.0
     bounds = problem.bounds()
     x = np.clip(problem.begin(), *bounds)
     noise, weighed = max(frame_noise([trial.angle for trial in problem.trials]), _LEAST_NOISE), np.inf
@@ -217,17 +220,21 @@ def fit(problem: Problem) -> Fit:
 
     def rows(x: Array) -> Array:
         parts = [(e - t.angle) / weighed for e, t in zip(at(x).expected, problem.trials, strict=True)]
-        return np.concatenate([*parts, (weights * x)[known]])
+        return np.concatenate([*parts, (weights * x)[weighted]])
 
     def slopes(x: Array) -> Array:
-        return np.concatenate([*(each / weighed for each in at(x).slopes), np.diag(weights)[known]])
+        return np.concatenate([*(slope / weighed for slope in at(x).slopes), np.diag(weights)[weighted]])
 
     with threadpool_limits(limits=1, user_api="blas"):
         while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
             weighed = noise
-            found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST)
-            x = found.x
-            residuals = [trial.angle - each for trial, each in zip(problem.trials, at(x).expected, strict=True)]
+            solution = least_squares(
+                rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST
+            )
+            x = solution.x
+            residuals = [trial.angle - expected for trial, expected in zip(problem.trials, at(x).expected, strict=True)]
             count = sum(map(len, residuals))
-            noise = float(np.sqrt(sum(float(each @ each) for each in residuals) / max(1, count - len(problem.free))))
+            noise = float(
+                np.sqrt(sum(float(residual @ residual) for residual in residuals) / max(1, count - len(problem.free)))
+            )
     return Fit(problem, x, noise, residuals, at(x).slopes, evaluations)

@@ -42,8 +42,10 @@ class SupposedWrist(NamedTuple):
 
 
 class Reeled(NamedTuple):
-    """What the spools have reeled in (T, 4) [m], held over each step of h [s], and how many steps a wrist has to settle
-    on the first of them; `faults` are Faultless or Faulty."""
+    """Tendon lengths reeled in by the spools (T, 4) [m], held over each step of h [s].
+
+    A wrist has `settle` steps to settle on the first lengths; `faults` are Faultless or Faulty.
+    """
 
     lengths: Any
     h: float
@@ -83,9 +85,9 @@ def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: A
 
 
 def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
-    plant, own = parameters_of(model, rows_of(values)), rows_of(tendon)
-    zero = zero_like(own[0])
-    tendons = RealTendons(own[_STIFFNESS], read_nonideal(own), rows_of(memory))
+    plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
+    zero = zero_like(tendon_rows[0])
+    tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive = 1.0 + zero
@@ -96,10 +98,10 @@ def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, sta
             total, _ = tip_angle(plant, q, rate)
             rows_of(angle)[k] = total
         on_spools = (
-            reeled[now, 0] + own[taut],
-            reeled[now, 2] + own[taut + 2],
-            reeled[now, 1] + own[taut + 1],
-            reeled[now, 3] + own[taut + 3],
+            reeled[now, 0] + tendon_rows[taut],
+            reeled[now, 2] + tendon_rows[taut + 2],
+            reeled[now, 1] + tendon_rows[taut + 1],
+            reeled[now, 3] + tendon_rows[taut + 3],
         )
         lengths = _after_slip(spools.faults, tendons, plant, q, on_spools, k * spools.h + zero)
         alive, _ = advance_or_stop(plant, q, rate, lengths, tendons, spools.h + zero, alive)
@@ -112,16 +114,18 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     tension, held over each step: two tendons of the + side, then the two of the - side. At first the wrist is at rest.
     A candidate that bends a segment beyond a full turn stays where it was.
     """
-    values = to_blocks(np.array([model.values(each.wrist, n) for each in candidates]))
-    nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h) for each in candidates]
+    values = to_blocks(np.array([model.values(candidate.wrist, n) for candidate in candidates]))
+    nonideal = [nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h) for candidate in candidates]
     faults = Faulty() if any(map(wears, nonideal)) else Faultless()
-    own = [(*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)]
-    tendons, k = to_blocks(np.array(own)), model.coordinates(n)
-    found = np.empty((len(values), len(reeled), *values.shape[2:]))
+    tendon_values = [
+        (*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)
+    ]
+    tendons, k = to_blocks(np.array(tendon_values)), model.coordinates(n)
+    trajectories = np.empty((len(values), len(reeled), *values.shape[2:]))
     spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), faults)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
-    for value, tendon, angle in zip(values, tendons, found, strict=True):
+    for value, tendon, angle in zip(values, tendons, trajectories, strict=True):
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
         advance(model, value, tendon, spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
-    return to_rows(found, len(candidates))
+    return to_rows(trajectories, len(candidates))

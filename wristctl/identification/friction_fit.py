@@ -27,15 +27,15 @@ from wristctl.identification.loop_problem import (
     LoopProblem,
 )
 
+# Evaluations of one search; 10 are usual.
 _MOST = 200
-"""Evaluations of one search; 10 are usual."""
+# Places that are tried first: how many, from how many of them a search starts, between which exponents and
+# preslidings [m].
 _STARTS, _BEST, _EXPONENTS, _PRESLIDINGS = 32, 4, (0.02, 1.0), (3e-6, 2e-4)
-"""Places that are tried first: how many, from how many of them a search starts, between which exponents and
-preslidings [m]."""
+# Relative decrease of the cost below which a rough search stops.
 _ROUGH = 1e-3
-"""By how much a cost must still fall, over itself, for a rough search to go on."""
+# Samples over which small errors are alike.
 _LASTING = 30
-"""Samples over which small errors are alike."""
 
 
 class FrictionEstimate(NamedTuple):
@@ -52,7 +52,7 @@ class FrictionEstimate(NamedTuple):
 
 @dataclass(frozen=True)
 class FrictionFit:
-    """Where the search ended."""
+    """Result of a search over friction's parameters."""
 
     problem: LoopProblem
     x: Array
@@ -62,7 +62,7 @@ class FrictionFit:
     """Standard deviation of each of them."""
     covariance: Array
     autocorrelation: float
-    """Of neighbouring residuals over their noise."""
+    """Correlation of neighbouring residuals over their noise."""
 
     @property
     def count(self) -> int:
@@ -84,11 +84,11 @@ class FrictionFit:
         finely = replace(self.problem, settings=settings.model_copy(update={"step": 0.5 * settings.step}))
         (coarse,), (fine,) = self.problem.expected([self.x]), finely.expected([self.x])
         parts = zip(fine, coarse, self.noise, strict=True)
-        return max(float(np.sqrt(np.mean((one - other) ** 2)) / noise) for one, other, noise in parts)
+        return max(float(np.sqrt(np.mean((one - second) ** 2)) / noise) for one, second, noise in parts)
 
     @property
     def leap(self) -> float:
-        """How far tendons move between two samples at a turn [m]: where it is about as much as presliding, nobody
+        """Travel of the tendons between two samples at a turn [m]: where it is about as much as presliding, nobody
         knows where the turn was."""
         loop = self.problem.loop
         if loop.spools is None:
@@ -118,17 +118,17 @@ class FrictionFit:
     @property
     def told_best(self) -> tuple[float, FrictionEstimate]:
         """The bend [rad] of the loop's at which the capstan's exponent is told best, and the exponent there."""
-        own, by = self.covariance[:2, :2], self._friction_by
-        both, spread = float((own @ by)[EXPONENT]), float(by @ own @ by)
+        block, by = self.covariance[:2, :2], self._friction_by
+        cross, spread = float((block @ by)[EXPONENT]), float(by @ block @ by)
         furthest = float(np.abs(self.problem.measured[0]).max()) - self.problem.bend
-        further = min(max(-both / spread, -self.problem.bend), furthest)
+        further = min(max(-cross / spread, -self.problem.bend), furthest)
         value = float(self.x[EXPONENT]) + self.friction.value * further
-        half = NORMAL_95 * math.sqrt(max(0.0, own[EXPONENT, EXPONENT] + further * (2.0 * both + further * spread)))
+        half = NORMAL_95 * math.sqrt(max(0.0, block[EXPONENT, EXPONENT] + further * (2.0 * cross + further * spread)))
         return self.problem.bend + further, FrictionEstimate(value, max(0.0, value - half), value + half)
 
     @property
     def sheath(self) -> FrictionEstimate:
-        """Its angle [rad]; endless where the bend's share of the exponent may be none."""
+        """Angle of the sheath [rad]; infinite interval where the bend's share of the exponent may be none."""
         bend, share = self.problem.bend, self._straight(SHARE, 0.0, 1.0)
         high = math.inf if share.low <= LEAST_SHARE else bend * (1.0 / share.low - 1.0)
         return FrictionEstimate(bend * (1.0 / share.value - 1.0), bend * (1.0 / share.high - 1.0), high)
@@ -136,21 +136,21 @@ class FrictionFit:
     @property
     def presliding(self) -> FrictionEstimate:
         """[m]; between nothing and no end where the loop does not tell it."""
-        at = self._straight(PRESLIDING, -math.inf, math.inf)
-        if at.high - at.value > WIDEST:
-            return FrictionEstimate(BEGIN_PRESLIDING * math.exp(at.value), 0.0, math.inf)
-        return FrictionEstimate(*(BEGIN_PRESLIDING * math.exp(each) for each in at))
+        logarithms = self._straight(PRESLIDING, -math.inf, math.inf)
+        if logarithms.high - logarithms.value > WIDEST:
+            return FrictionEstimate(BEGIN_PRESLIDING * math.exp(logarithms.value), 0.0, math.inf)
+        return FrictionEstimate(*(BEGIN_PRESLIDING * math.exp(logarithm) for logarithm in logarithms))
 
     @property
     def correlation(self) -> float:
-        """Of mu with the whole angle that a tendon is wrapped by at the mean bend, both as logarithms."""
+        """Correlation of mu with the whole angle that a tendon is wrapped by at the mean bend, both as logarithms."""
         friction, wrapped = np.array([1.0 / max(self.x[EXPONENT], 1e-12), 1.0 / self.x[SHARE]]), np.array([0.0, -1.0])
-        own = self.covariance[:2, :2]
-        both = friction @ own @ wrapped
-        return float(both / math.sqrt((friction @ own @ friction) * (wrapped @ own @ wrapped)))
+        block = self.covariance[:2, :2]
+        cross = friction @ block @ wrapped
+        return float(cross / math.sqrt((friction @ block @ friction) * (wrapped @ block @ wrapped)))
 
-    def _straight(self, at: int, least: float, most: float) -> FrictionEstimate:
-        half, value = NORMAL_95 * math.sqrt(self.covariance[at, at]), float(self.x[at])
+    def _straight(self, index: int, least: float, most: float) -> FrictionEstimate:
+        half, value = NORMAL_95 * math.sqrt(self.covariance[index, index]), float(self.x[index])
         return FrictionEstimate(value, max(least, value - half), min(most, value + half))
 
 
@@ -162,16 +162,19 @@ def fit_friction(problem: LoopProblem) -> FrictionFit:
     residuals, until these stay.
     """
     noise, searches = np.array([math.radians(0.1), 0.1, 0.1][: len(problem.measured)]), 0
-    rough = [_search(problem, each, noise, _ROUGH) for each in _starts(problem, noise)]
-    found = min(rough, key=lambda each: each.cost)
+    rough = [_search(problem, start, noise, _ROUGH) for start in _starts(problem, noise)]
+    best = min(rough, key=lambda each: each.cost)
     weighed = np.full(len(noise), np.inf)
     while np.abs(np.log(weighed / noise)).max() > 0.05 and searches < 10:
-        found, searches = _search(problem, found.x, noise), searches + 1
-        weighed, noise = noise, np.array([max(float(np.sqrt(np.mean(each**2))), 1e-9) for each in found.residuals])
-    parts = [each / sd for each, sd in zip(found.residuals, noise, strict=True)]
-    slopes = [each / sd for each, sd in zip(found.slopes, noise, strict=True)]
+        best, searches = _search(problem, best.x, noise), searches + 1
+        weighed, noise = (
+            noise,
+            np.array([max(float(np.sqrt(np.mean(residual**2))), 1e-9) for residual in best.residuals]),
+        )
+    parts = [residual / sd for residual, sd in zip(best.residuals, noise, strict=True)]
+    slopes = [slope / sd for slope, sd in zip(best.slopes, noise, strict=True)]
     covariance = _covariance(parts, slopes, problem.prior)
-    return FrictionFit(problem, found.x, found.residuals, noise, covariance, autocorrelation(parts))
+    return FrictionFit(problem, best.x, best.residuals, noise, covariance, autocorrelation(parts))
 
 
 class _Found(NamedTuple):
@@ -182,14 +185,14 @@ class _Found(NamedTuple):
 
 
 def _starts(problem: LoopProblem, noise: Array) -> Array:
-    """Where to start: those that fit best of the usual place and of others, spread as evenly as Sobol's."""
-    usual, known = problem.begin(), problem.prior > 0.0
+    """Best starting points of a search among the usual one and others, spread as evenly as Sobol's."""
+    usual, weighted = problem.begin(), problem.prior > 0.0
     spread = qmc.Sobol(len(usual), scramble=False).random(_STARTS)[1:]  # the first is a corner
     x = np.zeros_like(spread)
     x[:, EXPONENT] = np.exp(np.interp(spread[:, EXPONENT], (0.0, 1.0), np.log(_EXPONENTS)))
     x[:, SHARE] = spread[:, SHARE]
     x[:, PRESLIDING] = np.interp(spread[:, PRESLIDING], (0.0, 1.0), np.log(_PRESLIDINGS)) - math.log(BEGIN_PRESLIDING)
-    x[:, known] = norm.ppf(spread[:, known]) / problem.prior[known]
+    x[:, weighted] = norm.ppf(spread[:, weighted]) / problem.prior[weighted]
     x = np.concatenate([usual[None], x])
     costs = [
         sum(float(np.sum(((e - m) / sd) ** 2)) for e, m, sd in zip(each, problem.measured, noise, strict=True))
@@ -201,7 +204,7 @@ def _starts(problem: LoopProblem, noise: Array) -> Array:
 
 def _search(problem: LoopProblem, x: Array, noise: Array, tolerance: float = 1e-9) -> _Found:
     """The least squares that a search from x finds, measured quantities weighed by their noise."""
-    known, weights = problem.prior > 0.0, problem.prior
+    weighted, weights = problem.prior > 0.0, problem.prior
     last: tuple[Array, list[Array], list[Array]] | None = None
 
     def at(x: Array) -> tuple[Array, list[Array], list[Array]]:
@@ -212,25 +215,27 @@ def _search(problem: LoopProblem, x: Array, noise: Array, tolerance: float = 1e-
 
     def rows(x: Array) -> Array:
         parts = [(e - m) / sd for e, m, sd in zip(at(x)[1], problem.measured, noise, strict=True)]
-        return np.concatenate([*parts, (weights * x)[known]])
+        return np.concatenate([*parts, (weights * x)[weighted]])
 
     def slopes(x: Array) -> Array:
-        return np.concatenate([*(s / sd for s, sd in zip(at(x)[2], noise, strict=True)), np.diag(weights)[known]])
+        return np.concatenate([*(s / sd for s, sd in zip(at(x)[2], noise, strict=True)), np.diag(weights)[weighted]])
 
     bounds = problem.bounds()
-    found = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=tolerance, max_nfev=_MOST)
-    residuals = [m - e for m, e in zip(problem.measured, at(found.x)[1], strict=True)]
-    return _Found(found.x, float(found.cost), residuals, at(found.x)[2])
+    solution = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=tolerance, max_nfev=_MOST)
+    residuals = [m - e for m, e in zip(problem.measured, at(solution.x)[1], strict=True)]
+    return _Found(solution.x, float(solution.cost), residuals, at(solution.x)[2])
 
 
 def _linearised(problem: LoopProblem, x: Array) -> tuple[list[Array], list[Array]]:
-    """What is expected (T,) of each quantity, and its derivatives (T, coordinates); nudges point inward."""
+    """Expected course (T,) of every quantity, and its derivatives (T, coordinates); nudges point inward."""
     inward = np.where(x > problem.bounds()[1] - 0.1, -1.0, 1.0)
     nudges = inward * np.array(NUDGES[: len(x)])
-    expected, *others = problem.expected([x, *(x + np.diag(nudges))])
+    expected, *nudged = problem.expected([x, *(x + np.diag(nudges))])
     slopes = [
-        np.stack([(other[k] - own) / nudge for other, nudge in zip(others, nudges, strict=True)], axis=1)
-        for k, own in enumerate(expected)
+        np.stack(
+            [(nudged_signals[k] - signal) / nudge for nudged_signals, nudge in zip(nudged, nudges, strict=True)], axis=1
+        )
+        for k, signal in enumerate(expected)
     ]
     return expected, slopes
 
@@ -239,9 +244,9 @@ def _covariance(residuals: Sequence[Array], slopes: Sequence[Array], weights: Ar
     """The sandwich of `wristctl.identification.intervals`: residuals that are alike widen it."""
     count = sum(map(len, residuals))
     lags = bandwidth(autocorrelation(residuals), count / len(residuals))
-    bread = inverse(np.diag(weights**2) + sum(each.T @ each for each in slopes))
+    bread = inverse(np.diag(weights**2) + sum(slope.T @ slope for slope in slopes))
     meat = np.diag(weights**2) + sum(long_run(s * r[:, None], lags) for s, r in zip(slopes, residuals, strict=True))
     alike, robust = max(1.0, inflation(residuals, _LASTING)) * bread, bread @ meat @ bread
     widen = np.sqrt(np.maximum(1.0, np.diag(robust) / np.diag(alike)))
-    found: Array = alike * np.outer(widen, widen)
-    return found
+    sandwich: Array = alike * np.outer(widen, widen)
+    return sandwich

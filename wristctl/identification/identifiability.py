@@ -1,4 +1,4 @@
-"""What a set of trials cannot tell, and what would have to be added to them.
+"""Parameters that a set of trials does not identify, and trials that would.
 
 Angles at given spool positions depend on ratios of stiffness, tendon stiffness and weight: only a known weight sets
 their scale, and it has to act differently in different trials. Damping and delay both look like lag in slow moves. So
@@ -38,19 +38,19 @@ def width_text(name: str, half: float) -> str:
     return f"{1e3 * half:.2g} ms" if unknown.unit == "s" else f"{half:.2g}"
 
 
-def not_identified(fit: Fit, known: Knowledge) -> dict[str, float]:
+def not_identified(fit: Fit, knowledge: Knowledge) -> dict[str, float]:
     """The free parameters that the trials do not tell, with half their intervals as coordinates.
 
     Too wide an interval, a value at the edge of the search, or, all of them, too large a condition number.
     """
     low, high = fit.problem.bounds()
-    settings, found = fit.problem.settings, {}
-    for at, name in enumerate(fit.problem.free):
-        half = float(known.half_widths[at])
-        at_edge = name not in NOT_NEGATIVE and min(fit.x[at] - low[at], high[at] - fit.x[at]) < 1e-6
-        if half > widest(name, settings) or at_edge or known.condition > settings.condition_limit:
-            found[name] = half
-    return found
+    settings, unidentified = fit.problem.settings, {}
+    for index, name in enumerate(fit.problem.free):
+        half = float(knowledge.half_widths[index])
+        at_edge = name not in NOT_NEGATIVE and min(fit.x[index] - low[index], high[index] - fit.x[index]) < 1e-6
+        if half > widest(name, settings) or at_edge or knowledge.condition > settings.condition_limit:
+            unidentified[name] = half
+    return unidentified
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Addition:
 
 Added = Callable[[MeasuredTrial], MeasuredTrial]
 
+# Gravity across each of the two bending planes of a level forearm that is rolled by 45 deg [m/s^2].
 _ACROSS = 6.94
-"""Gravity across each of the two bending planes of a level forearm that is rolled by 45 deg [m/s^2]."""
 _POSE = f"of a level forearm rolled by 45 deg (wrist.gravity: [0, {_ACROSS}], wrist.gravity_flexion: {_ACROSS})"
 _MASS = "with 0.2 kg more in the hand, added to wrist.hand_mass"
 
@@ -86,6 +86,7 @@ def _heavier(trial: MeasuredTrial) -> MeasuredTrial:
     return replace(trial, wrist=trial.wrist.model_copy(update={"hand_mass": trial.wrist.hand_mass + 0.2}))
 
 
+# Additions to a set of trials: motion of the spools, and load.
 ADDITIONS: dict[str, tuple[Added, Added]] = {
     "the same moves three times as fast": (_fast, _as_is),
     f"another pose: the same moves {_POSE}": (_as_is, _across),
@@ -93,31 +94,30 @@ ADDITIONS: dict[str, tuple[Added, Added]] = {
     f"another pose and faster: the moves {_POSE}, three times as fast": (_fast, _across),
     f"a known mass and faster: the moves {_MASS}, three times as fast": (_fast, _heavier),
 }
-"""What may be added to trials: how the spools would move, and the load under which they would."""
 
 
 def additions(fit: Fit, lacking: Mapping[str, float]) -> list[Addition]:
-    """What each of ADDITIONS would bring, by the Jacobian of the trials there are and of those added.
+    """Effect of every one of ADDITIONS, by the Jacobian of the trials there are and of those added.
 
     Parameters that the trials do not tell stand at their starting values for it.
     """
     x, begin = fit.x.copy(), fit.problem.begin()
     for name in lacking:
-        at = fit.problem.coordinates[Coordinate(name)]
-        x[at] = begin[at]
+        column = fit.problem.coordinates[Coordinate(name)]
+        x[column] = begin[column]
     return [_addition(fit, x, what, *change) for what, change in ADDITIONS.items()]
 
 
 def _addition(fit: Fit, x: Array, what: str, move: Added, load: Added) -> Addition:
-    moved = [_following(fit.problem, x, move(each), load) for each in fit.problem.trials]
-    trials = [*fit.problem.trials, *(replace(each, run=f"{each.run} again") for each in moved)]
+    moved = [_following(fit.problem, x, move(trial), load) for trial in fit.problem.trials]
+    trials = [*fit.problem.trials, *(replace(trial, run=f"{trial.run} again") for trial in moved)]
     problem = replace(fit.problem, trials=trials)
     wider = np.zeros(len(problem.coordinates))
-    for name, at in fit.problem.coordinates.items():
-        wider[problem.coordinates[name]] = x[at]
-    slopes = [each / fit.noise for each in linearise(problem, wider).slopes]
+    for name, index in fit.problem.coordinates.items():
+        wider[problem.coordinates[name]] = x[index]
+    slopes = [slope / fit.noise for slope in linearise(problem, wider).slopes]
     half = promised(problem, slopes)
-    widths = {name: float(half[at]) for at, name in enumerate(problem.free)}
+    widths = {name: float(half[index]) for index, name in enumerate(problem.free)}
     enough = all(width <= widest(name, problem.settings) for name, width in widths.items())
     return Addition(what, widths, enough)
 
@@ -125,7 +125,7 @@ def _addition(fit: Fit, x: Array, what: str, move: Added, load: Added) -> Additi
 def _following(problem: Problem, x: Array, trial: MeasuredTrial, load: Added) -> MeasuredTrial:
     """The trial under another load, its angle as it was: one side's spools pull more, the other's keep theirs."""
     loaded = load(trial)
-    before, after = (problem.simulate(each, [problem.candidate(each, x)])[0] for each in (trial, loaded))
+    before, after = (problem.simulate(trial_run, [problem.candidate(trial_run, x)])[0] for trial_run in (trial, loaded))
     more = 2.0 * trial.wrist.tendon_offset * (before - after)
     pulls = np.stack([more, more, -more, -more], axis=1).clip(0.0)
     return replace(loaded, reeled=trial.reeled + pulls)
@@ -136,7 +136,7 @@ def refuse(lacking: Mapping[str, float], offered: list[Addition], condition: flo
     if not lacking:
         return
     told = ", ".join(f"{name} (+-{width_text(name, half)})" for name, half in lacking.items())
-    best = next((each for each in offered if each.enough), None)
+    best = next((addition for addition in offered if addition.enough), None)
     add = best.what if best else f"repetitions of {min(offered, key=_worst).what}"
     name = next(iter(lacking))
     fixed = Setting(f"fix.{name}={start[name]:g}", "identify")
@@ -153,16 +153,17 @@ def _worst(addition: Addition) -> float:
 
 
 def _more(name: str) -> Callable[[SupposedWrist], SupposedWrist]:
-    def changed(each: SupposedWrist) -> SupposedWrist:
-        return each._replace(wrist=each.wrist.model_copy(update={name: 1.01 * getattr(each.wrist, name)}))
+    def changed(supposed: SupposedWrist) -> SupposedWrist:
+        return supposed._replace(wrist=supposed.wrist.model_copy(update={name: 1.01 * getattr(supposed.wrist, name)}))
 
     return changed
 
 
-def _turned(each: SupposedWrist) -> SupposedWrist:
-    return each._replace(wrist=plant_of(each.wrist, TrueWrist(tilt_deg=1.0)))
+def _turned(supposed: SupposedWrist) -> SupposedWrist:
+    return supposed._replace(wrist=plant_of(supposed.wrist, TrueWrist(tilt_deg=1.0)))
 
 
+# Changes of the facts that identification takes as known.
 KNOWN: dict[str, Callable[[SupposedWrist], SupposedWrist]] = {
     "1 % more mass of the hand": _more("hand_mass"),
     "1 % more distance of the hand's centre of mass": _more("hand_offset"),
@@ -170,23 +171,24 @@ KNOWN: dict[str, Callable[[SupposedWrist], SupposedWrist]] = {
     "1 % more mass of the wrist": _more("mass"),
     "a base that leans by 1 deg": _turned,
 }
-"""What identification takes as known, changed to see what depends on it."""
+# As how finely it bends is taken as known too.
 FINER = "8 segments in place of the model's"
-"""As how finely it bends is taken as known too."""
 _FINER = 8
 
 
-def budget(fit: Fit, known: Knowledge) -> dict[str, dict[str, float]]:
-    """By how much each free coordinate would move if one of KNOWN, or FINER, were so, as believed: to first order."""
+def budget(fit: Fit, knowledge: Knowledge) -> dict[str, dict[str, float]]:
+    """Shift of every free coordinate under every change of KNOWN and under FINER, to first order."""
     problem, weights = fit.problem, 1.0 / fit.noise**2
     push = {name: np.zeros(len(fit.x)) for name in (*KNOWN, FINER)}
     for trial, slopes in zip(problem.trials, fit.slopes, strict=True):
-        own = problem.candidate(trial, fit.x)
-        course = [*problem.simulate(trial, [own, *(change(own) for change in KNOWN.values())])]
-        course += [*problem.simulate(trial, [own], _FINER)]
-        expected, *others = (trial.shown(each, fit.values["delay"]) for each in course)
-        for name, other in zip(push, others, strict=True):
-            push[name] += weights * slopes.T @ (other - expected)
-    bread = inverse(known.information)
-    shifts = {name: -bread @ each for name, each in push.items()}
-    return {name: {free: float(each[at]) for at, free in enumerate(problem.free)} for name, each in shifts.items()}
+        candidate = problem.candidate(trial, fit.x)
+        course = [*problem.simulate(trial, [candidate, *(change(candidate) for change in KNOWN.values())])]
+        course += [*problem.simulate(trial, [candidate], _FINER)]
+        expected, *pushed = (trial.shown(angle, fit.values["delay"]) for angle in course)
+        for name, pushed_angle in zip(push, pushed, strict=True):
+            push[name] += weights * slopes.T @ (pushed_angle - expected)
+    bread = inverse(knowledge.information)
+    shifts = {name: -bread @ pushes for name, pushes in push.items()}
+    return {
+        name: {free: float(shift[index]) for index, free in enumerate(problem.free)} for name, shift in shifts.items()
+    }

@@ -1,4 +1,4 @@
-"""How well the parameters are known: covariance, intervals, correlations, condition.
+"""Uncertainty of the parameters: covariance, intervals, correlations, condition.
 
 Neighbouring residuals may be alike (an error of the model, the camera's filter). The covariance is therefore the
 sandwich of Newey and West (Econometrica 55 (1987) 703) within each trial, with Andrews' bandwidth for a first-order
@@ -18,17 +18,17 @@ from wristctl.identification.fit import Coordinate, Fit, Problem
 from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
 
 NORMAL_95 = 1.959964
+# Autocorrelation of neighbouring residuals beyond which the model is said to miss something.
 ALIKE = 0.2
-"""Autocorrelation of neighbouring residuals beyond which the model is said to miss something."""
+# Share of the deviation beforehand that is left where trials tell hardly anything.
 _ASSUMED = 0.8
-"""Share of the deviation beforehand that is left where trials tell hardly anything."""
+# Frames over which small errors are alike: half a second at 60 a second.
 _LASTING = 30
-"""Frames over which small errors are alike: half a second at 60 a second."""
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a fit knows of its coordinates."""
+    """Uncertainty of a fit's coordinates."""
 
     deviation: Array
     """Standard deviations."""
@@ -37,15 +37,15 @@ class Knowledge:
     condition: float
     """Condition number of the Jacobian, its columns scaled to unit length."""
     autocorrelation: float
-    """Of neighbouring residuals."""
+    """Correlation of neighbouring residuals."""
     effective: float
     """Independent frames that would tell as much as the residuals do."""
     before: Array
     """One over the standard deviations with which coordinates were known beforehand; 0 where nothing was."""
 
-    def assumed(self, at: int) -> bool:
+    def assumed(self, index: int) -> bool:
         """Whether hardly more is known of a coordinate than beforehand."""
-        return bool(self.deviation[at] * self.before[at] > _ASSUMED)
+        return bool(self.deviation[index] * self.before[index] > _ASSUMED)
 
     @property
     def half_widths(self) -> Array:
@@ -62,15 +62,15 @@ class Knowledge:
         """Correlations of the coordinates."""
         covariance = inverse(self.information)
         sd = np.sqrt(np.diag(covariance))
-        found: Array = covariance / np.outer(sd, sd)
-        return found
+        correlation: Array = covariance / np.outer(sd, sd)
+        return correlation
 
 
 def knowledge(fit: Fit) -> Knowledge:
     """Deviations, condition and autocorrelation at the end of a fit."""
     weights = fit.problem.prior()
-    slopes = [each / fit.noise for each in fit.slopes]
-    residuals = [each / fit.noise for each in fit.residuals]
+    slopes = [slope / fit.noise for slope in fit.slopes]
+    residuals = [residual / fit.noise for residual in fit.residuals]
     count = sum(map(len, residuals))
     bread, variance = sandwich(slopes, residuals, weights, len(fit.problem.free))
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
@@ -105,14 +105,14 @@ def _with_clocks(problem: Problem, deviation: Array) -> Array:
     """An error of the clocks is a delay, and nothing in the trials tells the two apart."""
     wider = deviation.copy()
     if "delay" in problem.free:
-        at = problem.coordinates[Coordinate("delay")]
-        wider[at] = np.hypot(wider[at], problem.settings.clock_error)
+        column = problem.coordinates[Coordinate("delay")]
+        wider[column] = np.hypot(wider[column], problem.settings.clock_error)
     return wider
 
 
 def information_of(slopes: Sequence[Array], weights: Array) -> Array:
     """Fisher's information of residuals of unit variance with these slopes, with what is known beforehand."""
-    total: Array = np.diag(weights**2) + sum(each.T @ each for each in slopes)
+    total: Array = np.diag(weights**2) + sum(slope.T @ slope for slope in slopes)
     return total
 
 
@@ -120,8 +120,8 @@ def inverse(information: Array) -> Array:
     """The covariance; nearly infinite, not an error, where a coordinate has no influence."""
     scale = np.sqrt(np.diag(information)) + 1e-9
     scaled = information / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
-    found: Array = np.linalg.inv(scaled) / np.outer(scale, scale)
-    return found
+    inverted: Array = np.linalg.inv(scaled) / np.outer(scale, scale)
+    return inverted
 
 
 def condition(slopes: Array) -> float:
@@ -136,14 +136,14 @@ def condition(slopes: Array) -> float:
 
 def autocorrelation(residuals: Sequence[Array]) -> float:
     """Correlation of each residual with the next one of its trial."""
-    both = sum(float(each[:-1] @ each[1:]) for each in residuals)
-    return float(np.clip(both / sum(float(each @ each) for each in residuals), -0.97, 0.97))
+    product = sum(float(residual[:-1] @ residual[1:]) for residual in residuals)
+    return float(np.clip(product / sum(float(residual @ residual) for residual in residuals), -0.97, 0.97))
 
 
 def inflation(residuals: Sequence[Array], lags: int) -> float:
-    """How many times the variance of a mean is what it would be if residuals were independent (Bartlett)."""
-    total = sum(float(each @ each) for each in residuals)
-    means = sum(float(long_run(each[:, None], lags)[0, 0]) for each in residuals)
+    """Ratio of a mean's variance to its variance under independent residuals (Bartlett)."""
+    total = sum(float(residual @ residual) for residual in residuals)
+    means = sum(float(long_run(residual[:, None], lags)[0, 0]) for residual in residuals)
     return means / total
 
 
@@ -157,15 +157,15 @@ def long_run(scores: Array, lags: int) -> Array:
     """Covariance of the sum of a sequence (F, p) whose neighbours up to `lags` apart may be alike (Bartlett)."""
     total = scores.T @ scores
     for lag in range(1, min(lags, len(scores) - 1) + 1):
-        both = scores[lag:].T @ scores[:-lag]
-        total = total + (1.0 - lag / (lags + 1.0)) * (both + both.T)
-    found: Array = total
-    return found
+        products = scores[lag:].T @ scores[:-lag]
+        total = total + (1.0 - lag / (lags + 1.0)) * (products + products.T)
+    estimate: Array = total
+    return estimate
 
 
 def interval(fit: Fit, known: Knowledge, name: str) -> tuple[float, float]:
     """The 95 % interval of a free parameter in its own unit; friction's end at 0."""
-    at = fit.problem.free.index(name)
-    half, start, unknown = known.half_widths[at], fit.problem.start[name], UNKNOWNS[name]
-    low, high = (unknown.value(fit.x[at] + side * min(half, 50.0), start) for side in (-1.0, 1.0))
+    index = fit.problem.free.index(name)
+    half, start, unknown = known.half_widths[index], fit.problem.start[name], UNKNOWNS[name]
+    low, high = (unknown.value(fit.x[index] + side * min(half, 50.0), start) for side in (-1.0, 1.0))
     return (max(low, 0.0) if name in NOT_NEGATIVE else low), high

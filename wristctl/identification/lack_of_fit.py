@@ -1,4 +1,4 @@
-"""What a model lacks: residuals against the frames' own noise, and causes that are tried on what is left over.
+"""Lack of fit of a model: residuals against the frames' own noise, and causes that are tried on what is left over.
 
 A cause is a change of the model that no parameter says (springs that creep, play in the spools). Its size is found
 beside all coordinates, to first order, by one more column in the Jacobian: a score test (Rao, Proc. Cambridge Phil.
@@ -23,13 +23,13 @@ from wristctl.identification.intervals import Knowledge, sandwich
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.processes import cores
 
+# Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance.
 EVIDENT = 3.5
-"""Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance."""
 
+# Standard deviation of how far a wrist is on the way from the model's four segments to 8.
+#
+# A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells.
 _UNSURE = 5.0 / 3.0
-"""Standard deviation of how far a wrist is on the way from the model's four segments to 8.
-
-A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells."""
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 
@@ -46,31 +46,34 @@ class Cause(NamedTuple):
     """Whether less than none of it can be."""
 
 
-def _creeping_springs(trial: MeasuredTrial, own: SupposedWrist) -> Supposed:
-    return trial, own._replace(plant=TrueWrist(creep=0.01))
+def _creeping_springs(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+    return trial, supposed._replace(plant=TrueWrist(creep=0.01))
 
 
-def _creeping_tendons(trial: MeasuredTrial, own: SupposedWrist) -> Supposed:
-    return trial, own._replace(facts=TendonFacts(creep=0.01))
+def _creeping_tendons(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+    return trial, supposed._replace(facts=TendonFacts(creep=0.01))
 
 
-def _play(trial: MeasuredTrial, own: SupposedWrist) -> Supposed:
+def _play(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
     reeled = trial.reeled.copy()
     for before, now in pairwise(reeled):
         np.clip(before, now, now + 2e-5, out=now)
-    return replace(trial, reeled=reeled), own
+    return replace(trial, reeled=reeled), supposed
 
 
-def _flexion_more_damped(trial: MeasuredTrial, own: SupposedWrist) -> Supposed:
+def _flexion_more_damped(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
     factor = 1.01 if trial.plane == "flexion" else 1.0
-    return trial, own._replace(wrist=own.wrist.model_copy(update={"damping": factor * own.wrist.damping}))
+    return trial, supposed._replace(
+        wrist=supposed.wrist.model_copy(update={"damping": factor * supposed.wrist.damping})
+    )
 
 
-def _cut_finer(trial: MeasuredTrial, own: SupposedWrist) -> Supposed:
-    return trial, own
+def _cut_finer(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+    return trial, supposed
 
 
 _REST = "let the wrist rest before each trial and keep them short"
+# Possible causes of residuals, one line a cause.
 CAUSES: dict[str, Cause] = {
     "springs that creep": Cause(_creeping_springs, 1.0, "%", _REST),
     "tendons that creep": Cause(_creeping_tendons, 1.0, "%", _REST),
@@ -78,12 +81,11 @@ CAUSES: dict[str, Cause] = {
     "more damping toward flexion": Cause(_flexion_more_damped, 1.0, "%", "identify each plane by itself", signed=True),
     "8 segments": Cause(_cut_finer, 100.0, "% of the way there", "set identify.segments=8", 8),
 }
-"""What else may be behind residuals: one of these lines each."""
 
 
 @dataclass(frozen=True)
 class Suspicion:
-    """How much of a cause the residuals show, by which each free parameter would then move, as a coordinate."""
+    """Share of a cause in the residuals, and the shifts that it gives the free parameters' coordinates."""
 
     cause: str
     size: float
@@ -113,26 +115,34 @@ def suspicions(fit: Fit) -> list[Suspicion]:
     problem = fit.problem
 
     def columns(trial: MeasuredTrial) -> list[Array]:
-        own = problem.candidate(trial, fit.x)
+        candidate = problem.candidate(trial, fit.x)
 
-        def shown(trial: MeasuredTrial, own: SupposedWrist, segments: int | None = None) -> Array:
-            return trial.shown(problem.simulate(trial, [own], segments)[0], fit.values["delay"])
+        def shown(trial: MeasuredTrial, supposed: SupposedWrist, segments: int | None = None) -> Array:
+            return trial.shown(problem.simulate(trial, [supposed], segments)[0], fit.values["delay"])
 
-        expected = shown(trial, own)
-        return [(shown(*each.change(trial, own), each.segments) - expected) / each.size for each in CAUSES.values()]
+        expected = shown(trial, candidate)
+        return [
+            (shown(*cause.change(trial, candidate), cause.segments) - expected) / cause.size
+            for cause in CAUSES.values()
+        ]
 
     with ThreadPoolExecutor(cores()) as pool:
-        found = list(pool.map(columns, problem.trials))
-    every = [_suspicion(fit, name, [each[at] for each in found]) for at, name in enumerate(CAUSES)]
-    return sorted((each for each in every if each is not None), key=lambda each: -each.evidence)
+        cause_columns = list(pool.map(columns, problem.trials))
+    every = [
+        _suspicion(fit, name, [trial_columns[index] for trial_columns in cause_columns])
+        for index, name in enumerate(CAUSES)
+    ]
+    return sorted(
+        (suspicion for suspicion in every if suspicion is not None), key=lambda suspicion: -suspicion.evidence
+    )
 
 
 def _suspicion(fit: Fit, cause: str, columns: list[Array]) -> Suspicion | None:
-    if not any(each.any() for each in columns):
+    if not any(column.any() for column in columns):
         return None
     weights, x = np.append(fit.problem.prior(), 0.0), np.append(fit.x, 0.0)
-    slopes = [np.column_stack(each) / fit.noise for each in zip(fit.slopes, columns, strict=True)]
-    residuals = [each / fit.noise for each in fit.residuals]
+    slopes = [np.column_stack(parts) / fit.noise for parts in zip(fit.slopes, columns, strict=True)]
+    residuals = [residual / fit.noise for residual in fit.residuals]
     bread, variance = sandwich(slopes, residuals, weights, len(fit.problem.free) + 1)
     push = sum((a.T @ b for a, b in zip(slopes, residuals, strict=True)), -(weights**2) * x)
     *step, size = bread @ push
@@ -155,39 +165,43 @@ class Misfit(NamedTuple):
 
 
 def misfits(fit: Fit) -> list[Misfit]:
-    """Of every direction that there are trials of."""
-    own = dict[str, list[Array]]()
+    """Misfit of every direction with trials."""
+    residuals_of = dict[str, list[Array]]()
     for trial, residual in zip(fit.problem.trials, fit.residuals, strict=True):
-        own.setdefault(trial.direction, []).append(residual)
+        residuals_of.setdefault(trial.direction, []).append(residual)
     return [
         Misfit(name, len(every), float(np.sqrt(np.mean(every**2))), frame_noise(parts))
-        for name, parts in own.items()
+        for name, parts in residuals_of.items()
         for every in [np.concatenate(parts)]
     ]
 
 
-def widened(known: Knowledge, suspected: list[Suspicion], finer: Mapping[str, float]) -> Knowledge:
+def widened(knowledge: Knowledge, suspected: list[Suspicion], finer: Mapping[str, float]) -> Knowledge:
     """The knowledge with deviations that count what else is behind them: what an evident cause would move, and how
     finely the wrist bends, which trials hardly tell: by most of what a `finer` bend would move."""
-    deviation, count = known.deviation.copy(), len(finer)
-    systematic = [np.array(list(each.shifts.values())) for each in suspected if each.evident]
+    deviation, count = knowledge.deviation.copy(), len(finer)
+    systematic = [np.array(list(suspicion.shifts.values())) for suspicion in suspected if suspicion.evident]
     for shift in (*systematic, _UNSURE * np.array(list(finer.values()))):
         deviation[:count] = np.hypot(deviation[:count], shift)
-    return replace(known, deviation=deviation)
+    return replace(knowledge, deviation=deviation)
 
 
-def refuse_misfit(fit: Fit, known: Knowledge, suspected: list[Suspicion], found: list[Misfit]) -> None:
+def refuse_misfit(fit: Fit, knowledge: Knowledge, suspected: list[Suspicion], found: list[Misfit]) -> None:
     """UserError where an evident cause would move a parameter out of its interval, or residuals are far above noise."""
-    half = dict(zip(fit.problem.free, known.half_widths, strict=False))
+    half = dict(zip(fit.problem.free, knowledge.half_widths, strict=False))
     where, accept = "identify", Setting("misfit=tell", "identify")
-    for each in suspected:
-        worst = max(half, key=lambda name: abs(each.shifts[name]) / half[name])
-        if each.evident and abs(each.shifts[worst]) > half[worst]:
-            what = f"these trials look like {each.told}, which the model does not have; {worst} would be wrong by it"
-            raise UserError(what, where, (f"{CAUSES[each.cause].advice}; or take it as it is: ", accept), exit_code=3)
-    worst_fit = max(found, key=lambda each: each.ratio)
+    for suspicion in suspected:
+        worst = max(half, key=lambda name: abs(suspicion.shifts[name]) / half[name])
+        if suspicion.evident and abs(suspicion.shifts[worst]) > half[worst]:
+            problem = (
+                f"these trials look like {suspicion.told}, which the model does not have; {worst} would be wrong by it"
+            )
+            raise UserError(
+                problem, where, (f"{CAUSES[suspicion.cause].advice}; or take it as it is: ", accept), exit_code=3
+            )
+    worst_fit = max(found, key=lambda misfit: misfit.ratio)
     if worst_fit.ratio > fit.problem.settings.lack_of_fit:
-        like = next((each.told for each in suspected if each.evident), "none of the causes known")
-        size, noise = (f"{np.degrees(each):.2g} deg" for each in (worst_fit.residual, worst_fit.noise))
-        what = f"toward {worst_fit.direction} the model is off by {size}, frames by {noise}: it looks like {like}"
-        raise UserError(what, where, ("look at the figures; or take it as it is: ", accept), exit_code=3)
+        like = next((suspicion.told for suspicion in suspected if suspicion.evident), "none of the causes known")
+        size, noise = (f"{np.degrees(angle):.2g} deg" for angle in (worst_fit.residual, worst_fit.noise))
+        problem = f"toward {worst_fit.direction} the model is off by {size}, frames by {noise}: it looks like {like}"
+        raise UserError(problem, where, ("look at the figures; or take it as it is: ", accept), exit_code=3)

@@ -27,6 +27,7 @@ from wristctl.wrist.dead_band import FROM_ABOVE, FROM_BELOW
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _FORCES = {"N": 1.0}
+# The columns that there may be, and their units; a tension is one tendon's at its spool, a side has two alike.
 LOOP_TABLE = Expected(
     "measured loop",
     {
@@ -40,16 +41,15 @@ LOOP_TABLE = Expected(
     needed=("time", "angle"),
     example="time [s],angle [deg],spool_plus [mm],spool_minus [mm]",
 )
-"""The columns that there may be, and their units; a tension is one tendon's at its spool, a side has two alike."""
 _FEWEST = 100
+# Share of its whole way that what drives a loop goes back by before that is a turn.
 _TREMBLE = 0.05
-"""Share of its whole way that what drives a loop goes back by before that is a turn."""
+# Median of the absolute value of a normal variable, over its standard deviation.
 _MEDIAN = 0.6745
-"""Median of the absolute value of a normal variable, over its standard deviation."""
+# Share of the largest tension by which noise may take one below nothing.
 _NOISE = 0.05
-"""Share of the largest tension by which noise may take one below nothing."""
+# By which factor spools may go further, or less far, than the angle asks for.
 _APART = 3.0
-"""By which factor spools may go further, or less far, than the angle asks for."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +69,10 @@ class MeasuredLoop:
 
     @property
     def drive(self) -> Array:
-        """What the wrist is driven by, (T, 2)."""
-        found = self.tensions if self.spools is None else self.spools
-        assert found is not None
-        return found
+        """Input of the wrist: spools or tensions, (T, 2)."""
+        measured = self.tensions if self.spools is None else self.spools
+        assert measured is not None
+        return measured
 
     @property
     def tremble(self) -> float:
@@ -87,14 +87,14 @@ class MeasuredLoop:
     def turns(self) -> NDArray[np.int64]:
         """Samples at which what drives it turns round; small trembles do not count."""
         pulled = self.drive[:, 0] - self.drive[:, 1]
-        least, found, sign, begin = _TREMBLE * float(np.ptp(pulled)), list[int](), 1.0 if self.rises else -1.0, 0
+        least, turns, sign, begin = _TREMBLE * float(np.ptp(pulled)), list[int](), 1.0 if self.rises else -1.0, 0
         while True:
             onward = sign * pulled[begin:]
             back = np.flatnonzero(np.maximum.accumulate(onward) - onward > least)
             if not len(back):
-                return np.array(found, np.int64)
+                return np.array(turns, np.int64)
             begin += int(np.argmax(onward[: back[0]]))
-            found.append(begin)
+            turns.append(begin)
             sign = -sign
 
     @property
@@ -108,22 +108,22 @@ class MeasuredLoop:
 def read_loop(file: Path, wrist: WristParameters) -> MeasuredLoop:
     """A measured loop. Raises UserError for a file that is none, with line and column, and what would mend it."""
     read = LOOP_TABLE.read(file)
-    known = read.columns
-    spools, tensions = (_pair(known, name, str(file)) for name in ("spool", "tension"))
+    columns = read.columns
+    spools, tensions = (_pair(columns, name, str(file)) for name in ("spool", "tension"))
     if spools is None and tensions is None:
         raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {LOOP_TABLE.example}")
-    found = MeasuredLoop(file.name, known["time"], known["angle"], spools, tensions)
-    _check(found, wrist, str(file), read.lines)
-    return found
+    loop = MeasuredLoop(file.name, columns["time"], columns["angle"], spools, tensions)
+    _check(loop, wrist, str(file), read.lines)
+    return loop
 
 
-def _pair(known: Mapping[str, Array], name: str, where: str) -> Array | None:
+def _pair(columns: Mapping[str, Array], name: str, where: str) -> Array | None:
     sides = [f"{name}_plus", f"{name}_minus"]
-    there = [side for side in sides if side in known]
-    if len(there) == 1:
-        lacking = next(side for side in sides if side not in known)
-        raise UserError(f"{there[0]} without {lacking}", where, "both sides, or none")
-    return np.stack([known[side] for side in sides], axis=1) if there else None
+    present = [side for side in sides if side in columns]
+    if len(present) == 1:
+        lacking = next(side for side in sides if side not in columns)
+        raise UserError(f"{present[0]} without {lacking}", where, "both sides, or none")
+    return np.stack([columns[side] for side in sides], axis=1) if present else None
 
 
 def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequence[int]) -> None:
@@ -134,8 +134,8 @@ def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequenc
         raise UserError("time does not go on", f"{file}:{lines[back[0] + 1]}", "samples in the order of their times")
     most = float(np.abs(loop.angle).max())
     if most > 2.0 * math.radians(wrist.range_deg):
-        told = f"it bends by {math.degrees(most):.3g} deg, the wrist's range is {wrist.range_deg:g} deg"
-        raise UserError(told, file, "the angle's unit in the header, or wrist.range_deg")
+        problem = f"it bends by {math.degrees(most):.3g} deg, the wrist's range is {wrist.range_deg:g} deg"
+        raise UserError(problem, file, "the angle's unit in the header, or wrist.range_deg")
     if loop.tensions is not None:
         pushes = loop.tensions.min(axis=1) < -_NOISE * loop.tensions.max()
         if pushes.any():
@@ -155,18 +155,18 @@ def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequenc
             raise UserError(what, file, "the units in the header, or wrist.tendon_radius")
 
 
+# Coordinates of a search: the exponent, the bend's share of it, logarithms over where it begins, zeros [rad, m]; the
+# last three only where spools were measured.
 EXPONENT, SHARE, PRESLIDING, STIFFNESS, DAMPING, ANGLE_ZERO, TENDON, SPOOL_PLUS, SPOOL_MINUS = range(9)
-"""Coordinates of a search: the exponent, the bend's share of it, logarithms over where it begins, zeros [rad, m]; the
-last three only where spools were measured."""
+# Steps of finite differences.
 NUDGES = (1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-6, 1e-6)
-"""Steps of finite differences."""
+# Start of a search for presliding [m], and its width as a logarithm.
 BEGIN_PRESLIDING, WIDEST = 2e-5, math.log(1e3)
-"""Where a search for presliding begins [m], and how far it goes from there, as a logarithm."""
+# Below it a share is none.
 LEAST_SHARE = 1e-4
-"""Below it a share is none."""
 _BEGIN_FRICTION, _BEGIN_SHEATH = 0.1, 1.0
+# Share of the samples that may pass before the first that counts.
 _MOST_LOST = 0.7
-"""Share of the samples that may pass before the first that counts."""
 
 
 @dataclass(frozen=True)
@@ -185,14 +185,14 @@ class LoopProblem:
         """
         strokes = np.abs(np.diff(self.loop.angle[[0, *self.loop.turns]])) * self.wrist.tendon_offset
         long = np.flatnonzero(strokes > self.settings.known.run_up)
-        at = self.loop.turns[long[0]] if len(long) else len(self.loop.time)
-        if at > _MOST_LOST * len(self.loop.time):
-            told = f"{1e3 * self.settings.known.run_up:g} mm of its tendons' path"
+        turn = self.loop.turns[long[0]] if len(long) else len(self.loop.time)
+        if turn > _MOST_LOST * len(self.loop.time):
+            run_up = f"{1e3 * self.settings.known.run_up:g} mm of its tendons' path"
             raise UserError(
-                f"too little comes after the first turn that follows a stroke of {told}", self.loop.name,
+                f"too little comes after the first turn that follows a stroke of {run_up}", self.loop.name,
                 "record two cycles or more; for small ones lower hysteresis.known.run_up to some times the presliding",
             )  # fmt: skip
-        return int(at)
+        return int(turn)
 
     @cached_property
     def bend(self) -> float:
@@ -201,9 +201,9 @@ class LoopProblem:
 
     @property
     def measured(self) -> list[Array]:
-        """What is used of it: angle [rad] and, where spools are what moved, both tensions [N]."""
+        """Signals for the fit: angle [rad] and, where spools are what moved, both tensions [N]."""
         more = () if self.loop.winch or self.loop.tensions is None else self.loop.tensions.T
-        return [each[self.first :] for each in (self.loop.angle, *more)]
+        return [signal[self.first :] for signal in (self.loop.angle, *more)]
 
     @cached_property
     def prior(self) -> Array:
@@ -211,7 +211,7 @@ class LoopProblem:
         known = self.settings.known
         errors = known.stiffness_error, known.damping_error, math.radians(known.zero_error_deg)
         spools = known.tendon_stiffness_error, known.spool_error, known.spool_error
-        return np.array([0.0, 0.0, 0.0, *(1.0 / each for each in (*errors, *(() if self.loop.winch else spools)))])
+        return np.array([0.0, 0.0, 0.0, *(1.0 / error for error in (*errors, *(() if self.loop.winch else spools)))])
 
     def begin(self) -> Array:
         """The coordinates at the start."""
@@ -238,7 +238,7 @@ class LoopProblem:
         )
 
     def expected(self, candidates: Sequence[Array]) -> list[list[Array]]:
-        """What would have been measured at coordinates, as `measured` has it; they run side by side."""
+        """Expected measurements at coordinates, as `measured` has it; they run side by side."""
         loop, sides = self.loop, float(TENDONS_PER_SIDE)
         zeros = np.array([(0.0, 0.0) if loop.winch else x[[SPOOL_PLUS, SPOOL_MINUS]] for x in candidates])
         drive = PchipInterpolator(loop.time - loop.time[0], (sides if loop.winch else 1.0) * loop.drive)
@@ -252,13 +252,17 @@ class LoopProblem:
             course: Array = drive(time.clip(0.0, lasts))[:, :, None] + zeros[which].T
             return course
 
-        done = spooled(lanes, told, every * (math.ceil(lasts / (h * every)) + 1) + 1, h, every)
-        grid, at = h * every * np.arange(done.theta.shape[1]), (loop.time - loop.time[0])[self.first :]
-        found = []
+        courses = spooled(lanes, told, every * (math.ceil(lasts / (h * every)) + 1) + 1, h, every)
+        grid, instants = h * every * np.arange(courses.theta.shape[1]), (loop.time - loop.time[0])[self.first :]
+        signals = []
         for lane, x in enumerate(candidates):
-            pulls = () if len(self.measured) == 1 else (done.spool_plus[lane] / sides, done.spool_minus[lane] / sides)
-            found.append([np.interp(at, grid, each) for each in (done.theta[lane] + x[ANGLE_ZERO], *pulls)])
-        return found
+            pulls = (
+                () if len(self.measured) == 1 else (courses.spool_plus[lane] / sides, courses.spool_minus[lane] / sides)
+            )
+            signals.append(
+                [np.interp(instants, grid, signal) for signal in (courses.theta[lane] + x[ANGLE_ZERO], *pulls)]
+            )
+        return signals
 
     def _wrist(self, x: Array) -> WristParameters:
         own = self.wrist.stiffness * math.exp(x[STIFFNESS]), self.wrist.damping * math.exp(x[DAMPING])

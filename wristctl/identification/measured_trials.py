@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Frames that a trial must have to be of use.
 _FEWEST = 20
-"""Frames that a trial must have to be of use."""
 
+# Instants of an exposure whose mean stands for it.
 _INSTANTS = 5
-"""Instants of an exposure whose mean stands for it."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class MeasuredTrial:
     time: Array
     """(T,) [s]"""
     reeled: Array
-    """What the spools have reeled in by their count, (T, 4) [m]: two tendons of the + side, two of the - side."""
+    """Length reeled in by the spools' count, (T, 4) [m]: two tendons of the + side, two of the - side."""
     captured: Array
     """Time stamps of the frames, (F,) [s]."""
     angle: Array
-    """What they show, (F,) [rad]."""
+    """Angle in every frame, (F,) [rad]."""
     exposure: float
-    """How long the shutter is open, about the time stamp [s]; the picture shows the mean of that time."""
+    """Exposure time, about the time stamp [s]; the picture shows the mean of that time."""
 
     @property
     def plane(self) -> str:
@@ -54,15 +54,15 @@ class MeasuredTrial:
         return tendons_of(self.plane)
 
     def shown(self, course: Array, delay: float) -> Array:
-        """What the frames (F,) would show of angles (T,) on the grid, `delay` [s] before their time stamps."""
+        """Angles that the frames (F,) show of a course (T,) on the grid, `delay` [s] before their time stamps."""
         since = self.exposure * ((np.arange(_INSTANTS) + 0.5) / _INSTANTS - 0.5)
-        found: Array = np.interp(self.captured - delay + since[:, None], self.time, course).mean(axis=0)
-        return found
+        angle: Array = np.interp(self.captured - delay + since[:, None], self.time, course).mean(axis=0)
+        return angle
 
     def faster(self, factor: float) -> MeasuredTrial:
-        """The same motion in a fraction of the time, then at rest, as often seen."""
+        """Motion in a fraction of the time, then at rest, as often seen."""
         earlier = np.minimum(self.time[0] + factor * (self.time - self.time[0]), self.time[-1])
-        reeled = np.stack([np.interp(earlier, self.time, each) for each in self.reeled.T], axis=1)
+        reeled = np.stack([np.interp(earlier, self.time, travel) for travel in self.reeled.T], axis=1)
         return replace(self, reeled=reeled)
 
 
@@ -77,15 +77,15 @@ def measured_trials(
     """
     from scipy.interpolate import CubicSpline
 
-    found = []
+    trials = []
     for row in kinds.itertuples():
         number, direction = int(row.trial), str(row.direction)  # type: ignore[arg-type]
-        own, seen = log[log.trial == number], frames[frames.trial == number]
+        own, sightings = log[log.trial == number], frames[frames.trial == number]
         if float(row.push) != 0.0 or len(own) < _FEWEST:  # type: ignore[arg-type]
             continue
-        clock, captured, angle = (each.to_numpy(float) for each in (own.time, seen.captured, seen.theta))
+        clock, captured, angle = (column.to_numpy(float) for column in (own.time, sightings.captured, sightings.theta))
         time = np.arange(clock[0], clock[-1], grid)
-        usable = (seen.verdict == "ok").to_numpy() & np.isfinite(angle)
+        usable = (sightings.verdict == "ok").to_numpy() & np.isfinite(angle)
         usable &= (captured >= time[0]) & (captured <= time[-1])
         if usable.sum() < _FEWEST:
             continue
@@ -96,16 +96,16 @@ def measured_trials(
         steps = own[[f"position_{tendon}" for tendon in trial.tendons]].to_numpy(float)
         # What is held over a step is what its middle has. Chords would cut the corners of 5 ms.
         reeled = step_length * CubicSpline(own.counted, steps)(time + 0.5 * grid)
-        found.append(replace(trial, reeled=reeled))
-    if not found:
+        trials.append(replace(trial, reeled=reeled))
+    if not trials:
         raise UserError(
             f"no trial without a push has {_FEWEST} usable frames", label, "name an hw-run run with trials that ended"
         )
-    return found
+    return trials
 
 
+# Frames of delay that a simulated camera may have.
 MOST_DELAYED = 20.0
-"""Frames of delay that a simulated camera may have."""
 
 
 def camera_parameters(frames: pd.DataFrame, delay: float, noise: float) -> dict[str, float]:

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Tick of the simulation [s], and how many of them lie between two rows of the log.
 _PERIOD, _LOGGED = 1e-3, 5
-"""Tick of the simulation [s], and how many of them lie between two rows of the log."""
 
 
 _SPREADS = tuple(name for name in TrueWrist.model_fields if name.endswith("_spread"))
@@ -43,7 +43,7 @@ _NOTHING_ELSE, _NOR_OF_TENDONS = TrueWrist(), TendonFacts()
 
 @dataclass(frozen=True)
 class RehearsedTruth:
-    """What the bench has and its user does not know.
+    """True parameters of a rehearsed bench, unknown to its user.
 
     The marker's zero angle [deg] in the ulnar and the flexion plane, and what tendons 1, 2, 4, 5 have reeled in more
     than their spools' counts say [m].
@@ -59,9 +59,9 @@ class RehearsedTruth:
     exposure: float = 4e-3
     dropped: float = 0.05
     plant: TrueWrist = _NOTHING_ELSE
-    """What else is true of its wrist, and the plant's model."""
+    """Further true parameters of the wrist, and the plant's model."""
     facts: TendonFacts = _NOR_OF_TENDONS
-    """What else its tendons do."""
+    """Further true facts of the tendons."""
     segments: int = Loop().plant_segments
 
     def __post_init__(self) -> None:
@@ -81,14 +81,14 @@ def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: fl
 
 
 def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float, motor: Motor) -> Array:
-    """What both sides' spools have reeled in (T, 2) [m] each millisecond, as their host counts.
+    """Length reeled in by both sides' spools (T, 2) [m] every millisecond, as their host counts.
 
     Feedforward follows a reference; it believes in `actuator`, and the motors turn as `motor` does.
     """
     followed, law = motion(reference, wrist, horizon, _PERIOD), controller("feedforward")
     loop = Loop(actuator=actuator)
-    done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
-    sides = [2.0 * done.column(name, 0) for name in ("tension_plus", "tension_minus")]
+    rolled = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
+    sides = [2.0 * rolled.column(name, 0) for name in ("tension_plus", "tension_minus")]
     commands = np.stack([*sides, followed.theta_ref], axis=1)
     drive = SpoolDrive(motor)
     out = np.empty((len(commands), 2))
@@ -103,7 +103,7 @@ def rehearse(
     """The tables log, frames and trials of moves, each from rest; a controller believes in `wrist` and `actuator`."""
     import pandas as pd
 
-    logs, seen, kinds = [], [], []
+    logs, sightings, kinds = [], [], []
     for number, (direction, reference) in enumerate(moves):
         side = DIRECTIONS[direction]
         motor = counted_motor(actuator, truth.actuator)
@@ -126,9 +126,9 @@ def rehearse(
         verdict = np.where(kept, "ok", "no tip")
         theta = np.where(kept, theta, np.nan)
         columns = {"trial": number, "captured": captured, "used": captured + 0.01, "theta": theta, "verdict": verdict}
-        seen.append(pd.DataFrame(columns))
+        sightings.append(pd.DataFrame(columns))
         kinds.append({"trial": number, "direction": direction, "push": 0.0})
-    return pd.concat(logs), pd.concat(seen), pd.DataFrame(kinds)
+    return pd.concat(logs), pd.concat(sightings), pd.DataFrame(kinds)
 
 
 def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:

@@ -1,4 +1,4 @@
-"""What can be identified, and in which coordinate: logarithms of what is positive, friction and delay as they are."""
+"""Identifiable parameters and their coordinates: logarithms of what is positive, friction and delay as they are."""
 
 import math
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class Unknown(NamedTuple):
     tolerance: float
 
     def coordinate(self, value: float, start: float) -> float:
-        """Where the search stands at this value, having begun at `start`."""
+        """Coordinate of the search at a value, having begun at `start`."""
         return math.log(value / start) if self.log else value
 
     def value(self, coordinate: float, start: float) -> float:
@@ -40,6 +40,7 @@ class Unknown(NamedTuple):
         return (math.log(self.low), math.log(self.high)) if self.log else (self.low, self.high)
 
 
+# The table of parameters. All but tendon_radius and presliding begin without any knowledge beyond the bounds.
 UNKNOWNS = {
     each.name: each
     for each in (
@@ -54,32 +55,31 @@ UNKNOWNS = {
         Unknown("tendon_radius", "m", "radius of the tendons' circle, the pulley's as known", True, 0.8, 1.25, 1.0),
     )
 }
-"""The table of parameters. All but tendon_radius and presliding begin without any knowledge beyond the bounds."""
 
+# Coefficient that stands for none, where sheaths have friction.
 _LEAST_FRICTION = 1e-9
-"""Coefficient that stands for none, where sheaths have friction."""
 
 
 def tendons_of_values(values: Mapping[str, float]) -> dict[str, float]:
     """The leaves of an actuator that parameters say: stiffness and friction of its tendons, their sheaths' angle."""
     friction = max(values["friction"], _LEAST_FRICTION)
     sheath = values["sheath_friction"] / friction
-    found = {name: values[name] for name in ("tendon_stiffness", "presliding")}
-    return found | {"friction": friction, "sheath": sheath}
+    nonideal = {name: values[name] for name in ("tendon_stiffness", "presliding")}
+    return nonideal | {"friction": friction, "sheath": sheath}
 
 
 def believed_of(wrist: WristParameters, actuator: Actuator) -> dict[str, float]:
     """The parameters as a controller believes them, of a camera whose pictures are as old as their time stamps."""
-    own = {name: getattr(wrist, name) for name in ("stiffness", "flexion_ratio", "damping", "tendon_radius")}
+    wrist_values = {name: getattr(wrist, name) for name in ("stiffness", "flexion_ratio", "damping", "tendon_radius")}
     tendons = {name: float(getattr(actuator, name)) for name in ("tendon_stiffness", "friction", "presliding")}
-    return own | tendons | {"sheath_friction": actuator.friction * actuator.sheath, "delay": 0.0}
+    return wrist_values | tendons | {"sheath_friction": actuator.friction * actuator.sheath, "delay": 0.0}
 
 
+# Parameters with a lower bound of zero, which they may reach.
 NOT_NEGATIVE = ("friction", "sheath_friction")
-"""Those that end at zero, where they may well be."""
 
+# Parameters of the forward model; the delay shifts its outcome in time.
 SIMULATED = tuple(name for name in UNKNOWNS if name != "delay")
-"""Those that the forward model holds; the delay shifts its outcome in time."""
 
 
 _WRIST = ("stiffness", "flexion_ratio", "damping", "tendon_radius")
@@ -91,7 +91,7 @@ def identified_yaml(values: Mapping[str, float], camera: Mapping[str, float]) ->
     lines += [
         "    actuator:",
         "      level: tendon",
-        *(f"      {name}: {each!r}" for name, each in tendons_of_values(values).items()),
+        *(f"      {name}: {value!r}" for name, value in tendons_of_values(values).items()),
     ]
     lines += ["    sensor:", "      level: camera", *(f"      {name}: {value!r}" for name, value in camera.items())]
     return "\n".join(lines) + "\n"
@@ -102,8 +102,8 @@ def with_identified(study: Study, command: str, text: str) -> Study:
 
     Their levels stay as they are.
     """
-    found = parse_yaml(text, "identified.yaml").data
-    loop = found["simulate"]["loop"]
+    mapping = parse_yaml(text, "identified.yaml").data
+    loop = mapping["simulate"]["loop"]
     parts = {name: {k: v for k, v in loop[name].items() if k != "level"} for name in ("actuator", "sensor")}
     name = command.replace("-", "_")
     settings = getattr(study, name)
@@ -113,12 +113,12 @@ def with_identified(study: Study, command: str, text: str) -> Study:
         if isinstance(value, Loop):
             changed[leaf] = _known(value, parts)
         elif leaf == "loops":
-            changed[leaf] = {key: _known(each, parts) for key, each in value.items()}
+            changed[leaf] = {key: _known(part, parts) for key, part in value.items()}
         elif leaf in parts:
             changed[leaf] = value.model_copy(update=parts[leaf])
-    wrist = study.wrist.model_copy(update=found["wrist"])
+    wrist = study.wrist.model_copy(update=mapping["wrist"])
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})
 
 
 def _known(loop: Loop, parts: Mapping[str, Mapping[str, Any]]) -> Loop:
-    return loop.model_copy(update={name: getattr(loop, name).model_copy(update=each) for name, each in parts.items()})
+    return loop.model_copy(update={name: getattr(loop, name).model_copy(update=part) for name, part in parts.items()})

@@ -1,4 +1,4 @@
-"""What gains are worth: their metrics on many cases beside those of `feedforward` there, in decades."""
+"""Objective of a search for gains: their metrics on many cases beside those of `feedforward` there, in decades."""
 
 from collections.abc import Sequence
 
@@ -12,22 +12,22 @@ from wristctl.control.table import controller
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.metrics import METRICS
 
+# A law without feedback, which cannot be unstable: what every gains are measured by.
 YARDSTICK = "feedforward"
-"""A law without feedback, which cannot be unstable: what every gains are measured by."""
+# Decades that a case counts where the wrist left its range at its very end, and one more where it did at once.
 _FAILED = 3.0
-"""Decades that a case counts where the wrist left its range at its very end, and one more where it did at once."""
 
 
 def marks_of(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters) -> dict[str, int]:
     """On how many cases gains (g,) fail, swing, chatter, or do not converge, by mark; without those of none."""
-    found = measure(law, gains[None], cases, wrist, ["oscillation"])
+    measured = measure(law, gains[None], cases, wrist, ["oscillation"])
     holds = {
-        "failed": found.failed,
-        "limit cycle": found.limit_cycles & ~found.failed,
-        "chatters": (found.chatter > 0.0) & ~found.failed,
-        "not converged": found.unconverged & ~found.failed,
+        "failed": measured.failed,
+        "limit cycle": measured.limit_cycles & ~measured.failed,
+        "chatters": (measured.chatter > 0.0) & ~measured.failed,
+        "not converged": measured.unconverged & ~measured.failed,
     }
-    counts = {mark: int(each.sum()) for mark, each in holds.items()}
+    counts = {mark: int(worlds.sum()) for mark, worlds in holds.items()}
     return {mark: count for mark, count in counts.items() if count}
 
 
@@ -57,8 +57,8 @@ class Judge:
         At the default integration step; only gains that would be the best are measured at steps that are short enough,
         the most promising first, so that a search never ends with what the step alone makes good.
         """
-        found = measure(law, gains, self._cases, self._wrist, self._metrics, converge=False)
-        values, sure = self.value(found), np.zeros(len(gains), bool)
+        measured = measure(law, gains, self._cases, self._wrist, self._metrics, converge=False)
+        values, sure = self.value(measured), np.zeros(len(gains), bool)
         while not sure.all():
             next_ = int(np.argmin(np.where(sure, np.inf, values)))
             if values[next_] >= best:
@@ -67,25 +67,25 @@ class Judge:
             best = min(best, float(values[next_]))
         return values
 
-    def value(self, found: Measured) -> Array:
+    def value(self, measured: Measured) -> Array:
         """Objective (P,) of what was measured on the cases."""
-        value = np.zeros(found.failed.shape)
+        value = np.zeros(measured.failed.shape)
         for name, weight in self._weights.weights().items():
-            own, known = self._sizes(name, found.metrics[name]), self._known(name)
+            own, known = self._sizes(name, measured.metrics[name]), self._known(name)
             value = value + weight * np.log10(own / known)
-        lost = found.failed | np.isnan(value)
-        value = np.where(lost, _FAILED + 1.0 - found.lasted, value)
-        cells = np.stack([value[:, self._cells == each].mean(axis=1) for each in np.unique(self._cells)], axis=1)
+        lost = measured.failed | np.isnan(value)
+        value = np.where(lost, _FAILED + 1.0 - measured.lasted, value)
+        cells = np.stack([value[:, self._cells == cell].mean(axis=1) for cell in np.unique(self._cells)], axis=1)
         total: Array = value.mean(axis=1) + self._weights.worst * cells.max(axis=1)
         if self._weights.swinging:
-            total = total + self._weights.swinging * np.sqrt(found.swings.mean(axis=1))
+            total = total + self._weights.swinging * np.sqrt(measured.swings.mean(axis=1))
         return total
 
     def _known(self, name: str) -> Array:
         """The yardstick's, (1, C); where that has failed, which is the same for all laws, its median elsewhere."""
         sizes = self._sizes(name, self._yardstick.metrics[name])
-        there = np.isfinite(sizes)
-        return np.where(there, sizes, np.median(sizes[there]) if there.any() else METRICS[name].floor)
+        finite = np.isfinite(sizes)
+        return np.where(finite, sizes, np.median(sizes[finite]) if finite.any() else METRICS[name].floor)
 
     def _sizes(self, name: str, values: Array) -> Array:
         """A metric (.., C) with its floor; what never happens counts what its metric says of the horizon."""
@@ -93,6 +93,6 @@ class Judge:
         if name == "oscillation":
             values = np.where(np.isnan(values), 0.0, values)  # no time to rest; a failure counts by itself
         elif metric.never is not None:
-            values = np.where(np.isnan(values), np.array([metric.never(each) for each in self._horizons]), values)
-        found: Array = values + metric.floor
-        return found
+            values = np.where(np.isnan(values), np.array([metric.never(horizon) for horizon in self._horizons]), values)
+        costs: Array = values + metric.floor
+        return costs

@@ -68,9 +68,9 @@ class GainSpace:
         """Points (..., g) of the unit cube of gains (..., g); UserError for a gain outside its box."""
         outside = ~((gains >= self.low) & (gains <= self.high))
         if outside.any():
-            at = int(np.argmax(outside.reshape(-1, len(self.names)).any(axis=0)))
-            box = f"{self.low[at]:g} to {self.high[at]:g}"
-            raise UserError(f"gain {self.names[at]} outside its search box", fix=f"start within {box}")
+            column = int(np.argmax(outside.reshape(-1, len(self.names)).any(axis=0)))
+            box = f"{self.low[column]:g} to {self.high[column]:g}"
+            raise UserError(f"gain {self.names[column]} outside its search box", fix=f"start within {box}")
         return np.log10(gains / self.low) / self.decades
 
 
@@ -97,12 +97,12 @@ class Finalist(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """What a search found, and its course."""
+    """Result of a search for gains, and its course."""
 
     controller: str
     gains: dict[str, float]
     objective: float
-    """Of the gains, on the cases that they were chosen by."""
+    """Objective of the gains, on the cases that they were chosen by."""
     evaluations: int
     tried: Tried
     restarts: int
@@ -113,8 +113,10 @@ class Search:
     def best_so_far(self) -> Array:
         """Least objective up to each iteration of each search, (restarts, iterations of one); nan where not begun."""
         least = self.tried.values.min(axis=1)
-        each = -(-len(least) // self.restarts)
-        padded = np.append(least, np.full(each * self.restarts - len(least), np.nan)).reshape(self.restarts, each)
+        iterations = -(-len(least) // self.restarts)
+        padded = np.append(least, np.full(iterations * self.restarts - len(least), np.nan)).reshape(
+            self.restarts, iterations
+        )
         return np.minimum.accumulate(padded, axis=1)
 
 
@@ -139,7 +141,7 @@ def check_tunable(controller: Controller) -> None:
 
 
 def tuning_cases(study: Study, network: Inverse | None = None) -> tuple[list[Case], list[Case]]:
-    """What gains are searched on, and what the best of them are chosen by: other worlds, or other noise.
+    """Cases for the search, and cases for the choice among its best gains: other worlds, or other noise.
 
     The latter are none where nothing is random.
     """
@@ -154,22 +156,22 @@ def tuning_cases(study: Study, network: Inverse | None = None) -> tuple[list[Cas
         )
     check_loops(settings)
     cases = _scenarios(study, Draws(study.seed, "tuning"), settings.repetitions, network)
-    drawn = any(is_random(settings.loops[each.loop]) for each in settings.scenarios)
+    drawn = any(is_random(settings.loops[scenario.loop]) for scenario in settings.scenarios)
     return cases, _scenarios(
         study, Draws(study.seed, "validation"), settings.worlds.validation, network
     ) if drawn else []
 
 
 def _scenarios(study: Study, draws: Draws, repetitions: int, network: Inverse | None) -> list[Case]:
-    """Each scenario as often as asked for, where that makes a difference."""
+    """Cases of every scenario, repeated where the loop is random."""
     settings, cases = study.tune, list[Case]()
     for cell, scenario in enumerate(settings.scenarios):
         loop = settings.loops[scenario.loop]
         times = repetitions if is_random(loop) else 1
         period, name = sample_period(loop.control_period), scenario_of(scenario.reference, "ulnar")
         followed = motion(scenario.reference, study.wrist, settings.horizon, period, network)
-        for k, own in enumerate(loops_of(loop, [draws.plant(each) for each in range(times)])):
-            cases.append(Case(own, followed, draws.camera(name, k), cell))
+        for k, plant_loop in enumerate(loops_of(loop, [draws.plant(draw) for draw in range(times)])):
+            cases.append(Case(plant_loop, followed, draws.camera(name, k), cell))
     return cases
 
 
@@ -192,21 +194,21 @@ def search(
     settings, space, (judge, choose) = study.tune, GainSpace.of(controller.gains), judges
     values, tried = list[Array](), list[Array]()
     for gains, tell in _searches(settings, controller, space, streams):
-        at = len(values)
-        if known is not None and at < len(known.values):
-            if not np.array_equal(gains, known.gains[at]):
-                what = f"the run to resume tried other gains of {controller.name} in iteration {at}"
-                raise UserError(what, "tune.resume", "the settings, seed and version that it had")
-            value = known.values[at]
+        iteration = len(values)
+        if known is not None and iteration < len(known.values):
+            if not np.array_equal(gains, known.gains[iteration]):
+                problem = f"the run to resume tried other gains of {controller.name} in iteration {iteration}"
+                raise UserError(problem, "tune.resume", "the settings, seed and version that it had")
+            value = known.values[iteration]
         else:
-            value = judge.beside(controller, gains, min((float(each.min()) for each in values), default=np.inf))
+            value = judge.beside(controller, gains, min((float(best.min()) for best in values), default=np.inf))
         tell(value)
         values.append(value)
         tried.append(gains)
-        found = _found(controller, Tried(np.array(values), np.array(tried)), settings.restarts)
+        result = _found(controller, Tried(np.array(values), np.array(tried)), settings.restarts)
         if progress is not None:
-            progress(found)
-    return _chosen(controller, found, judge, choose, settings.finalists)
+            progress(result)
+    return _chosen(controller, result, judge, choose, settings.finalists)
 
 
 def _searches(
@@ -231,15 +233,15 @@ def _searches(
 
 
 def _contained(optimiser: str) -> AbstractContextManager[None]:
-    """What surrounds the calls of an optimiser: nothing, unless it is from elsewhere."""
+    """Context around the calls of an optimiser: empty, unless it is from elsewhere."""
     origin = OPTIMISERS.origin(optimiser)
     return contained(f"the optimiser {optimiser}", origin.reference) if origin else nullcontext()
 
 
 def _presets(controller: Controller, space: GainSpace) -> dict[str, Array]:
     """The presets within the search box, by name, each (g,)."""
-    given = {name: np.array(controller.values(each)) for name, each in controller.presets.items()}
-    return {name: each for name, each in given.items() if ((each >= space.low) & (each <= space.high)).all()}
+    preset_gains = {name: np.array(controller.values(preset)) for name, preset in controller.presets.items()}
+    return {name: gains for name, gains in preset_gains.items() if ((gains >= space.low) & (gains <= space.high)).all()}
 
 
 def _start(controller: Controller, space: GainSpace) -> Array:
@@ -249,31 +251,31 @@ def _start(controller: Controller, space: GainSpace) -> Array:
 
 
 def _found(controller: Controller, tried: Tried, restarts: int) -> Search:
-    at = np.unravel_index(int(np.argmin(tried.values)), tried.values.shape)
-    gains = dict(zip(controller.gains, map(float, tried.gains[at]), strict=True))
+    best = np.unravel_index(int(np.argmin(tried.values)), tried.values.shape)
+    gains = dict(zip(controller.gains, map(float, tried.gains[best]), strict=True))
     return Search(controller.name, gains, float(tried.values.min()), tried.values.size, tried, restarts)
 
 
-def _chosen(controller: Controller, found: Search, judge: Judge, choose: Judge | None, count: int) -> Search:
+def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge | None, count: int) -> Search:
     """The best on the cases to choose by, of the search's best candidates and the presets."""
-    flat, values = found.tried.gains.reshape(-1, len(controller.gains)), found.tried.values.ravel()
+    flat, values = result.tried.gains.reshape(-1, len(controller.gains)), result.tried.values.ravel()
     distinct: dict[tuple[float, ...], float] = {}
-    for at in np.argsort(values, kind="stable"):
-        distinct.setdefault(tuple(map(float, flat[at])), float(values[at]))
-    known = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
+    for index in np.argsort(values, kind="stable"):
+        distinct.setdefault(tuple(map(float, flat[index])), float(values[index]))
+    candidates = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
     if presets := _presets(controller, GainSpace.of(controller.gains)):
         judged = judge(controller, np.array(list(presets.values())))
         for (name, each), value in zip(presets.items(), judged, strict=True):
-            known.append((tuple(map(float, each)), name, float(value)))
+            candidates.append((tuple(map(float, each)), name, float(value)))
     if choose is None:
-        validated = judge(controller, np.array([gains for gains, *_ in known]))
+        validated = judge(controller, np.array([gains for gains, *_ in candidates]))
     else:
-        validated = choose(controller, np.array([gains for gains, *_ in known]))
-    every = [Finalist(*each, float(value)) for each, value in zip(known, validated, strict=True)]
-    ordered = tuple(sorted(every, key=lambda each: each.validated))
+        validated = choose(controller, np.array([gains for gains, *_ in candidates]))
+    every = [Finalist(*each, float(value)) for each, value in zip(candidates, validated, strict=True)]
+    ordered = tuple(sorted(every, key=lambda finalist: finalist.validated))
     best = dict(zip(controller.gains, ordered[0].gains, strict=True))
     return Search(
-        controller.name, best, ordered[0].validated, found.evaluations, found.tried, found.restarts, ordered
+        controller.name, best, ordered[0].validated, result.evaluations, result.tried, result.restarts, ordered
     )  # fmt: skip
 
 
@@ -295,17 +297,17 @@ def search_unit(study: Study, law: str) -> Unit:
 
 
 def searched(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """What `search_unit` asks for: all that was tried, and the finalists, best first."""
+    """Result of one unit of `search_unit`: all gains that were tried, and the finalists, best first."""
     study, law = Study.model_validate_json(json.dumps(spec["study"])), controller(spec["law"])
-    cases, others = tuning_cases(study)
-    judges = Judge(cases, study.wrist, study.tune.objective), Judge(others, study.wrist, study.tune.objective)
-    found = search(study, law, lambda name: stream(study.seed, name), judges)
+    cases, validation_cases = tuning_cases(study)
+    judges = Judge(cases, study.wrist, study.tune.objective), Judge(validation_cases, study.wrist, study.tune.objective)
+    result = search(study, law, lambda name: stream(study.seed, name), judges)
     return {
-        "values": found.tried.values,
-        "gains": found.tried.gains,
-        "finalists": np.array([each.gains for each in found.finalists]),
-        "origins": np.array([each.origin for each in found.finalists]),
-        "judged": np.array([(each.objective, each.validated) for each in found.finalists]),
+        "values": result.tried.values,
+        "gains": result.tried.gains,
+        "finalists": np.array([finalist.gains for finalist in result.finalists]),
+        "origins": np.array([finalist.origin for finalist in result.finalists]),
+        "judged": np.array([(finalist.objective, finalist.validated) for finalist in result.finalists]),
     }
 
 
@@ -322,35 +324,35 @@ def search_of(arrays: Mapping[str, np.ndarray], law: str, restarts: int) -> Sear
     return Search(law, best, finalists[0].validated, tried.values.size, tried, restarts, finalists)
 
 
-def history(found: Search) -> pd.DataFrame:
+def history(result: Search) -> pd.DataFrame:
     """Every candidate of every search: restart, iteration, candidate, objective and gains."""
-    iterations, candidates = found.tried.values.shape
-    each = -(-iterations // found.restarts)
-    at = np.repeat(np.arange(iterations), candidates)
+    iterations, candidates = result.tried.values.shape
+    per_restart = -(-iterations // result.restarts)
+    iteration = np.repeat(np.arange(iterations), candidates)
     columns = {
-        "restart": at // each,
-        "iteration": at % each,
+        "restart": iteration // per_restart,
+        "iteration": iteration % per_restart,
         "candidate": np.tile(np.arange(candidates), iterations),
-        "objective": found.tried.values.ravel(),
+        "objective": result.tried.values.ravel(),
     }
-    gains = np.concatenate(found.tried.gains).T
-    return pd.DataFrame(columns | dict(zip(found.gains, gains, strict=True)))
+    gains = np.concatenate(result.tried.gains).T
+    return pd.DataFrame(columns | dict(zip(result.gains, gains, strict=True)))
 
 
 def tried_of(table: pd.DataFrame, gains: Sequence[str]) -> Tried:
-    """What a history says was tried, as far as its iterations are whole."""
+    """Gains and values of a history's complete iterations."""
     candidates = int(table["candidate"].max()) + 1
-    whole = len(table) // candidates
-    rows = table.iloc[: whole * candidates]
-    values = rows["objective"].to_numpy(float).reshape(whole, candidates)
-    return Tried(values, rows[list(gains)].to_numpy(float).reshape(whole, candidates, len(gains)))
+    complete = len(table) // candidates
+    rows = table.iloc[: complete * candidates]
+    values = rows["objective"].to_numpy(float).reshape(complete, candidates)
+    return Tried(values, rows[list(gains)].to_numpy(float).reshape(complete, candidates, len(gains)))
 
 
-def finalists(found: Search) -> pd.DataFrame:
+def finalists(result: Search) -> pd.DataFrame:
     """The gains that were judged anew, best first."""
     rows = [
-        {"origin": each.origin, "objective": each.objective, "validated": each.validated}
-        | dict(zip(found.gains, each.gains, strict=True))
-        for each in found.finalists
+        {"origin": finalist.origin, "objective": finalist.objective, "validated": finalist.validated}
+        | dict(zip(result.gains, finalist.gains, strict=True))
+        for finalist in result.finalists
     ]
     return pd.DataFrame(rows)

@@ -1,4 +1,4 @@
-"""What every optimiser is: it proposes candidates in the unit box and learns their values, smaller is better.
+"""Base of every optimiser: it proposes candidates in the unit box and learns their values, smaller is better.
 
 An optimiser never calls the objective (ask/tell), so a whole generation is evaluated as one batch. A method is one
 class: how it proposes the next candidates and what it keeps of their values; `Optimiser` does the rest.

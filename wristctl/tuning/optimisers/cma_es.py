@@ -11,8 +11,8 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.tuning.optimisers.base import Optimiser
 
+# First standard deviation, as Hansen has it for an optimum somewhere in a unit box.
 _STEP = 0.3
-"""First standard deviation, as Hansen has it for an optimum somewhere in a unit box."""
 
 
 class CMAES(Optimiser):

@@ -9,10 +9,10 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.tuning.optimisers.base import Optimiser
 
+# Range of the weight of differences, drawn anew for every generation.
 _WEIGHT = (0.5, 1.0)
-"""Range of the weight of differences, drawn anew for every generation."""
+# Probability with which a coordinate is taken from the mutant.
 _CROSSOVER = 0.7
-"""Probability with which a coordinate is taken from the mutant."""
 
 
 class DifferentialEvolution(Optimiser):

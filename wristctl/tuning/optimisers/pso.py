@@ -12,14 +12,14 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.tuning.optimisers.base import Optimiser
 
+# Acceleration towards either best; the two together must exceed 4.
 _PULL = 2.05
-"""Acceleration towards either best; the two together must exceed 4."""
+# 0.7298: the swarm converges for any pull (Clerc and Kennedy, eq. 4).
 _CONSTRICTION = 2.0 / (2.0 * _PULL - 2.0 + math.sqrt(4.0 * _PULL**2 - 8.0 * _PULL))
-"""0.7298: the swarm converges for any pull (Clerc and Kennedy, eq. 4)."""
+# Largest step of a coordinate, a twentieth of the box: longer ones settle later.
 _FASTEST = 0.05
-"""Largest step of a coordinate, a twentieth of the box: longer ones settle later."""
+# Standard deviation of a leap from the swarm's best point, along one coordinate.
 _LEAP = 0.1
-"""Standard deviation of a leap from the swarm's best point, along one coordinate."""
 
 
 class ParticleSwarm(Optimiser):
