@@ -101,7 +101,7 @@ worlds: .venv/run
 # repeated, other surroundings and processors.
 test-trust: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/faults tests/cli/test_kill.py tests/cli/test_crowd.py \
-	  tests/cli/test_environments.py tests/cli/test_replay.py tests/records/test_query.py tests/lanes/test_processors.py
+	  tests/cli/test_environments.py tests/cli/test_closed_pipe.py tests/cli/test_replay.py tests/records/test_query.py tests/lanes/test_processors.py
 
 # Small wrong changes to a copy of the package: does a test notice each? The listed ones, or `make mutants SEED=7`.
 mutants: .venv/dev

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import subprocess
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -43,17 +44,45 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         subprocess.run(["umount", str(disk)], check=True)
 
 
+_TOGETHER = {"board": ("tests/board", "tests/firmware"), "trial": ("tests/bench", "tests/trial")}
+"""Folders whose files all go to one process."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """How many tests were skipped, by what they lack: a suite that is green has not tried them."""
+    reasons = [str(each.longrepr[2]) for each in terminalreporter.stats.get("skipped", []) if len(each.longrepr) == 3]
+    kinds = Counter(_lacking(reason.removeprefix("Skipped: ")) for reason in reasons)
+    if kinds:
+        told = "; ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        terminalreporter.write_line(f"not tried: {told}")
+
+
+_LACKS = {
+    "simavr": "simavr", "octave": "Octave", "avr-gcc": "the firmware's compiler", "chrom": "a browser",
+    "runs alone": "a run alone (make test-rig)", "long": "WRISTCTL_THOROUGH", "minutes": "WRISTCTL_THOROUGH",
+    "thorough": "WRISTCTL_THOROUGH",
+}  # fmt: skip
+"""Kinds of what a skipped test lacks, by a word of its reason; any other reason is a kind of its own."""
+
+
+def _lacking(reason: str) -> str:
+    return next((kind for word, kind in _LACKS.items() if word in reason.lower()), reason)
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Over several processes (`pytest -n 2`) each file goes to one, so that its fixtures are made once.
 
-    The boards all go to the same: one process compiles their emulator, and what runs in real time has no rival there.
+    Benches and trials run in one process, where what is in real time has no rival; so do the boards, in another.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            board = nodeid.startswith(("tests/board", "tests/bench", "tests/trial", "tests/vision", "tests/firmware"))
-            return "board" if board else nodeid.partition("::")[0]
+            for group, folders in _TOGETHER.items():
+                if nodeid.startswith(folders):
+                    return group
+            return nodeid.partition("::")[0]
 
     return ByFile(config, log)

@@ -65,7 +65,7 @@ def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> N
 
 def test_every_table_holds_what_was_found_in_the_units_of_its_heads(tmp_path: Path) -> None:
     """A loop that is stable above a gain too, so that no column is empty; frequencies in Hz, angles in deg."""
-    lagged = "simulate.loop={plant_segments: 1, actuator: {level: lagged}, sensor: {level: camera}}"
+    lagged = "simulate.loop={actuator: {level: lagged}, sensor: {level: camera}}"
     law = "simulate={controller: smc-tracking, gains: camera, horizon: 0.2}"
     done = analyse(lagged, law, "analyse.angles_deg=[0.0, 20.0]", out=tmp_path)
     run, turn, last = done.run, 2.0 * math.pi, done.found[-1]

@@ -51,7 +51,7 @@ def test_an_audit_compares_in_memory_too_and_says_where_it_is_shown(
 def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
     axes = {
         "directions": "[ulnar, radial, flexion]",
-        "loops": "{fast: {plant_segments: 1}, two: {plant_segments: 2}}",
+        "loops": "{fast: {plant_segments: 1}, two: {plant_segments: 1, control_period: 2.0e-3}}",
         "references": "[{duration: 0.01}, {kind: step, angle_deg: 5.0}]",
         "inverses": "[none, exact]",
         "rows": "[{controller: pid, gains: printed}, {controller: smc, gains: printed}, {controller: feedforward}]",

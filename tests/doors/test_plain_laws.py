@@ -43,7 +43,7 @@ def plain(law: Any, **more: Any) -> Controller:
 def run(law: Controller, gains: np.ndarray, loop: Loop | None = None, **more: Any) -> Outcome:
     followed = motion(Reference(angle_deg=20.0, duration=0.3), WRIST, 0.5, 1e-3)
     which = np.zeros(len(gains), np.int64)
-    return rollout(law, gains, [followed], which, loop or Loop(plant_segments=2), WRIST, record=True, **more)
+    return rollout(law, gains, [followed], which, loop or Loop(), WRIST, record=True, **more)
 
 
 @pytest.mark.parametrize("rig", [False, True], ids=["ideal", "camera and tendons"])
@@ -51,7 +51,7 @@ def test_a_plain_law_moves_the_wrist_as_the_compiled_one_does(rig: bool) -> None
     names = list(COMPUTED_TORQUE.gains)
     law = plain(ct, gains=COMPUTED_TORQUE.gains, presets={})
     levels = {"actuator": {"level": "tendon"}, "sensor": {"level": "camera"}, "control_period": 5e-3} if rig else {}
-    loop = Loop.model_validate({"plant_segments": 2, **levels})
+    loop = Loop.model_validate(levels)
     values = {"w": 15.0, "zeta": 1.0}
     gains = np.array([[values[name] for name in names]])
     ours, theirs = run(law, gains, loop), run(COMPUTED_TORQUE, gains, loop)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -39,9 +40,13 @@ class Elsewhere:
         (folder / "study.yaml").write_text(STUDY)
 
     def __call__(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        return self.python("-m", "elsewhere", *arguments, **environment)
+
+    def python(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        """Python, where the newcomers' package is found."""
         path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)]), "COLUMNS": "80"}
-        command, own = [sys.executable, "-m", "elsewhere", *arguments], os.environ | path | environment
-        return subprocess.run(command, cwd=self.folder, env=own, capture_output=True, text=True)
+        own = os.environ | path | environment
+        return subprocess.run([sys.executable, *arguments], cwd=self.folder, env=own, capture_output=True, text=True)
 
     def run(self, *arguments: str) -> tuple[Run, str]:
         """The run that a command leaves, and what it printed."""
@@ -97,24 +102,43 @@ def test_a_tremor_shakes_and_another_plant_moves_otherwise(compared: tuple[Run, 
     assert 7 <= int(np.argmax(spectrum[4:])) + 4 <= 9  # Hz
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (("simulate", "--set", "reference.kind=swep"), "did you mean 'sweep'?"),
-        (("simulate", "--controller", "lqrr"), "did you mean 'lqr'?"),
-        (("tune", "--set", "optimiser=coordinate"), "did you mean 'coordinates'?"),
-        (("tune", "--set", "objective.jrk=1"), "did you mean 'jerk'?"),
-        (("simulate", "--set", "loop.plant.model=hing"), "did you mean 'hinge'?"),
-        (("simulate", "--set", "loop.disturbances.tremors=1"), "did you mean 'tremor'?"),
-        (("simulate", "--set", "reference={kind: sweep, end_frequenc: 1}"), "did you mean 'end_frequency'?"),
-        (("simulate", "--set", "reference.end_frequency=1"), "unknown key 'end_frequency'"),
-        (("simulate", "--set", "reference={kind: sweep, end_frequency: fast}"), "'fast' should be a number"),
-        (("tune", "--set", "objective.jerk=-1"), "the weight of jerk is negative"),
-    ],
-)
-def test_errors_know_the_newcomers(elsewhere: Elsewhere, arguments: tuple[str, ...], told: str) -> None:
-    done = elsewhere(*arguments)
-    assert done.returncode == 2 and told in done.stderr and not done.stdout
+ERRORS: list[tuple[tuple[str, ...], str]] = [
+    (("simulate", "--set", "reference.kind=swep"), "did you mean 'sweep'?"),
+    (("simulate", "--controller", "lqrr"), "did you mean 'lqr'?"),
+    (("tune", "--set", "optimiser=coordinate"), "did you mean 'coordinates'?"),
+    (("tune", "--set", "objective.jrk=1"), "did you mean 'jerk'?"),
+    (("simulate", "--set", "loop.plant.model=hing"), "did you mean 'hinge'?"),
+    (("simulate", "--set", "loop.disturbances.tremors=1"), "did you mean 'tremor'?"),
+    (("simulate", "--set", "reference={kind: sweep, end_frequenc: 1}"), "did you mean 'end_frequency'?"),
+    (("simulate", "--set", "reference.end_frequency=1"), "unknown key 'end_frequency'"),
+    (("simulate", "--set", "reference={kind: sweep, end_frequency: fast}"), "'fast' should be a number"),
+    (("tune", "--set", "objective.jerk=-1"), "the weight of jerk is negative"),
+]
+"""What is typed, and what the error says."""
+ONE_BY_ONE = """
+import json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+import elsewhere.tables
+from wristctl.cli.app import main
+
+ended = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv[1:] = arguments
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        try:
+            main()
+        except SystemExit as end:
+            ended.append((end.code, out.getvalue(), err.getvalue()))
+print(json.dumps(ended))
+"""
+
+
+def test_errors_know_the_newcomers(elsewhere: Elsewhere) -> None:
+    typed = json.dumps([arguments for arguments, _ in ERRORS])
+    done = elsewhere.python("-c", ONE_BY_ONE, typed)
+    for (arguments, told), (code, out, err) in zip(ERRORS, json.loads(done.stdout), strict=True):
+        assert code == 2 and told in err and not out, arguments
 
 
 def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -> None:

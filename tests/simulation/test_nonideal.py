@@ -129,10 +129,9 @@ def test_a_motor_falls_back_by_electrical_turns_where_it_is_pulled_harder_than_i
 
 
 LEVELS = {
-    "ideal": Loop(plant_segments=2),
-    "lagged": Loop(plant_segments=2, actuator=Actuator(level="lagged")),
+    "ideal": Loop(),
+    "lagged": Loop(actuator=Actuator(level="lagged")),
     "tendon": Loop(
-        plant_segments=2,
         control_period=5e-3,
         actuator=Actuator(level="tendon", friction=0.0),
         sensor=Sensor(level="camera"),

@@ -82,7 +82,7 @@ def _by_python_control(a: Array, b: Array, period: float) -> tuple[Array, Array]
 
 CASES = [
     (n, period, degrees, gains, level)
-    for n, level in ((1, "ideal"), (4, "ideal"), (8, "ideal"), (2, "lagged"), (4, "tendon"))
+    for n, level in ((1, "ideal"), (4, "ideal"), (4, "lagged"), (4, "tendon"))
     for period, degrees, gains in ((1e-3, 0.0, HARD), (1e-3, 30.0, SOFT), (5e-3, -20.0, HARD), (1e-2, 30.0, SOFT))
 ]
 

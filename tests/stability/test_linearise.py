@@ -145,7 +145,7 @@ def test_an_unstable_loop_is_found_where_it_rests() -> None:
 def test_stuck_tendons_are_stiffer_by_their_bristles() -> None:
     """A side's pull P falls by P mu phi / s with its travel, which the angle makes by the tendons' arm."""
     loop, theta, stiffness, pulls = (
-        Loop(plant_segments=1, control_period=5e-3, actuator=TENDON),
+        Loop(control_period=5e-3, actuator=TENDON),
         math.radians(30.0),
         [],
         0.0,

@@ -34,7 +34,8 @@ SHORT: dict[str, Any] = {
     "push": {"force": 0.0},
     "calibration": "given",
     "positions": "stored",
-    "bench": {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}},
+    "homing": {"frames": 1, "rest": 0.1, "let_go": 1.0},
+    "bench": {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.5}},
 }
 
 

@@ -155,7 +155,7 @@ class _NativeLaw(types.WrapperAddressProtocol):
     def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
         self._lanes = lanes
         frozen, others = frozen_values(law)
-        self._code = CFunc(law, normalize_signature(_signature(lanes, names)), locals={}, options={})
+        self._code: Any = CFunc(law, normalize_signature(_signature(lanes, names)), locals={}, options={})
         keep(self._code, law, *others, frozen=frozen)
         try:
             self._code.compile()
