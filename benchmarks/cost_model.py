@@ -70,7 +70,7 @@ def streamed(threads: int) -> dict[str, float]:
     from wristctl.control.table import controller
     from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
-    from wristctl.simulation.stream import stream
+    from wristctl.simulation.rollout import stream
 
     loop, wrist, law = Loop(plant_segments=1), WristParameters(), controller("smc")
     course = motion(Reference(), wrist, 5.0, sample_period(loop.control_period))

@@ -20,9 +20,9 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.closed_loop import repeat
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.reference import motion
+from wristctl.simulation.worlds import Draws
 from wristctl.wrist.compiled_model import integrate
 from wristctl.wrist.segments import segments
 

@@ -25,9 +25,9 @@ from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSen
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.closed_loop import repeat
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.reference import motion
+from wristctl.simulation.worlds import Draws
 
 HERE = Path(__file__).parent
 WRIST, HORIZON, NOMINAL = WristParameters(), 4.0, (5e-3, 20e3)

@@ -146,9 +146,8 @@ class _Episodes:
         from wristctl.simulation.cases import Case
         from wristctl.simulation.closed_loop import scenario_of
         from wristctl.simulation.drawn_worlds import drawn_cases
-        from wristctl.simulation.draws import Draws
         from wristctl.simulation.reference import motion, toward
-        from wristctl.simulation.worlds import loops_of
+        from wristctl.simulation.worlds import Draws, loops_of
 
         if self.family:
             family = self.study.families[self.family]

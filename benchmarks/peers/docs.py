@@ -137,7 +137,7 @@ def cost_model(costs: dict[str, Any]) -> str:
     stream = costs["stream"]
     lines.append(
         f"\nA lane of a batch takes {costs['bytes_per_lane']:,.0f} bytes beyond the program itself. A stream "
-        f"(`wristctl.simulation.stream`) of {stream['rollouts']:,} rollouts of 5 s, n = 1, in batches of "
+        f"(`wristctl.simulation.rollout`) of {stream['rollouts']:,} rollouts of 5 s, n = 1, in batches of "
         f"{stream['batch']:,} took {stream['seconds']:.1f} s; its peak memory grew by {stream['growth_mib']:.1f} MiB "
         "after the first batch."
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from wristctl.lanes.series import E2, E3
+from wristctl.lanes.functions import E2, E3
 
 
 class Segment(NamedTuple):

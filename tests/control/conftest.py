@@ -15,10 +15,10 @@ from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.wrist.allocation import allocate, reach
 from wristctl.wrist.elastic import NoTendons
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import allocate, reach
 
 
 @dataclass(frozen=True)

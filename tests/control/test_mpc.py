@@ -17,8 +17,8 @@ from wristctl.control.model import one_segment_terms
 from wristctl.control.mpc import HORIZON, MPC, TURNS, plan
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import reach
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendons import reach
 
 WRIST = WristParameters()
 LIMITS = np.array([2.0 * WRIST.pretension, 2.0 * WRIST.tension_limit])

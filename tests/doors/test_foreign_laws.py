@@ -19,7 +19,7 @@ from wristctl.control.table import CONTROLLERS, controller
 from wristctl.control.vetting import call_law
 from wristctl.errors import UserError
 from wristctl.interrupt import interrupts
-from wristctl.lanes.frozen_values import frozen_values
+from wristctl.lanes.compiled import frozen_values
 from wristctl.records import list_runs
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout

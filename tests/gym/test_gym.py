@@ -21,9 +21,9 @@ from wristctl.errors import UserError
 from wristctl.gym import OBSERVED, SCALE, WristEnv, WristVectorEnv
 from wristctl.simulation.closed_loop import repeat, scenario_of, simulate
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.worlds import Draws
 from wristctl.study_files.load import load_study
 
 ROOT = Path(__file__).parents[2]

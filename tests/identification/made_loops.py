@@ -12,8 +12,7 @@ from wristctl.config.hysteresis import HysteresisSettings, KnownBeforehand
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.loop_problem import LoopProblem, MeasuredLoop
-from wristctl.simulation.spooled import SpooledWrist, spooled
-from wristctl.simulation.strokes import FrictionCase, strokes
+from wristctl.simulation.spool_driven import FrictionCase, SpooledWrist, spooled, strokes
 
 BELIEVED, KNOWN = WristParameters(), KnownBeforehand()
 Measured = Literal["spools and tensions", "spools", "tensions"]

@@ -12,7 +12,7 @@ from tests.identification.made_loops import SHORT, Measured, Recording, made_loo
 from wristctl.errors import UserError
 from wristctl.identification.friction_fit import FrictionFit, fit_friction
 from wristctl.identification.loop_problem import LEAST_SHARE
-from wristctl.simulation.strokes import FrictionCase
+from wristctl.simulation.spool_driven import FrictionCase
 
 NAMES = ("friction", "sheath", "presliding")
 CABLE = FrictionCase(0.1, 1.0, 2e-5)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.lanes import kernel_folder
-from wristctl.lanes.kernel_folder import is_shared, kernels_folder
+from wristctl.lanes import compiled as kernel_folder
+from wristctl.lanes.compiled import is_shared, kernels_folder
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from numba.core.errors import TypingError
 
 from wristctl.lanes.compiled import by_type, implements, kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.parts import block_of, replacing, tuple_of
+from wristctl.lanes.named_tuples import block_of, replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_named, rows_of, square_like
 from wristctl.lanes.types import LANES
 

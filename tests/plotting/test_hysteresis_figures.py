@@ -14,7 +14,7 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.friction_fit import FrictionFit
 from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop, dead_bands, loops
-from wristctl.simulation.strokes import FrictionCase, Strokes, strokes
+from wristctl.simulation.spool_driven import FrictionCase, Strokes, strokes
 
 Driven = tuple[Strokes, list[HysteresisLoop], list[DeadBand]]
 

@@ -16,8 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.plotting.wrist_drawing import RIM, directions, draw_wrist, stroboscope
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import DIRECTIONS, TENDONS
-from wristctl.wrist.kinematics import chain_tip
-from wristctl.wrist.shape import arcs_backbone, discs, offset_points
+from wristctl.wrist.kinematics import arcs_backbone, chain_tip, discs, offset_points
 
 WRIST = WristParameters()
 L, C = WRIST.length, WRIST.tendon_offset

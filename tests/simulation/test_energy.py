@@ -11,8 +11,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.closed_loop import trajectory
-from wristctl.simulation.energy import energy
-from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.metrics import METRICS, energy
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 

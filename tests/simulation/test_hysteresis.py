@@ -11,7 +11,7 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, friction_cases, loops, main_case
-from wristctl.simulation.strokes import Strokes, strokes
+from wristctl.simulation.spool_driven import Strokes, strokes
 
 WRIST = WristParameters()
 

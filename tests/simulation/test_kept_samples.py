@@ -9,9 +9,8 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED
-from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.outcome import KeptSamples, Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import How, rollout
 

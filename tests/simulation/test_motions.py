@@ -15,9 +15,9 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.simulation.metrics import range_untracked
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import jumps, motion, reference_name, toward
-from wristctl.simulation.tracked_range import range_untracked
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.kinematics import arc_tip, exact_arc
 

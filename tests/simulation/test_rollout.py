@@ -15,8 +15,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import rollout
-from wristctl.simulation.stream import stream
+from wristctl.simulation.rollout import rollout, stream
 from wristctl.wrist.compiled_model import linearised
 from wristctl.wrist.segments import segments
 

@@ -17,7 +17,7 @@ from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.tune.command import TUNE
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.errors import UserError
-from wristctl.simulation.size import MOST_BYTES, MOST_IN_ALL, Size, check_size
+from wristctl.simulation.closed_loop import MOST_BYTES, MOST_IN_ALL, Size, check_size
 from wristctl.study_files.load import load_study
 
 TABLE: dict[str, Procedure[Any]] = {"simulate": SIMULATE, "compare": COMPARE, "tune": TUNE, "audit": AUDIT}

@@ -7,7 +7,7 @@ import pytest
 
 from tests.simulation import spools
 from tests.simulation.spools import HOME, STIFF, WRIST, antagonists, minimum_jerk
-from wristctl.simulation.spooled import Spooled, SpooledWrist, spooled
+from wristctl.simulation.spool_driven import Spooled, SpooledWrist, spooled
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 

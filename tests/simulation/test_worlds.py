@@ -16,10 +16,9 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation.cases import measure
 from wristctl.simulation.closed_loop import simulate
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.simulation.worlds import drawn
+from wristctl.simulation.worlds import Draws, drawn
 from wristctl.study_files.load import load_study
 from wristctl.tuning.search import tuning_cases
 

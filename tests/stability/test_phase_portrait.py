@@ -10,7 +10,7 @@ import pytest
 from tests.stability.conftest import row
 from wristctl.config.loop import Loop
 from wristctl.control.table import CONTROLLERS
-from wristctl.simulation.draws import Draws
+from wristctl.simulation.worlds import Draws
 from wristctl.stability.phase_portrait import phase_portrait
 
 SLIDING = [name for name in CONTROLLERS if CONTROLLERS[name].surface is not None]

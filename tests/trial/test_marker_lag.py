@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wristctl.simulation.minimum_jerk import minimum_jerk
+from wristctl.simulation.references import minimum_jerk
 from wristctl.trial.warnings_report import MarkerLag
 
 RATE, NOISE = 60.0, 1e-3

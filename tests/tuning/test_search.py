@@ -22,10 +22,10 @@ from wristctl.errors import UserError
 from wristctl.seeds import stream
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.closed_loop import repeat, scenario_of
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import FASTEST, LIMIT_CYCLE
 from wristctl.simulation.reference import motion
+from wristctl.simulation.worlds import Draws
 from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge, marks_of
 from wristctl.tuning.search import (

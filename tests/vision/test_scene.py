@@ -10,7 +10,7 @@ from wristctl.config.vision import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.scene import Scene
 from wristctl.vision.scene_parts import FACE, THICK
-from wristctl.wrist.shape import arcs_backbone, discs
+from wristctl.wrist.kinematics import arcs_backbone, discs
 
 WRIST = WristParameters()
 QUIET = SceneSettings(noise=0.0)

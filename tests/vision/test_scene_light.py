@@ -13,7 +13,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.vision.detector import Detector
 from wristctl.vision.scene import Film, Scene
 from wristctl.vision.scene_parts import BASE_AT
-from wristctl.wrist.shape import arcs_backbone, discs
+from wristctl.wrist.kinematics import arcs_backbone, discs
 
 WRIST = WristParameters()
 PLAIN = SceneSettings(noise=0.0, blur=0.0, gradient=0.0)

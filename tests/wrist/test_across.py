@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.across import across_of
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters(gravity=(-9.0, 2.0), mass=0.4, hand_mass=0.3)

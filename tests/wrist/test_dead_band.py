@@ -11,9 +11,17 @@ from tests.simulation.spools import WRIST, rest_angle
 from wristctl.config.plant import Actuator
 from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.dead_band import FROM_ABOVE, FROM_BELOW, UNBENT, HeldTendons, at_rest_with
 from wristctl.wrist.segments import segments
-from wristctl.wrist.statics import equilibria_at, equilibrium, stiffness
+from wristctl.wrist.statics import (
+    FROM_ABOVE,
+    FROM_BELOW,
+    UNBENT,
+    HeldTendons,
+    at_rest_with,
+    equilibria_at,
+    equilibrium,
+    stiffness,
+)
 
 SIDE = 2.0 * Actuator().tendon_stiffness
 Angles = st.floats(0.02, 0.6) | st.floats(-0.6, -0.02)

@@ -15,7 +15,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of, square_like
 from wristctl.wrist.dynamics import equation_of_motion
 from wristctl.wrist.elastic import NoTendons, travel

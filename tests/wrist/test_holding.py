@@ -10,8 +10,7 @@ import pytest
 
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.stepped_loops import largest_torque
-from wristctl.wrist.holding import Shortfall, balance, shortfall
-from wristctl.wrist.statics import equilibrium
+from wristctl.wrist.statics import Shortfall, balance, equilibrium, shortfall
 
 STIFF = WristParameters(stiffness=6.0, length=0.12)
 LEANING = WristParameters(stiffness=6.0, length=0.12, gravity=(-7.0, 6.9), hand_mass=0.5)

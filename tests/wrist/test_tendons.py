@@ -13,10 +13,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import allocate, reach, torque_of
 from wristctl.wrist.compiled_model import integrate, terms
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.statics import equilibrium, least_stiffness, stiffness
+from wristctl.wrist.tendons import allocate, reach, torque_of
 
 WRIST = WristParameters()
 

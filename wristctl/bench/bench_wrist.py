@@ -19,8 +19,8 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
-from wristctl.wrist.across import across_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
+from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
 
 _KEPT = 60_000

@@ -19,8 +19,7 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
 from wristctl.wrist.elastic import RealTendons, read_nonideal, spool_pull
-from wristctl.wrist.moving import advance_or_stop
-from wristctl.wrist.plant import disturbed, parameters_of, travel
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)

@@ -18,7 +18,7 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.control.law import Conditions
-    from wristctl.wrist.holding import Shortfall
+    from wristctl.wrist.statics import Shortfall
 
 
 log = logging.getLogger(__name__)
@@ -176,7 +176,7 @@ def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
     from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion, toward
     from wristctl.simulation.worlds import loop_facing, plant_of
-    from wristctl.wrist.holding import shortfall
+    from wristctl.wrist.statics import shortfall
 
     if not asked.loop.limits:
         return None

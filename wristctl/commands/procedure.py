@@ -18,7 +18,7 @@ from wristctl.records.run import NAME_A_RUN
 from wristctl.study_files.keys import SUBJECTS
 
 if TYPE_CHECKING:
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
 
 
 Found = TypeVar("Found", bound=StudyResult)

@@ -23,8 +23,8 @@ from wristctl.control.smc import SMC
 from wristctl.seeds import stream
 from wristctl.tuning.optimisers.differential_evolution import DifferentialEvolution
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.holding import shortfall
 from wristctl.wrist.segments import segments
+from wristctl.wrist.statics import shortfall
 
 Reading = Literal["strict", "usual"]
 # Further angles that the wrist must follow [deg]: to both sides, as "all movements were symmetrical", and less far.

@@ -16,11 +16,10 @@ from wristctl.errors import UserError
 from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.disturbances import DISTURBANCES
-from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import jumps, motion, reference_name, toward
 from wristctl.simulation.repetitions import Repeated, Simulation
-from wristctl.simulation.worlds import World, loop_facing, mismatches
+from wristctl.simulation.worlds import Draws, World, is_random, loop_facing, mismatches
 from wristctl.wrist.kinematics import Inverse
 
 

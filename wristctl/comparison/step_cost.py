@@ -10,9 +10,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, allocate
 
 
 class StepTime(NamedTuple):

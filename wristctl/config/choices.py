@@ -170,7 +170,7 @@ METRICS: Choices[Any] = Choices(
         "rmse_settled": "wristctl.simulation.metrics:RMSE_SETTLED",
         "settling": "wristctl.simulation.metrics:SETTLING",
         "settling_5": "wristctl.simulation.metrics:SETTLING_5",
-        "settling_after": "wristctl.simulation.settling_after:SETTLING_AFTER",
+        "settling_after": "wristctl.simulation.metrics:SETTLING_AFTER",
         "steady_state": "wristctl.simulation.metrics:STEADY_STATE",
         "missing": "wristctl.simulation.metrics:MISSING",
         "overshoot": "wristctl.simulation.metrics:OVERSHOOT",
@@ -190,7 +190,7 @@ METRICS: Choices[Any] = Choices(
         "drift": "wristctl.simulation.metrics:DRIFT",
         "observer_consistency": "wristctl.simulation.metrics:OBSERVER",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
-        "range_untracked": "wristctl.simulation.tracked_range:RANGE_UNTRACKED",
+        "range_untracked": "wristctl.simulation.metrics:RANGE_UNTRACKED",
     },
 )
 

@@ -24,8 +24,7 @@ from wristctl.config.section import Parameter
 from wristctl.control.plain_law import PlainLaw
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import width
-from wristctl.lanes.compiled import compiled, keep
-from wristctl.lanes.frozen_values import frozen_values
+from wristctl.lanes.compiled import compiled, frozen_values, keep
 from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments

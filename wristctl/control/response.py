@@ -6,7 +6,7 @@ from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.allocation import allocate, reach
+from wristctl.wrist.tendons import allocate, reach
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD = range(len(NOW))
 

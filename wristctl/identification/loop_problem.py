@@ -22,8 +22,8 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected
-from wristctl.simulation.spooled import SpooledWrist, spooled
-from wristctl.wrist.dead_band import FROM_ABOVE, FROM_BELOW
+from wristctl.simulation.spool_driven import SpooledWrist, spooled
+from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _FORCES = {"N": 1.0}

@@ -7,23 +7,128 @@ Where the package lies is no part of it: checkouts, copies and installed package
 
 import hashlib
 import os
+import pickle
 import re
 import shutil
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NoReturn, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
-from wristctl.lanes.kernel_folder import kernels_folder
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def frozen_values(function: Callable[..., Any]) -> tuple[bytes, tuple[Path, ...]]:
+    """A hash over all that a function reaches outside this package, and the files of this package that it reaches.
+
+    It reaches globals by the names in its code, attributes of modules too, and what its closure holds.
+    """
+    digest, files, seen = hashlib.sha256(), set[Path](), set[int]()
+    waiting: list[Any] = [function]
+    while waiting:
+        value = waiting.pop()
+        own = getattr(value, "py_func", getattr(value, "_defn", value))
+        if not isinstance(own, FunctionType):
+            digest.update(_told(value))
+        elif id(own) not in seen:
+            seen.add(id(own))
+            file = Path(own.__code__.co_filename)
+            if file.is_relative_to(_PACKAGE):
+                files.add(file)
+                continue
+            digest.update(own.__qualname__.encode())
+            for code in _codes(own.__code__):
+                digest.update(code.co_code + repr((code.co_names, code.co_varnames, _plain(code.co_consts))).encode())
+                waiting += _reached(own, code)
+            waiting += [cell.cell_contents for cell in own.__closure__ or ()]
+            waiting += [*(own.__defaults__ or ()), *(own.__kwdefaults__ or {}).values()]
+    return digest.digest(), tuple(sorted(files))
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """A function's code, and that of the functions within it."""
+    yield code
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _codes(each)
+
+
+def _plain(constants: tuple[Any, ...]) -> list[Any]:
+    return [each for each in constants if not isinstance(each, CodeType)]
+
+
+def _reached(function: FunctionType, code: CodeType) -> Iterator[Any]:
+    """What the names in a code stand for: globals, and attributes of the modules among them."""
+    found = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    for name in sorted(found):
+        value = found[name]
+        if isinstance(value, ModuleType):
+            yield from (getattr(value, each) for each in sorted(code.co_names) if hasattr(value, each))
+        else:
+            yield value
+
+
+def _told(value: Any) -> bytes:
+    """A value as bytes that are the same in another process; what has none is told by where it is, and never kept."""
+    if isinstance(value, np.ndarray):
+        return repr((value.shape, value.dtype)).encode() + np.ascontiguousarray(value).tobytes()
+    if isinstance(value, ModuleType):
+        return value.__name__.encode()
+    try:
+        return pickle.dumps(value)
+    except Exception:
+        return repr(value).encode()
+
+
+NAMED = "WRISTCTL_KERNELS"
+"""Environment variable that names another folder."""
+_SHARED = ("nfs", "nfs4", "lustre", "gpfs", "beegfs", "cifs", "smb3", "ceph", "afs", "panfs", "glusterfs", "fuse.sshfs")
+_MOUNTS = Path("/proc/self/mounts")
+
+
+def kernels_folder() -> Path:
+    """The folder, which may not be there yet. PermissionError where another user has taken its place."""
+    if named := os.environ.get(NAMED):
+        return Path(named)
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
+    return _of_this_machine() if is_shared(usual) else usual
+
+
+def is_shared(folder: Path) -> bool:
+    """Whether a folder lies on a file system of a network."""
+    try:
+        mounts = [line.split()[1:3] for line in _MOUNTS.read_text(encoding="utf-8").splitlines()]
+    except OSError:
+        return False
+    place = folder.resolve()
+    below = [(len(point), kind) for point, kind in mounts if place.is_relative_to(_unescaped(point))]
+    return bool(below) and max(below)[1] in _SHARED
+
+
+def _unescaped(point: str) -> str:
+    return point.encode().decode("unicode_escape") if "\\" in point else point
+
+
+def _of_this_machine() -> Path:
+    """What lies there is run: so it is the user's own."""
+    folder = Path(tempfile.gettempdir()) / f"wristctl-kernels-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    known = folder.lstat()
+    if known.st_uid != os.getuid() or known.st_mode & 0o022 or folder.is_symlink():
+        raise PermissionError(f"{folder} is not this user's alone")
+    return folder
+
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -34,7 +139,6 @@ _KEPT_DAYS = 30.0
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Of what compiled code alone calls: a way in from Python would be compiled for each of them, and never used."""
-_PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
 _CONSTANT_FREE = tuple(f"wristctl.{room}" for room in ("config", "errors", "plugins", "records", "study_files"))
 """Packages that compiled code takes nothing from, neither a function nor a number."""

@@ -22,7 +22,7 @@ from wristctl.plotting.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.vision.scene_parts import coil, hand
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
-from wristctl.wrist.shape import Planar, discs, offset_points
+from wristctl.wrist.kinematics import Planar, discs, offset_points
 
 # Radius of the drawn discs over that of the circle of tendons.
 RIM = 1.25

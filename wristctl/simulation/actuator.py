@@ -19,7 +19,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
-from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.plant import PlantModel

@@ -20,8 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
-from wristctl.simulation.energy import energy
-from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.metrics import METRICS, energy
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter, oscillations
 from wristctl.simulation.outcome import Outcome

@@ -13,8 +13,8 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
-from wristctl.simulation.minimum_jerk import smooth_stroke
 from wristctl.simulation.reference import ReferenceKind
+from wristctl.simulation.references import smooth_stroke
 
 _RYU = "Ryu et al., J. Hand Surg. 16A (1991) 409"
 _PALMER = "Palmer et al. 1985, as cited by Nelson et al. 1994"

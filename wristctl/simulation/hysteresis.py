@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.simulation.convergence import ABSOLUTE, FINER, RELATIVE
-from wristctl.simulation.spooled import Spooled, spooled
-from wristctl.simulation.strokes import FrictionCase, Strokes
+from wristctl.simulation.spool_driven import FrictionCase, Spooled, Strokes, spooled
 
 _HOLD = 1.5
 """How long a wrist is held at the end of a ramp [s]."""

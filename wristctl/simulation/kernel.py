@@ -9,18 +9,16 @@ from wristctl.control.law import now_of
 from wristctl.control.response import Controlled, look_ahead, respond
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.parts import block_of
+from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import actuate, drive_in_lanes, read_winding, wound
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
-from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.elastic import pulls_at_start, tendons_in_lanes
-from wristctl.wrist.moving import advance_or_stop
-from wristctl.wrist.plant import disturbed, parameters_of, path_before, tip_angle
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_before, tip_angle
 from wristctl.wrist.segments import load_segments
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
 RECORDED = (
     "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",

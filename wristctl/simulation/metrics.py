@@ -15,10 +15,20 @@ from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.simulation.arrival import missing
-from wristctl.simulation.energy import course_energy
 from wristctl.simulation.motion import Goals
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
+
+
+def energy(torque: Array, rate: Array, step: float) -> Any:
+    """Integral of |torque * rate| [J] over torques [N m] and rates [rad/s] (..., T) sampled every `step` [s]."""
+    return np.abs(torque * rate).sum(axis=-1) * step
+
+
+def course_energy(course: Trajectory) -> float:
+    """The same of one course."""
+    return float(energy(course.torque, course.rate, float(course.time[1] - course.time[0])))
+
 
 _ANGLE = float(np.deg2rad(0.01))
 _LEAST_MOVE = 1e-9
@@ -262,4 +272,42 @@ OBSERVER = Metric(
 )
 OUTSIDE_DOMAIN = Metric(
     "", "share of the wanted tips outside the network's trained domain", of_trajectory=lambda course: course.outside
+)
+
+
+WITHIN = np.deg2rad(2.0)
+BIN = np.deg2rad(1.0)
+
+
+def range_untracked(course: Trajectory) -> float:
+    """Share of the wanted range in which the angle was ever off by more than 2 deg, by bins of 1 deg.
+
+    Bins that a motion jumps over are no part of its range.
+    """
+    wanted = course.theta_desired
+    bins = np.floor((wanted - wanted.min()) / BIN + 1e-9).astype(np.int64)
+    worst = np.zeros(bins.max() + 1)
+    np.maximum.at(worst, bins, np.nan_to_num(np.abs(course.theta - wanted), nan=np.inf))
+    return float(np.mean(worst[np.unique(bins)] > WITHIN))
+
+
+RANGE_UNTRACKED = Metric(
+    "",
+    "share of the wanted range, in bins of 1 deg, in which the angle was ever off by more than 2 deg",
+    of_trajectory=range_untracked,
+    floor=0.01,
+)
+
+
+def _settling_after(of: Totals) -> Array:
+    assert SETTLING.of_totals is not None
+    return np.maximum(SETTLING.of_totals(of) - of.goals["rest"], 0.0)
+
+
+SETTLING_AFTER = Metric(
+    "s",
+    "settling time from when the reference rests; 0 where the angle is within +-2 % by then; never: nan",
+    _settling_after,
+    never=lambda horizon: horizon,
+    floor=0.01,
 )

@@ -13,7 +13,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import frictionless_pulls, tendon_stiffness
-from wristctl.wrist.allocation import torque_of
+from wristctl.wrist.tendons import torque_of
 
 _ONE = (0,)
 

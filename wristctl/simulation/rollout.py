@@ -1,6 +1,6 @@
 """Rollouts: many closed loops of one controller at once, as blocks of lanes over threads."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from threading import Event
 from typing import Literal
 
@@ -17,11 +17,10 @@ from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled
-from wristctl.simulation.kept_samples import KeptSamples
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
 from wristctl.simulation.motion import Goals, Motion
-from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.outcome import KeptSamples, Outcome
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
@@ -192,3 +191,20 @@ def _advance(
     with stoppable(workers, stop) as pool:
         for _ in pool.map(run, pieces):
             progress(sum(ended) / (blocks * samples))
+
+
+def stream(
+    controller: Controller,
+    batches: Iterable[NDArray[np.float64]],
+    followed: Motion,
+    loop: Loop,
+    wrist: WristParameters,
+    threads: int | None = None,
+) -> Iterator[Outcome]:
+    """Outcomes of batches of gains, each (count, g), as they come, all on one motion; nothing of them is kept.
+
+    The caller reduces each outcome (a histogram, a best, a line in a file), so that a million rollouts need no more
+    memory than one batch. A few thousand lanes a batch keep all threads busy.
+    """
+    for gains in batches:
+        yield rollout(controller, gains, [followed], np.zeros(len(gains), np.int64), loop, wrist, threads=threads)

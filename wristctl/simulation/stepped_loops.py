@@ -18,7 +18,7 @@ from wristctl.control.response import Controlled, perceive
 from wristctl.lanes.blocks import to_rows
 from wristctl.lanes.compiled import kernel, spelled_out
 from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.parts import block_of
+from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import drive_in_lanes
 from wristctl.simulation.batch import Lanes, Start, batch
@@ -29,10 +29,9 @@ from wristctl.simulation.observer import sense
 from wristctl.simulation.rollout import outcome_of, worlds_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
-from wristctl.wrist.allocation import reach
 from wristctl.wrist.plant import kernel_of, parameters_of, tip_angle
 from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, reach
 
 _ALIVE = SUMS.index("alive")
 _SIDE = float(TENDONS_PER_SIDE)

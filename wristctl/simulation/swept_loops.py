@@ -18,7 +18,6 @@ from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.cases import AT_ONCE, at_most, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
-from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
@@ -26,7 +25,7 @@ from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.repetitions import MARKS, STRAIN
 from wristctl.simulation.rollout import rollout, structure
-from wristctl.simulation.worlds import loop_facing, loops_of
+from wristctl.simulation.worlds import Draws, is_random, loop_facing, loops_of
 
 
 class SweptLoop(NamedTuple):

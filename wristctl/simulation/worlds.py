@@ -1,7 +1,8 @@
 """The world that a rollout runs in, which may differ from what its controller knows."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from wristctl.config.plant import Actuator, Sensor, TrueWrist, is_unsaid
 from wristctl.config.section import Section
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.seeds import Entropy
+from wristctl.seeds import Entropy, stream
 from wristctl.study_files.keys import unit_of
 from wristctl.wrist.directions import in_plane
 
@@ -150,3 +151,46 @@ def loops_of(loop: Loop, streams: Sequence[Entropy]) -> list[Loop]:
     """The loop with its plant drawn by each of the streams."""
     plants = [drawn(loop.plant, each) for each in streams]
     return [loop if each is loop.plant else loop.model_copy(update={"plant": each}) for each in plants]
+
+
+@dataclass(frozen=True)
+class Draws:
+    """The streams under a root seed. What is tuned on and what is judged on have different `purpose`s: other noise."""
+
+    seed: int
+    purpose: str = "judged"
+
+    def camera(self, scenario: str, repetition: int) -> Entropy:
+        """Noise and dropped frames of a scenario, by the name of its reference and direction."""
+        return *stream(self.seed, self._camera(scenario)), repetition
+
+    def plant(self, repetition: int) -> Entropy:
+        """The drawn plant."""
+        return *stream(self.seed, self._plant()), repetition
+
+    def names(self, loops: Iterable[Loop], scenarios: Iterable[str]) -> list[str]:
+        """The named streams that such loops draw from: what a run notes of them."""
+        chosen = list(loops)
+        cameras = [self._camera(each) for each in scenarios] if any(map(sees_noise, chosen)) else []
+        return [*dict.fromkeys(cameras), *([self._plant()] if any(map(has_drawn_plant, chosen)) else [])]
+
+    def _camera(self, scenario: str) -> str:
+        return f"{self.purpose} camera: {scenario}"
+
+    def _plant(self) -> str:
+        return f"{self.purpose} plant"
+
+
+def sees_noise(loop: Loop) -> bool:
+    """Whether a camera draws noise and lost frames."""
+    return loop.sensor.level == "camera"
+
+
+def has_drawn_plant(loop: Loop) -> bool:
+    """Whether each repetition has a plant of its own."""
+    return any((loop.plant.stiffness_spread, loop.plant.damping_spread, loop.plant.payload_spread))
+
+
+def is_random(loop: Loop) -> bool:
+    """Whether repetitions of this loop differ."""
+    return sees_noise(loop) or has_drawn_plant(loop)

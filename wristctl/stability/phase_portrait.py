@@ -13,8 +13,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Surface
 from wristctl.simulation.batch import Start, sample_period
 from wristctl.simulation.closed_loop import repeat
-from wristctl.simulation.draws import Draws
 from wristctl.simulation.reference import motion
+from wristctl.simulation.worlds import Draws
 
 SCENARIO = "phase portrait"
 """The name that the camera's noise goes by."""

@@ -13,7 +13,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.draws import Draws
+from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.homing import Zero, check_zero, find_zero, slacken

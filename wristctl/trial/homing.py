@@ -22,8 +22,8 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Spools, on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
-from wristctl.wrist.across import across_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, in_plane
+from wristctl.wrist.out_of_plane import across_of
 
 log = logging.getLogger(__name__)
 

@@ -19,9 +19,8 @@ from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import ArrivingFrame, fuse, predict
 from wristctl.simulation.stationary_filter import Belief, observer_of
-from wristctl.wrist.allocation import torque_of
 from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
 REMEMBERED = 256
 """Ticks that a frame may be late."""

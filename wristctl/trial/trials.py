@@ -18,9 +18,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import metrics_of, summed
-from wristctl.simulation.minimum_jerk import minimum_jerk
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.reference import motion
+from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.repetitions import Simulation
 from wristctl.trial.spools import on_plus_side
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane

@@ -27,9 +27,8 @@ from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.simulation.draws import Draws, is_random
 from wristctl.simulation.reference import motion
-from wristctl.simulation.worlds import loops_of
+from wristctl.simulation.worlds import Draws, is_random, loops_of
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.work.worker import Unit

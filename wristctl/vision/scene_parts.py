@@ -10,7 +10,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.wrist.shape import Backbone, Planar, discs, offset_points
+from wristctl.wrist.kinematics import Backbone, Planar, discs, offset_points
 
 _FINGERTIPS = ((1.7, -0.35), (1.82, -0.12), (1.75, 0.12), (1.5, 0.35))
 

@@ -13,12 +13,31 @@ Springs creep alike (yielding).
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.functions import maximum
+from wristctl.lanes.functions import exp, expm1_of_negative, maximum
 from wristctl.lanes.lane import rounded, where, zero_like
-from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, rows_of
 from wristctl.wrist.chain import lengths, moment_arms
-from wristctl.wrist.tendon_friction import bristle, bristle_slope, capstan
+
+
+@compiled
+def bristle(z: Any, travel: Any, slope: Any) -> Any:
+    """The bristle's state after its tendon has moved by `travel` [m], positive towards the spool; slope 1/s [1/m]."""
+    sign = where(travel < 0.0, -1.0, 1.0)
+    return z - expm1_of_negative(-slope * abs(travel)) * (sign - z)
+
+
+@compiled
+def capstan(friction: Any, wrapped: Any, z: Any) -> Any:
+    """Pull at the wrist over pull at the spool."""
+    return exp(-friction * wrapped * z)
+
+
+@compiled
+def bristle_slope(z: Any, speed: Any, slope: Any) -> Any:
+    """dz/dx [1/m] where the tendon moves at this speed; between both directions' where it is at rest."""
+    sign = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, 0.0))
+    return (1.0 - z * sign) * slope
 
 
 class Nonideal(NamedTuple):

@@ -17,7 +17,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled, implements, kernel
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, turn, zero_like
-from wristctl.lanes.parts import replacing, tuple_of
+from wristctl.lanes.named_tuples import replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import (
@@ -33,9 +33,9 @@ from wristctl.wrist.dynamics import bias
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
+from wristctl.wrist.kinematics import Planar
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
-from wristctl.wrist.shape import Planar
 from wristctl.wrist.statics import settled
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 

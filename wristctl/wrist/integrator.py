@@ -10,17 +10,100 @@ order system the 2n equations of each stage reduce to n:
 
 from typing import Any
 
-from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import zero_like
+from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.functions import clip
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords
-from wristctl.wrist.chain import chords, tendon_torques
+from wristctl.wrist.chain import chords, spring, tendon_torques
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import pulls_along, pulls_at_start, stiffen
+from wristctl.wrist.elastic import (
+    PATH,
+    ElasticTendons,
+    NoTendons,
+    PulledTendons,
+    RealTendons,
+    pulls_along,
+    pulls_at_start,
+    row_of,
+    stiffen,
+)
 from wristctl.wrist.jacobian import residual_jacobians
-from wristctl.wrist.linear import factorise, solve
 from wristctl.wrist.plant import path_along, path_before
-from wristctl.wrist.yielding import yield_, yield_jacobians
+
+
+@compiled
+def factorise(a: Any) -> None:
+    """LU factors of a square matrix, in place; the diagonal holds the pivots' reciprocals."""
+    n = len(a)
+    for k in range(n):
+        a[k, k] = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            a[i, k] = a[i, k] * a[k, k]
+            for j in range(k + 1, n):
+                a[i, j] = a[i, j] - a[i, k] * a[k, j]
+
+
+@compiled
+def solve(lu: Any, b: Any) -> None:
+    """Overwrite b with the solution of a x = b."""
+    n = len(b)
+    for i in range(1, n):
+        for k in range(i):
+            b[i] = b[i] - lu[i, k] * b[k]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] = b[i] - lu[i, k] * b[k]
+        b[i] = b[i] * lu[i, i]
+
+
+@compiled
+def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
+    """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
+    limit, stiffness = nonideal.stop / n, nonideal.stop_stiffness * n
+    depth = theta - clip(theta, -limit, limit)
+    damped = 1.0 + nonideal.stop_dissipation * where(depth < 0.0, -omega, omega)
+    touching = where((abs(depth) > 0.0) & (damped > 0.0), 1.0, 0.0)
+    torque = stiffness * depth * damped * touching
+    return torque, stiffness * damped * touching, stiffness * nonideal.stop_dissipation * abs(depth) * touching
+
+
+@by_type
+def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    """Add to the residual r (n,) what end stops take and what creeping springs give."""
+    raise NotImplementedError("compiled code only")
+
+
+@by_type
+def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    """Add what end stops add to dr/d(theta) and dr/d(rate), (n, n)."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(yield_, NoTendons, ElasticTendons)
+def _stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    pass
+
+
+@implements(yield_jacobians, NoTendons, ElasticTendons)
+def _stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    pass
+
+
+@implements(yield_, PulledTendons, RealTendons)
+def _yield(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    nonideal, state, springs = tendons.nonideal, tendons.state, row_of(len(spool_input), PATH)
+    for k in range(len(theta)):
+        torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
+        r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]
+
+
+@implements(yield_jacobians, PulledTendons, RealTendons)
+def _yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    for k in range(len(theta)):
+        _, stiffness, damping = _contact(tendons.nonideal, len(theta), theta[k], omega[k])
+        by_theta[k, k] = by_theta[k, k] + stiffness
+        by_rate[k, k] = by_rate[k, k] + damping
 
 
 @compiled

@@ -6,16 +6,15 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.parts import replacing
+from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist.arcs import ARC_LIMIT, tip
 from wristctl.wrist.chain import angle_along, tip_derivatives
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
-from wristctl.wrist.kinematics import chain_tip
+from wristctl.wrist.kinematics import arcs_backbone, chain_tip
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
-from wristctl.wrist.shape import arcs_backbone
 from wristctl.wrist.statics import equilibrium
 
 _load = replacing("stiffness", "force_y")

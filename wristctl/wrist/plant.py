@@ -24,12 +24,12 @@ from wristctl.config.choices import Choices
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import spread, to_blocks, to_rows, width
-from wristctl.lanes.compiled import by_type, implements, kernel
-from wristctl.lanes.lane import dot, planar, zero_like
-from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.compiled import by_type, implements, kernel, spelled_out
+from wristctl.lanes.lane import dot, planar, where, zero_like
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
-from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons
-from wristctl.wrist.shape import Backbone
+from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons, update_memory
+from wristctl.wrist.kinematics import Backbone
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: An
 
     It is what the spools of both sides hold, (plus, minus) or twice that: by the type of `tendons` pulls [N] or lengths
     reeled in [m]. Pulls at any place are `wristctl.wrist.elastic.pulls_along`'s, and end stops are
-    `wristctl.wrist.yielding`'s. Returns an estimate of the step's error in the bending angle and in its rate
+    `wristctl.wrist.integrator`'s. Returns an estimate of the step's error in the bending angle and in its rate
     [rad, rad/s], as an embedded solution of lower order gives it.
     """
     raise NotImplementedError("compiled code only")
@@ -244,3 +244,24 @@ def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
     kernel_of(_poses, model)(model, values, states, out, (0,) * k)
     rows = to_rows(out, count)
     return Pose(rows[:, :2], rows[:, 2], rows[:, 3:].reshape(count, 3, k))
+
+
+@spelled_out
+def advance_or_stop(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: Any, alive: Any) -> Any:
+    """`advance`, but a plant that leaves what it can be stays where it was for good.
+
+    Returns which are still alive, and an estimate of the step's error as an angle [rad]: of a plant that leaves what it
+    can be in this step 1, of one that is not alive 0.
+    """
+    before = lanes_like(q)
+    for i in range(len(q)):
+        before[i] = q[i]
+    of_bend, of_rate = advance(plant, q, rate, spool_input, tendons, h)
+    zero = zero_like(alive)
+    well = where(within(plant, q), alive, zero)
+    error = where(well > zero, abs(of_bend) + h * abs(of_rate), alive)
+    for i in range(len(q)):
+        q[i] = where(well > zero, q[i], before[i])
+        rate[i] = where(well > zero, rate[i], zero)
+    update_memory(tendons, q, spool_input, path_along(tendons, plant, q))
+    return well, error

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.parts import tuple_of
+from wristctl.lanes.named_tuples import tuple_of
 
 
 class Segments(NamedTuple):

@@ -1,5 +1,6 @@
 """Statics of the n-segment wrist: equilibria under tendons and gravity, stiffness and buckling."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.wrist.compiled_model import linearised
-from wristctl.wrist.segments import segments
+from wristctl.wrist.compiled_model import linearised, terms
+from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 
@@ -99,3 +100,127 @@ def equilibria_at(parameters: Array, n: int, angle: Array, pretension: float) ->
 def _pulls(difference: Array, pretension: float) -> Array:
     """(B, 2) pulls whose difference is the given one, the lesser at pretension [N]."""
     return pretension + np.stack([difference.clip(0.0), (-difference).clip(0.0)], axis=-1)
+
+
+_ANGLES = 2001
+"""At which a range of bending is looked at."""
+
+
+class Balance(NamedTuple):
+    """What holds one arc at some angles, (T,) each."""
+
+    asked: Array
+    """Torque that holds it there [N m]."""
+    least: Array
+    """The tendons' least and largest torque there [N m], as `wristctl.wrist.tendons.reach` has it."""
+    most: Array
+    arm_plus: Array
+    """Moment arms of the + and the - side [m]."""
+    arm_minus: Array
+
+
+class Shortfall(NamedTuple):
+    """Where the tendons fall short by most, and what would hold the wrist there."""
+
+    theta: float
+    """Bending angle [rad]."""
+    asked: float
+    """Torque that holds it there [N m]."""
+    given: float
+    """The tendons' torque nearest to that [N m]."""
+    angle: float
+    """How far toward theta they hold it, from straight [rad]; nan where they do not hold it straight."""
+    tension_limit: float
+    """Least limit of each tendon's tension that would do [N]."""
+    tendon_radius: float
+    """Least radius of the circle of tendons that would do [m]."""
+
+
+def balance(wrist: WristParameters, theta: Array, force: float = 0.0) -> Balance:
+    """What holds the wrist at angles (T,) [rad] under a force at the tip, across the straight wrist [N]."""
+    here = terms(segments(wrist, 1, (0.0, force)), theta[:, None], 0.0 * theta[:, None])
+    plus, minus = here.moment_arms[:, 0].T
+    low, high = TENDONS_PER_SIDE * wrist.pretension, TENDONS_PER_SIDE * wrist.tension_limit
+    asked = here.bias[:, 0] + wrist.stiffness * theta
+    return Balance(asked, plus * low + minus * high, plus * high + minus * low, plus, minus)
+
+
+def shortfall(wrist: WristParameters, low: float, high: float, force: float = 0.0) -> Shortfall | None:
+    """Where between two bending angles [rad] the tendons cannot hold the wrist; None where they can everywhere.
+
+    `force` is a constant one at the tip, across the straight wrist [N].
+    """
+    theta = np.linspace(low, high, _ANGLES)
+    found = balance(wrist, theta, force)
+    beyond = np.maximum(found.asked - found.most, found.least - found.asked)
+    worst = int(beyond.argmax())
+    if beyond[worst] <= 0.0:
+        return None
+    asked, least, most, plus, minus = (float(each[worst]) for each in found)
+    ahead = asked > most
+    pulls, other = (plus, minus) if ahead else (minus, plus)
+    limit = (asked / TENDONS_PER_SIDE - other * wrist.pretension) / pulls
+    squeezed = 0.5 * (plus + minus) * (wrist.tension_limit + wrist.pretension)
+    per_radius = 0.5 * (plus - minus) * (wrist.tension_limit - wrist.pretension) / wrist.tendon_radius
+    radius = abs(asked / TENDONS_PER_SIDE - squeezed) / per_radius
+    angle = _held_to(wrist, float(theta[worst]), force)
+    return Shortfall(float(theta[worst]), asked, most if ahead else least, angle, limit, radius)
+
+
+def _held_to(wrist: WristParameters, theta: float, force: float) -> float:
+    way = np.linspace(0.0, theta, _ANGLES)
+    found = balance(wrist, way, force)
+    spare = np.minimum(found.asked - found.least, found.most - found.asked)
+    first = int((spare < 0.0).argmax())
+    if first == 0:
+        return math.nan
+    share = spare[first - 1] / (spare[first - 1] - spare[first])
+    return float(way[first - 1] + share * (way[first] - way[first - 1]))
+
+
+FROM_BELOW, FROM_ABOVE, UNBENT = (1.0, -1.0), (-1.0, 1.0), (0.0, 0.0)
+"""States of the + and the - side's bristle."""
+
+
+class HeldTendons(NamedTuple):
+    """Both sides' tendons of wrists at rest, one value a wrist (B,)."""
+
+    given: Array
+    """(B, 2) what both sides have reeled in since they were taut and free of tension on the straight wrist [m]; pulls
+    at the spools [N] where these are held."""
+    stiffness: Array
+    """Of a side's tendons together [N/m]; 0 where pulls are held."""
+    friction: Array
+    sheath: Array
+    """[rad]"""
+
+
+def at_rest_with(parameters: Array, tendons: HeldTendons, z: tuple[float, float], guess: Array) -> Array:
+    """Segments' angles (B, n) [rad] at rest with both sides' bristles in this state, by Newton's method from a guess.
+
+    `parameters` are rows of Segments, (B, 12). Raises UserError where there is no such rest.
+    """
+    theta: Array = np.array(guess, float)
+    still, side = 0.0 * theta, np.asarray(z)
+    length = parameters[:, Segments._fields.index("length")] * theta.shape[1]
+    springy, held = tendons.stiffness[:, None] > 0.0, tendons.stiffness[:, None] <= 0.0
+    for _ in range(100):
+        own = terms(parameters, theta, still)
+        stretch = tendons.given - (length[:, None] - own.tendon_lengths.sum(axis=1))
+        at_spool = np.where(held, tendons.given, tendons.stiffness[:, None] * stretch.clip(0.0))
+        wrapped = tendons.sheath + np.abs(theta).sum(axis=1)
+        left = np.exp(-tendons.friction[:, None] * wrapped[:, None] * side)
+        pulls = at_spool * left
+        r, tangent, _ = linearised(parameters, theta, still, still, pulls)
+        stiff = np.where(springy & (stretch > 0.0), tendons.stiffness[:, None] * left, 0.0)
+        arms = own.moment_arms
+        softer = (tendons.friction[:, None] * side * pulls)[:, None, :] * np.sign(theta)[:, :, None]
+        slope = stiff[:, None, :] * arms + softer
+        tangent = tangent + np.einsum("bis,bjs->bij", arms, slope)
+        change = np.linalg.solve(tangent, -r[..., None])[..., 0]
+        theta = theta + change * np.minimum(1.0, 0.3 / np.abs(change).max(axis=1, initial=1e-300))[:, None]
+        if np.abs(change).max() < 1e-13:
+            return theta
+    raise UserError(
+        "no rest was found on held tendons with this friction", "wrist", "less friction, sheath or bend, or more pull"
+    )

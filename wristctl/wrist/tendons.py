@@ -7,7 +7,8 @@ A segment holds g spans, each bending by theta/g over l/g; with y = theta/(2 g) 
 from typing import Any
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import bessel
+from wristctl.lanes.functions import bessel, clip
+from wristctl.lanes.lane import where
 
 TENDONS_PER_SIDE = 2
 """Each of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5)."""
@@ -43,3 +44,26 @@ def tendon_torques(theta: Any, segment: Any, plus: Any, minus: Any, torque: Any,
         s = y * y
         torque[k] = bend * (e0 - s * e1) + squeeze * y * e1
         slope[k] = (0.5 / segment.spans) * (squeeze * (e1 - s * e2) - bend * y * e0)
+
+
+@compiled
+def reach(theta: Any, wrist: Any, low: Any, high: Any) -> Any:
+    """Least and largest torque [N m] at theta with both sides' pulls between low and high [N]."""
+    plus, minus = moment_arms(theta, wrist)
+    return plus * low + minus * high, plus * high + minus * low
+
+
+@compiled
+def allocate(theta: Any, wrist: Any, torque: Any, low: Any, high: Any) -> Any:
+    """Pulls of the + and the - side [N] that give the torque nearest to the wanted one, with one side at `low`."""
+    plus, minus = moment_arms(theta, wrist)
+    forward = torque > (plus + minus) * low
+    needed = clip((torque - where(forward, minus, plus) * low) / where(forward, plus, minus), low, high)
+    return where(forward, needed, low), where(forward, low, needed)
+
+
+@compiled
+def torque_of(theta: Any, wrist: Any, plus: Any, minus: Any) -> Any:
+    """Torque [N m] of both sides' pulls [N] on the one-segment wrist ("force": A_b F_t)."""
+    arm_plus, arm_minus = moment_arms(theta, wrist)
+    return arm_plus * plus + arm_minus * minus

@@ -16,10 +16,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, turn
-from wristctl.lanes.parts import replacing
+from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist.elastic import pulls_along
+from wristctl.wrist.kinematics import Planar
 from wristctl.wrist.plant import PlantModel
-from wristctl.wrist.shape import Planar
 
 Array = NDArray[np.float64]
 

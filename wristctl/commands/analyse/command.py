@@ -219,7 +219,7 @@ def _at_rest(row: AnalysedRow, study: Study, angle: float) -> LoopAnalysis:
 
 
 def _portrait(session: Session, row: AnalysedRow, study: Study, theta: float) -> PhasePortrait | None:
-    from wristctl.simulation.draws import Draws
+    from wristctl.simulation.worlds import Draws
     from wristctl.stability.phase_portrait import SCENARIO, phase_portrait
 
     if row.law.surface is None:

@@ -55,7 +55,7 @@ class Audited(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """Describe the run. Raises UserError without claims, or for a train run that cannot show them."""
     from wristctl.comparison.claims import TRAININGS, conditions_of
-    from wristctl.simulation.size import Size, check_size
+    from wristctl.simulation.closed_loop import Size, check_size
 
     claims = study.audit.claims
     if not claims:
@@ -79,7 +79,7 @@ def _check_box(study: Study) -> None:
     """UserError where the box's settings are too many; their mean is that of a few of them."""
     from wristctl.comparison.robust import rows_in_box
     from wristctl.comparison.unknowns_sampling import CONTINUOUS, drawn_settings
-    from wristctl.simulation.size import Size, check_steps
+    from wristctl.simulation.closed_loop import Size, check_steps
 
     box, rows = study.audit.box, len(rows_in_box(study.audit.claims))
     few = drawn_settings(box.model_copy(update={"draws": 8}), study.wrist, study.seed)

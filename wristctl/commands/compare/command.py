@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from wristctl.comparison.step_cost import StepTime
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.table import Gains
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
 
 
@@ -187,7 +187,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check names and say how many rollouts there will be."""
     from wristctl.commands.truth_table import truth_told
     from wristctl.comparison.combinations import refuse_tuned_scenarios
-    from wristctl.simulation.size import check_size
+    from wristctl.simulation.closed_loop import check_size
 
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
@@ -216,7 +216,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 def size(study: Study) -> Size:
     """Every row on every loop and reference, or on the worlds of a family."""
     from wristctl.comparison.combinations import count_rollouts
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
 
     settings, loops = study.compare, list(judged_loops(study, study.compare).values())
     if settings.worlds.family:
@@ -234,7 +234,7 @@ def compare(session: Session) -> Compared:
     from wristctl.comparison.comparison_data import frame, repetitions_frame, series
     from wristctl.comparison.statistics import spread
     from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.draws import Draws
+    from wristctl.simulation.worlds import Draws
 
     study, findings, searches = session.study, session.findings, dict[str, "Search"]()
     settings = study.compare

@@ -12,7 +12,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.plotting.style import BLACK, BLUE, GREY, figure, legend, title
-from wristctl.wrist.shape import arcs_backbone
+from wristctl.wrist.kinematics import arcs_backbone
 from wristctl.wrist.statics import equilibrium
 
 SEGMENTS = 4

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
     from wristctl.identification.loop_problem import LoopProblem
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
-    from wristctl.simulation.strokes import FrictionCase
+    from wristctl.simulation.spool_driven import FrictionCase
 
 
 log = logging.getLogger(__name__)
@@ -210,7 +210,7 @@ class Hysteresis(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """See that the wrist can be driven so, and that a measured loop can be read."""
     from wristctl.simulation.hysteresis import loop_cases
-    from wristctl.simulation.strokes import strokes
+    from wristctl.simulation.spool_driven import strokes
 
     settings = study.hysteresis
     strokes(study.wrist, settings)
@@ -230,7 +230,7 @@ def hysteresis(session: Session) -> Hysteresis:
     """
     from wristctl.commands.hysteresis import figures
     from wristctl.simulation.hysteresis import dead_bands, loops, main_case
-    from wristctl.simulation.strokes import strokes
+    from wristctl.simulation.spool_driven import strokes
 
     findings, settings = session.findings, session.study.hysteresis
     driven_strokes = strokes(session.study.wrist, settings)

@@ -23,7 +23,7 @@ from wristctl.plotting.style import (
     title,
 )
 from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop, with_preslidings, with_sheaths
-from wristctl.simulation.strokes import FrictionCase, Strokes
+from wristctl.simulation.spool_driven import FrictionCase, Strokes
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)

@@ -38,8 +38,8 @@ from wristctl.errors import UserError, under
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.repetitions import Repeated
-    from wristctl.simulation.size import Size
     from wristctl.simulation.trajectory import Trajectory
     from wristctl.wrist.kinematics import Inverse
 
@@ -101,7 +101,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     settings = study.simulate
     from wristctl.commands.truth_table import truth_told
-    from wristctl.simulation.size import check_size
+    from wristctl.simulation.closed_loop import check_size
 
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
@@ -116,8 +116,8 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def size(study: Study) -> Size:
     """One rollout, or as many as there are repetitions of what is drawn."""
-    from wristctl.simulation.draws import is_random
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
+    from wristctl.simulation.worlds import is_random
 
     chosen = study.simulate
     return Size([chosen.loop], chosen.horizon, chosen.repetitions if is_random(chosen.loop) else 1)
@@ -132,8 +132,8 @@ def simulate(session: Session) -> Simulated:
     from wristctl.plotting.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
-    from wristctl.simulation.draws import Draws
     from wristctl.simulation.trajectory import COLUMNS
+    from wristctl.simulation.worlds import Draws
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist = study.simulate, study.wrist

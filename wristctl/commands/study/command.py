@@ -34,7 +34,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
     from wristctl.comparison.world_ranking import noises_of
     from wristctl.control.table import controller
-    from wristctl.simulation.size import Size, check_size, check_steps
+    from wristctl.simulation.closed_loop import Size, check_size, check_steps
     from wristctl.tuning.search import check_optimiser, check_tunable
 
     settings = study.study

@@ -149,7 +149,7 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
     """The procedure, which does what it does at every point where the study has a sweep."""
 
     def plan(study: Study, inputs: Inputs) -> str:
-        from wristctl.simulation.size import check_steps
+        from wristctl.simulation.closed_loop import check_steps
 
         if not study.sweep:
             return procedure.plan(study, inputs)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
@@ -99,7 +99,7 @@ def planned_search(
     that none of the inputs is.
     """
     from wristctl.control.table import controller
-    from wristctl.simulation.size import check_size
+    from wristctl.simulation.closed_loop import check_size
     from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
     for number, name in enumerate(settings.controllers):
@@ -129,8 +129,8 @@ def size(study: Study) -> Size:
 
 
 def _size(settings: TuneSettings, families: Mapping[str, Family]) -> Size:
-    from wristctl.simulation.draws import is_random
-    from wristctl.simulation.size import Size
+    from wristctl.simulation.closed_loop import Size
+    from wristctl.simulation.worlds import is_random
 
     searched = settings.candidates * settings.iterations * settings.restarts * len(settings.controllers)
     if settings.worlds.family:
@@ -213,7 +213,7 @@ def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[
 def _note_streams(session: Session, study: Study) -> None:
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.simulation.draws import Draws
+    from wristctl.simulation.worlds import Draws
 
     settings = study.tune
     if settings.worlds.family:
