@@ -90,13 +90,13 @@ def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_streng
 
 def test_the_ranking_is_that_of_the_numbers() -> None:
     printed = dict.fromkeys(LOOPS, loop({}, {}))
-    assert "SMC has less RMSE than PID: as printed on all loops, with P1 and P2 exchanged on all loops." in said(
+    assert "SMC has less RMSE than PID: as printed on all loops; with P1 and P2 exchanged on all loops." in said(
         printed
     )
     assert "cannot be judged" in said(printed) and "it holds on all loops." in said(printed)
     turned = loop({}, {"pid/printed": 1e-5})
     found = said({**printed, "default": turned})
-    assert "as printed on exact and sampled, with" in found and "it holds on exact and sampled." in found
+    assert "as printed on exact and sampled; with" in found and "it holds on exact and sampled." in found
     one_link = loop({}, {"gvsc/default": 0.09})
     assert "it holds on no loop." in said(dict.fromkeys(LOOPS, one_link)), "GVSC above NC alone breaks it"
     alike = said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": 1.5e-3})))
@@ -128,9 +128,9 @@ def test_what_cannot_be_told_is_what_is_judged_so() -> None:
 
 def test_the_heaviest_claims_have_both_numbers_with_their_unit_and_what_fails_says_so() -> None:
     found = said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": float("nan"), "pid/printed": 0.25})))
-    assert "SMC's RMSE, gains as printed 0.00027 rad fails fails fails" in found
-    assert "PID's RMSE, gains as printed 0.0015 rad 0.25 0.25 0.25" in found
-    assert "SMC's RMSE, P1, P2 exchanged 0.00027 rad 0.00027* 0.00027* 0.00027*" in found
+    assert "RMSE, SMC as printed 0.00027 rad fails fails fails" in found
+    assert "RMSE, PID as printed 0.0015 rad 0.25 0.25 0.25" in found
+    assert "RMSE, SMC exchanged 0.00027 rad 0.00027* 0.00027* 0.00027*" in found
 
 
 def test_no_id_of_a_claim_is_on_the_first_screen() -> None:
@@ -182,7 +182,7 @@ def test_with_a_box_the_screen_still_says_what_cannot_be_told_and_what_is_contra
         found.index(each) for each in ("are reached", "RMSE comes out", "Cannot be told", "Contradicted", "Of 200")
     ]
     assert places == sorted(places)
-    assert "whatever is asked of them" in found and "SMC's RMSE, gains as printed" in found
+    assert "whatever is asked of them" in found and "RMSE, SMC as printed" in found
 
 
 def test_without_loops_or_claims_there_is_no_sentence_about_them() -> None:

@@ -109,7 +109,7 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     for gains, wording in (("printed", "as printed"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
         pairs += [f"{wording} {_places(one.found)}"] if one else []
-    sentences = [f"SMC has less RMSE than PID: {', '.join(pairs)}."] if pairs else []
+    sentences = [f"SMC has less RMSE than PID: {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
     tried = [link for link in links if link is not None]
