@@ -19,7 +19,7 @@ from wristctl.comparison.derived_claims import least_rmse
 from wristctl.comparison.paper import FACTOR, T2
 from wristctl.comparison.robust import split
 from wristctl.comparison.unknowns_sampling import courses, drawn_settings, readings
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.unknowns_box import STRATA, Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters

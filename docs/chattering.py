@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.comparison.combinations import ComparedRow, compare
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import LOOPS, Loop, Reference
 from wristctl.config.study import Study
 from wristctl.control.table import CONTROLLERS, controller

@@ -15,7 +15,7 @@ from wristctl.commands.compare.ranking import answer
 from wristctl.commands.printed_table import degrees
 from wristctl.comparison.geometric_means import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.families import Drawn, Family, Worlds
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of

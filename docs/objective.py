@@ -14,8 +14,8 @@ from scipy.stats import spearmanr
 
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import penalised
-from wristctl.config.controllers import Objective
 from wristctl.config.study import Study
+from wristctl.config.tune import Objective
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
 from wristctl.simulation.cases import Measured, measure

@@ -26,7 +26,7 @@ from wristctl.commands.inputs_of_loops import (
 from wristctl.commands.loop_warnings import warn_if_it_buckles, warn_if_outside
 from wristctl.commands.results import Findings
 from wristctl.commands.study.command import FAIR_STUDY
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
 from wristctl.errors import UserError
 from wristctl.simulation import worlds

@@ -10,7 +10,7 @@ import pytest
 from wristctl.comparison.best_case import GUARD_DEG, closest, follows, search
 from wristctl.comparison.paper import T2
 from wristctl.comparison.unknowns_sampling import Courses, courses, readings
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.unknowns_box import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters

@@ -26,7 +26,7 @@ from wristctl.comparison.unknowns_sampling import (
     usual,
 )
 from wristctl.config.audit import Claim
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.unknowns_box import Box, PaperSetting, Unstated
 from wristctl.config.wrist import WristParameters

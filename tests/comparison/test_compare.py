@@ -11,8 +11,9 @@ from wristctl.comparison.combinations import ComparedRow, compare, refuse_tuned_
 from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
-from wristctl.config.controllers import CompareSettings, TuneSettings
+from wristctl.config.compare import CompareSettings
 from wristctl.config.loop import Reference
+from wristctl.config.tune import TuneSettings
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation.reference import reference_name

@@ -13,7 +13,7 @@ import yaml
 from wristctl.commands.compare import command as compare
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.simulate import command as simulate
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.section import Section
 from wristctl.config.study import Study
 from wristctl.errors import UserError

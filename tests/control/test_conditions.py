@@ -18,7 +18,7 @@ from wristctl.commands.progress import watched
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session, Unattended
 from wristctl.config.choices import CONTROLLERS
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop
 from wristctl.control.law import Conditions
 from wristctl.control.table import controller

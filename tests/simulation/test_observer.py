@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
-from wristctl.config.controllers import SimulateSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, Push, Sensor
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of

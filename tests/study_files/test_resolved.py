@@ -11,9 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.config.controllers import CompareSettings, Row, SimulateSettings
+from wristctl.config.compare import CompareSettings
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop
 from wristctl.config.section import Section
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.study_files.load import load_study
 from wristctl.study_files.resolved import config_hash, resolved_yaml

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
-from wristctl.config.controllers import TuneSettings
+from wristctl.config.tune import TuneSettings
 from wristctl.errors import UserError
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.tuning.optimisers.pso import ParticleSwarm

@@ -13,8 +13,8 @@ import wristctl
 import wristctl.tuning
 from tests.values import changeable
 from wristctl.arrays import Array
-from wristctl.config.controllers import Objective
 from wristctl.config.study import Study
+from wristctl.config.tune import Objective
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import CONTROLLERS, controller, read_gains, write_gains

@@ -8,10 +8,13 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from wristctl.commands.inputs import Inputs
-from wristctl.config.controllers import CompareSettings, Row, SimulateSettings, TuneSettings
+from wristctl.config.compare import CompareSettings
+from wristctl.config.controller_row import Row
 from wristctl.config.families import Family
 from wristctl.config.loop import Loop, Reference
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, UserError, meant
 from wristctl.records import Run

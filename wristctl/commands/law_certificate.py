@@ -13,7 +13,7 @@ from wristctl.commands.adoption import adopted
 from wristctl.commands.hw_run.command import HW_RUN
 from wristctl.commands.perform import carry_out
 from wristctl.comparison.step_cost import step_time
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, signals_of

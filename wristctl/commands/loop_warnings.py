@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import by_angles, ends_of_family, identified
 from wristctl.commands.results import Findings
-from wristctl.config.controllers import CompareSettings, Row, SimulateSettings, TuneSettings
+from wristctl.config.compare import CompareSettings
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import DirectionName, Loop, Reference, longest_step
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.comparison.paper import FACTOR, T2
 from wristctl.comparison.unknowns_sampling import Courses, courses, readings, usual
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.unknowns_box import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.smc import SMC

@@ -12,7 +12,8 @@ import numpy as np
 from wristctl.comparison.paper import Ends, rounded
 from wristctl.comparison.verdicts import Finding, joint, of_numbers, of_ordering, of_sample, of_settling
 from wristctl.config.audit import Claim, VerdictName
-from wristctl.config.controllers import CompareSettings, Row
+from wristctl.config.compare import CompareSettings
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import LOOPS, Reference
 from wristctl.config.study import Study
 from wristctl.simulation.arrival import SHORT

@@ -23,7 +23,7 @@ from wristctl.comparison.geometric_means import (
 )  # fmt: skip
 from wristctl.comparison.tie_groups import Standing, standing
 from wristctl.comparison.world_ranking import WorldRanking
-from wristctl.config.controllers import CompareSettings
+from wristctl.config.compare import CompareSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter
 from wristctl.simulation.repetitions import Repeated

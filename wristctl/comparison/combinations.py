@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wristctl.config.controllers import CompareSettings, TuneSettings
+from wristctl.config.compare import CompareSettings
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.errors import UserError

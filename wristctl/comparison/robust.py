@@ -16,7 +16,7 @@ from wristctl.comparison.tie_groups import Share, share
 from wristctl.comparison.unknowns_sampling import Reactions
 from wristctl.comparison.verdicts import FAILING, of_numbers, of_ordering
 from wristctl.config.audit import Claim, VerdictName
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.simulation.arrival import SHORT
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import Reference
 from wristctl.config.unknowns_box import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters

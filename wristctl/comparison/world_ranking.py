@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.comparison.geometric_means import GeometricMean, geometric_mean, paired_ratio, penalised
 from wristctl.comparison.tie_groups import Standing, standing
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.families import Family, Worlds
 from wristctl.config.study import Study
 from wristctl.control.table import TunedGains, controller, gains_of

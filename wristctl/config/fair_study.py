@@ -5,8 +5,9 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from wristctl.config.choices import OPTIMISERS
-from wristctl.config.controllers import ControllerName, Objective, Row
+from wristctl.config.controller_row import ControllerName, Row
 from wristctl.config.section import OneOf, Section, choice
+from wristctl.config.tune import Objective
 
 
 class StudyBudget(Section):

@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
-from wristctl.config.controllers import Row
+from wristctl.config.controller_row import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity

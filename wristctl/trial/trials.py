@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.controllers import SimulateSettings
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Disturbances, Push
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.controllers import Objective
+from wristctl.config.tune import Objective
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller

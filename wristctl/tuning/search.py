@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 
 from wristctl.arrays import Array
-from wristctl.config.controllers import TuneSettings
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
 from wristctl.errors import UserError, meant

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.results import StudyResult
-from wristctl.config.controllers import TuneSettings
 from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVariant
 from wristctl.config.families import TuningWorlds
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:

@@ -29,10 +29,10 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Done, Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.config.controllers import TuneSettings
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
+from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, under
 

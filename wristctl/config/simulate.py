@@ -1,0 +1,36 @@
+"""Settings of `simulate`, one closed loop, and of `analyse`, the same loop linearised."""
+
+from typing import Literal
+
+from wristctl.config.controller_row import ControllerName, GainsChoice
+from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.section import Section, choice, quantity
+
+
+class SimulateSettings(Section):
+    """One closed loop."""
+
+    controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
+    gains: GainsChoice = choice("stepper", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    loop: Loop = Loop()
+    reference: Reference = Reference()
+    direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")
+    start: Literal["straight", "equilibrium"] = choice(
+        "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
+    )
+    horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
+    repetitions: int = choice(1, "rollouts, each with noise and a drawn plant of its own", ge=1, le=10_000)
+    network: str | None = choice(None, "train run behind a reference with inverse: network")
+    tuned: str | None = choice(None, "tune run behind gains: tuned")
+    from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+
+
+class AnalyseSettings(Section):
+    """The loop of the `simulate` section, linearised about where it rests."""
+
+    angles_deg: tuple[float, ...] = quantity(
+        (), "deg", "resting angles toward the direction; none: straight, half way, and where the reference ends"
+    )
+    over: str = choice("loop", "what the root locus goes over: loop (its gain), or a gain of the law by its name")
+    span: float = quantity(10.0, "", "the root locus goes from 1/span to span times that gain", gt=1, le=1000)
+    friction: Literal["slipping", "stuck"] = choice("slipping", "how the friction of elastic tendons is linearised")
