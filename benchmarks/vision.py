@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import CELLS, Detector, outlined, print_of, square_angle

@@ -13,7 +13,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.commands.compare.ranking import answer
 from wristctl.commands.printed_table import degrees
-from wristctl.comparison.geometric_means import paired_ratio, penalised, plain
+from wristctl.comparison.bootstrap import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Drawn, Family, Worlds

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import penalised
+from wristctl.comparison.bootstrap import penalised
 from wristctl.config.study import Study
 from wristctl.config.tune import Objective
 from wristctl.control.law import Controller

@@ -15,7 +15,7 @@ from wristctl.commands.hysteresis.figures import loops as loops_by_speed
 from wristctl.comparison.class_standing import class_standings
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.paper import T2
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.plotting.loop_figures import errors
 from wristctl.plotting.wrist_drawing import directions

@@ -19,7 +19,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
+from wristctl.comparison.bootstrap import LEVEL, GeometricMean, paired_ratio, penalised
 from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.study import Study
 from wristctl.control.table import controller

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-from wristctl.comparison.geometric_means import LEVEL, GeometricMean, paired_ratio, penalised
+from wristctl.comparison.bootstrap import LEVEL, GeometricMean, paired_ratio, penalised
 from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.study import Study
 from wristctl.control.law import Controller

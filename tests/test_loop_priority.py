@@ -17,7 +17,7 @@ import pytest
 from wristctl import loop_priority
 from wristctl.bench.frame_process import start_film
 from wristctl.config.bench import BenchSettings, RenderedCamera
-from wristctl.config.vision import Device, Gates, Markers, SceneSettings
+from wristctl.config.camera import Device, Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.loop_priority import BESIDE, PRIORITY, prioritised
 from wristctl.trial.tracking import ThreadedTracking

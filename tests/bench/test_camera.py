@@ -9,7 +9,7 @@ from tests.bench.conftest import TAUT, Host, HostOn
 from wristctl.bench.rig import Rig
 from wristctl.bench.virtual_bench import BenchTransport, VirtualBench, VirtualCamera
 from wristctl.config.bench import BenchSettings, FaultKind, InjectedFault, RenderedCamera
-from wristctl.config.vision import Gates, Markers
+from wristctl.config.camera import Gates, Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import SightingVerdict, Tracker

@@ -9,7 +9,7 @@ import urllib.request
 import numpy as np
 
 from wristctl.bench.frame_process import MjpegStream
-from wristctl.config.vision import Device
+from wristctl.config.camera import Device
 from wristctl.vision.camera import Frame
 from wristctl.vision.device_camera import DeviceCamera
 

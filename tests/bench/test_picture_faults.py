@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.bench.shutter import PICTURE_FAULTS, spoiled
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.detector import Detector
 from wristctl.vision.scene import Scene

@@ -29,7 +29,7 @@ from wristctl.board.driver import Board
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import Flag, Target
 from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 

@@ -20,7 +20,7 @@ from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.board.framing import Decoder
 from wristctl.board.messages import LAYOUTS, Command, Rate
 from wristctl.commands.loop_warnings import outside_conditions
-from wristctl.config.vision import Gates, Markers
+from wristctl.config.camera import Gates, Markers
 from wristctl.records import Run, list_runs, open_run
 from wristctl.study_files.load import load_study
 from wristctl.vision.camera import VideoCamera

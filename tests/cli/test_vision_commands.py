@@ -18,7 +18,7 @@ import pytest
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
 from wristctl.commands.calibrate.camera import look
-from wristctl.config.vision import CalibrateCameraSettings, SceneSettings
+from wristctl.config.camera import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, open_run
 from wristctl.records.manifest import command_of

@@ -17,7 +17,7 @@ from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.inputs import Inputs
 from wristctl.comparison import combinations, step_cost
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.statistics import spread
+from wristctl.comparison.repetition_spread import spread
 from wristctl.comparison.step_cost import StepTime
 from wristctl.errors import UserError
 from wristctl.records.manifest import read_overview

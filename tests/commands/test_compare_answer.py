@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from wristctl.commands.compare.answer import LADDER, LINES, answer_lines, wrapped
 from wristctl.commands.printed_table import COLUMNS, two
+from wristctl.comparison.bootstrap import geometric_mean, penalised
 from wristctl.comparison.class_standing import ClassStanding
 from wristctl.comparison.combinations import CLASSES
-from wristctl.comparison.geometric_means import geometric_mean, penalised
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.tie_groups import standing
 

@@ -10,9 +10,9 @@ import pytest
 
 from tests.commands.conftest import repeated
 from wristctl.api import load_study
+from wristctl.comparison.bootstrap import MEASURABLE, paired_ratio
 from wristctl.comparison.class_standing import ClassStanding, class_standings, standings_frame
 from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
-from wristctl.comparison.geometric_means import MEASURABLE, paired_ratio
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.repetitions import Repeated

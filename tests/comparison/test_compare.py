@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from wristctl.commands.compare.csv_data import frame, series
 from wristctl.comparison.combinations import ComparedRow, compare, refuse_tuned_scenarios
-from wristctl.comparison.comparison_data import frame, series
 from wristctl.comparison.paper import verdict
 from wristctl.comparison.step_cost import step_time
 from wristctl.config.compare import CompareSettings

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
+from wristctl.commands.compare.csv_data import frame, metrics_of, repetitions_frame, series
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.comparison_data import frame, metrics_of, repetitions_frame, series
 from wristctl.comparison.paper import T2
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from scipy.stats import binom, norm, skew, t
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import (
+from wristctl.comparison.bootstrap import (  # fmt: skip
     FEWEST_WORLDS,
     GeometricMean,
     Resampled,
     geometric_mean,
     paired_ratio,
     penalised,
-)  # fmt: skip
+)
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 DEXTRO = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0])

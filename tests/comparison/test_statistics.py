@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from wristctl.comparison.statistics import FEWEST, spread
+from wristctl.comparison.repetition_spread import FEWEST, spread
 
 
 @pytest.mark.parametrize(("count", "median"), [(1, 10.0), (2, 15.0), (3, 20.0), (4, 25.0), (7, 40.0), (8, 45.0)])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import studentized_range, t, ttest_rel
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import FAILURE, MEASURABLE
+from wristctl.comparison.bootstrap import FAILURE, MEASURABLE
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.tie_groups import Standing, share, standing
 

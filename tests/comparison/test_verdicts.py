@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from wristctl.comparison.paper import Ends
-from wristctl.comparison.statistics import spread
+from wristctl.comparison.repetition_spread import spread
 from wristctl.comparison.verdicts import joint, of_numbers, of_ordering, of_sample, of_settling
 from wristctl.config.audit import VerdictName
 

@@ -19,7 +19,7 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records.provenance import code_state, environment_state
 from wristctl.records.start import fingerprint
-from wristctl.study_files.explain import located
+from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 from wristctl.study_files.resolved import config_hash, resolved_yaml
 from wristctl.study_files.strict_yaml import KeyPath, parse_yaml

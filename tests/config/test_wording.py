@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wristctl.errors import Argument, Call, Phrase, Setting, UserError, under
-from wristctl.study_files.explain import located
+from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 
 PHRASES: list[tuple[Phrase, str, str]] = [

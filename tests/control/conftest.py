@@ -15,9 +15,9 @@ from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.wrist.elastic import NoTendons
 from wristctl.wrist.integrator import step
 from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendon_mechanics import NoTendons
 from wristctl.wrist.tendons import allocate, reach
 
 

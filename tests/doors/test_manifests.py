@@ -23,8 +23,8 @@ from wristctl.board.messages import BAUD
 from wristctl.board.transport import SerialTransport, open_transport
 from wristctl.cli.runs.verification import _again
 from wristctl.commands.procedure import procedure_of
+from wristctl.config.camera import Device
 from wristctl.config.study import Study
-from wristctl.config.vision import Device
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, list_runs, start_run
 from wristctl.records.manifest import KINDS

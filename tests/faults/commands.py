@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from tests.identification.benches import LEVEL, UPRIGHT, write_run
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, list_runs
 from wristctl.vision.scene import Scene

@@ -26,7 +26,7 @@ CONFIG = ("wristctl.config", "wristctl.records")
 def test_a_function_rests_on_what_it_imports_and_on_nothing_else() -> None:
     loop, plant = (PACKAGE / "simulation" / "kernel.py", PACKAGE / "wrist" / "pcc.py")
     names = [{each.relative_to(PACKAGE).as_posix() for each in sources(file)} for file in (loop, plant)]
-    assert {"simulation/kernel.py", "simulation/observer.py", "wrist/elastic.py", "lanes/lane.py"} <= names[0]
+    assert {"simulation/kernel.py", "simulation/observer.py", "wrist/tendon_mechanics.py", "lanes/lane.py"} <= names[0]
     assert {"wrist/integrator.py", "wrist/jacobian.py", "lanes/lane.py"} <= names[1]
     assert not any(
         name.startswith(("config/", "study_files/", "plugins/", "records/", "vision/", "board/", "cli/"))

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import wristctl
+from wristctl.commands.compare.csv_data import frame, series
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters

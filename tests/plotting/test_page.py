@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.commands.compare.csv_data import frame, series
 from wristctl.commands.compare.figures import rmse_map, variation_dots
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.comparison_data import frame, series
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.plotting.page import page, several_page

@@ -10,9 +10,9 @@ import pytest
 from tests.commands.conftest import repeated
 from wristctl.api import load_study
 from wristctl.commands.compare.class_figures import answer_figure, error_against_variation
+from wristctl.comparison.bootstrap import MEASURABLE
 from wristctl.comparison.class_standing import ClassStanding, class_standings
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.geometric_means import MEASURABLE
 
 MOVES = 8
 

@@ -14,10 +14,10 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import nonideal_of, spools_after_slip, unmoved
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.elastic import RealTendons, pulls_along, read_nonideal, spool_pull
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, travel
 from wristctl.wrist.segments import segments
+from wristctl.wrist.tendon_mechanics import RealTendons, pulls_along, read_nonideal, spool_pull
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from wristctl.errors import UserError
-from wristctl.study_files.explain import check_lengths
+from wristctl.study_files.error_messages import check_lengths
 from wristctl.study_files.load import read_study
 
 ASKED = {

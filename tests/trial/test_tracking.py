@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.tracking import InlineTracking, ThreadedTracking
 from wristctl.vision.camera import Frame

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 from wristctl.vision.scene import Scene

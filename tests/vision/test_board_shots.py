@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.config.vision import CharucoBoard, SceneSettings
+from wristctl.config.camera import CharucoBoard, SceneSettings
 from wristctl.vision.camera import Frame
 from wristctl.vision.charuco import BoardFinder, BoardView
 from wristctl.vision.scene import board_shots

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wristctl.config.vision import Device
+from wristctl.config.camera import Device
 from wristctl.vision.camera import (
     CameraError,
     FolderCamera,

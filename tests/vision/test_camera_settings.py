@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wristctl.config.vision import Device
+from wristctl.config.camera import Device
 from wristctl.vision.camera import CameraError, FolderCamera, VideoCamera
 from wristctl.vision.device_camera import DeviceCamera
 

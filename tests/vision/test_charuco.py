@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.vision.conftest import bent
-from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard, Gates, Markers, SceneSettings
+from wristctl.config.camera import CalibrateCameraSettings, CharucoBoard, Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.vision.camera import Frame

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard
+from wristctl.config.camera import CalibrateCameraSettings, CharucoBoard
 from wristctl.errors import UserError
 from wristctl.vision.camera import Frame
 from wristctl.vision.charuco import Album, BoardFinder, BoardView, board_of, calibrate, least_seen

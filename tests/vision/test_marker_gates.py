@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.config.vision import Gates, Markers
+from wristctl.config.camera import Gates, Markers
 from wristctl.vision import marker
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker

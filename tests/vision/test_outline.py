@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from tests.vision.conftest import Array, frames
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.detector import outlined, square_angle
 from wristctl.vision.marker import Tracker

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 from wristctl.vision.detector import PictureQuality, quality_of

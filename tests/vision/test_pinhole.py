@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.vision.view import Pinhole
 
 Side = Literal["right", "left"]

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from wristctl.commands.calibrate.print_sheet import PAPERS, board_page, marker_page, write_sheets
-from wristctl.config.vision import CharucoBoard, Markers
+from wristctl.config.camera import CharucoBoard, Markers
 from wristctl.errors import UserError
 from wristctl.vision.charuco import BoardFinder
 from wristctl.vision.detector import Detector

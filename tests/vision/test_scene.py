@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.vision.conftest import bent
-from wristctl.config.vision import Markers, SceneSettings
+from wristctl.config.camera import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.scene import Scene
 from wristctl.vision.scene_parts import FACE, THICK

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.distance import pdist
 
-from wristctl.config.vision import Gates, Markers, SceneSettings
+from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Tracker

@@ -18,10 +18,10 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of, square_like
 from wristctl.wrist.dynamics import equation_of_motion
-from wristctl.wrist.elastic import NoTendons, travel
 from wristctl.wrist.hinges import HINGES, Hinges
 from wristctl.wrist.integrator import step
 from wristctl.wrist.pcc import PCC
+from wristctl.wrist.tendon_mechanics import NoTendons, travel
 
 WRIST = WristParameters(gravity=(-8.1, 4.3), taper=3.0)
 _read = tuple_of(Hinges)

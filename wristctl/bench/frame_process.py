@@ -15,7 +15,7 @@ import numpy as np
 
 from wristctl.bench.shutter import Exposure, picture
 from wristctl.config.bench import BenchSettings
-from wristctl.config.vision import Markers
+from wristctl.config.camera import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.loop_priority import as_any_program
 from wristctl.processes import safe_path

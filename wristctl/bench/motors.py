@@ -18,8 +18,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
-from wristctl.wrist.elastic import RealTendons, read_nonideal, spool_pull
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
+from wristctl.wrist.tendon_mechanics import RealTendons, read_nonideal, spool_pull
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)

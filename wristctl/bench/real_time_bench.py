@@ -17,8 +17,8 @@ from wristctl.board.board_errors import BoardError
 from wristctl.board.messages import BAUD
 from wristctl.board.transport import SerialTransport
 from wristctl.config.bench import BenchSettings
+from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
-from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.processes import safe_path

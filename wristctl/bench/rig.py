@@ -13,8 +13,8 @@ from wristctl.bench.faults import Faults
 from wristctl.bench.shutter import Shutter
 from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.config.bench import BenchSettings
+from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
-from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
 from wristctl.vision.scene import Scene

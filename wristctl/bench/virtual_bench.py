@@ -13,8 +13,8 @@ from wristctl.board.board_errors import PortLost
 from wristctl.board.emulator.atmega2560 import Atmega2560, VirtualTransport
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.config.bench import BenchSettings, FaultKind
+from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
-from wristctl.config.vision import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.vision.camera import CameraError, Frame

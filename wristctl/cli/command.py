@@ -19,7 +19,7 @@ from wristctl.commands.perform import check_executor, perform, prepare, recordin
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
-from wristctl.study_files.explain import check_sizes, located
+from wristctl.study_files.error_messages import check_sizes, located
 from wristctl.study_files.keys import section_keys
 from wristctl.study_files.load import read_study, whole_key
 

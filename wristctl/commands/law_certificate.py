@@ -20,7 +20,7 @@ from wristctl.control.law import NOW, Controller, signals_of
 from wristctl.control.table import controller
 from wristctl.control.vetting import call_law, vet
 from wristctl.errors import UserError
-from wristctl.study_files.explain import explained
+from wristctl.study_files.error_messages import explained
 
 # Angle from which a law should bend the wrist back [rad], and ticks in which its memory may take that in.
 _BENT, _SETTLED = 0.1, 20

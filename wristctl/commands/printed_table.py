@@ -134,7 +134,7 @@ def two(value: float, digits: int = 2) -> str:
 
 def degrees(error: float, digits: int = 2) -> str:
     """An error [rad] in degrees, to so many digits; `<0.001` where nobody could measure it."""
-    from wristctl.comparison.geometric_means import MEASURABLE
+    from wristctl.comparison.bootstrap import MEASURABLE
 
     if error <= MEASURABLE * (1.0 + 1e-9):
         return f"<{math.degrees(MEASURABLE):g}"

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
-from wristctl.comparison.geometric_means import (
+from wristctl.comparison.bootstrap import (  # fmt: skip
     MEASURABLE,
     GeometricMean,
     geometric_mean,
     paired_ratio,
     penalised,
-)  # fmt: skip
+)
+from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
 from wristctl.comparison.tie_groups import Standing, standing
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.config.compare import CompareSettings

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import LEVEL, on_grid
+from wristctl.comparison.bootstrap import LEVEL, on_grid
 from wristctl.seeds import Entropy
 
 # Worlds or motions below which no outcome tells two rows apart: 2 of 2^5 flips are 6 %, and 2 of 2^6 are 3 %.

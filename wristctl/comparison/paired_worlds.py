@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import GeometricMean, Resampled, paired_ratio, penalised, plain
+from wristctl.comparison.bootstrap import GeometricMean, Resampled, paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking
 
 _TERM_STREAM = 20_032

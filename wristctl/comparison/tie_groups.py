@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import FAILURE, MEASURABLE, penalised
+from wristctl.comparison.bootstrap import FAILURE, MEASURABLE, penalised
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS, PairedComparisons
 from wristctl.seeds import Entropy
 

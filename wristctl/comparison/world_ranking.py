@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import GeometricMean, geometric_mean, paired_ratio, penalised
+from wristctl.comparison.bootstrap import GeometricMean, geometric_mean, paired_ratio, penalised
 from wristctl.comparison.tie_groups import Standing, standing
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Family, Worlds

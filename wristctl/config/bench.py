@@ -4,9 +4,9 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from wristctl.config.camera import SceneSettings
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.section import Section, choice, quantity
-from wristctl.config.vision import SceneSettings
 
 # Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
 # others the bench's; from usb-latency on they are in virtual time only.

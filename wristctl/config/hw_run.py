@@ -5,11 +5,11 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.bench import BenchSettings
+from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
-from wristctl.config.vision import Device, Gates, Markers
 from wristctl.errors import Unfitting
 
 # Lifetime of a step rate on the board: least time [s], and number of ticks.

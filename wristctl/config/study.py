@@ -6,6 +6,7 @@ from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from wristctl.config.audit import AuditSettings
+from wristctl.config.camera import CalibrateCameraSettings, TrackSettings
 from wristctl.config.compare import CompareSettings
 from wristctl.config.fair_study import FairStudySettings
 from wristctl.config.families import Family
@@ -16,7 +17,6 @@ from wristctl.config.learning import DataSettings, TrainSettings
 from wristctl.config.section import Section
 from wristctl.config.simulate import AnalyseSettings, SimulateSettings
 from wristctl.config.tune import TuneSettings
-from wristctl.config.vision import CalibrateCameraSettings, TrackSettings
 from wristctl.config.wrist import WristParameters
 
 

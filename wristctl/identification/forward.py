@@ -16,9 +16,9 @@ from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import nonideal_of, tendon_after_slip, unmoved, wears
-from wristctl.wrist.elastic import Nonideal, RealTendons, read_nonideal
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle, travel
+from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, read_nonideal
 
 _STIFFNESS = len(Nonideal._fields)
 """Row of a tendon's stiffness, before what each has reeled in more."""

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
-from wristctl.comparison.statistics import spread_over_time
+from wristctl.comparison.repetition_spread import spread_over_time
 from wristctl.plotting.style import (
     BLACK,
     DOTTED,

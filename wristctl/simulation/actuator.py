@@ -1,7 +1,7 @@
 """Actuators: from commanded pulls to the pulls that act on the wrist. A side's pull is that of its two tendons.
 
 lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon, in whole microsteps of it.
-tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.elastic`'s.
+tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
 positively with a gain near 1.
 
@@ -21,8 +21,8 @@ from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.elastic import travel
 from wristctl.wrist.plant import PlantModel
+from wristctl.wrist.tendon_mechanics import travel
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
 
 

@@ -22,9 +22,9 @@ from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
 from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
-from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons, Tendons
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
+from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, Tendons
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 Indices = NDArray[np.int64]

@@ -15,9 +15,9 @@ from wristctl.simulation.actuator import actuate, drive_in_lanes, read_winding, 
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
-from wristctl.wrist.elastic import pulls_at_start, tendons_in_lanes
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_before, tip_angle
 from wristctl.wrist.segments import load_segments
+from wristctl.wrist.tendon_mechanics import pulls_at_start, tendons_in_lanes
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
 RECORDED = (
@@ -92,7 +92,7 @@ class LoopState(NamedTuple):
     """What goes on, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates,
-    `tendons` one of `wristctl.wrist.elastic.Tendons` as they are, with their state.
+    `tendons` one of `wristctl.wrist.tendon_mechanics.Tendons` as they are, with their state.
     `record` [block, sample, column, lane] takes each sample's values, all or BRIEFLY, or has no samples. `watch` is the
     camera with its observer, or NoCamera.
     """

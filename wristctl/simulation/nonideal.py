@@ -10,7 +10,7 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import where
-from wristctl.wrist.elastic import (
+from wristctl.wrist.tendon_mechanics import (
     LOST,
     OF_A_TENDON,
     PATH,

@@ -24,11 +24,11 @@ from wristctl.lanes.rows import part, rows_of
 from wristctl.processes import cores, stoppable
 from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.elastic import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, tip_angle
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
+from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _STIFFNESS = len(Nonideal._fields)

@@ -23,8 +23,8 @@ from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
-from wristctl.wrist.elastic import OF_A_TENDON, PATH, PulledTendons, RealTendons
 from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.tendon_mechanics import OF_A_TENDON, PATH, PulledTendons, RealTendons
 
 _ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
 """Typical sizes [rad, rad/s, N, m], by which small changes are measured."""

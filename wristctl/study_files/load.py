@@ -13,7 +13,7 @@ from wristctl.config.study import Study
 from wristctl.errors import Phrase, Setting, UserError, meant, worded
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
-from wristctl.study_files.explain import explained
+from wristctl.study_files.error_messages import explained
 from wristctl.study_files.keys import field_at, home_of, keys_of, section_keys
 from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml

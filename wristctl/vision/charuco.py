@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.vision import CalibrateCameraSettings, CharucoBoard
+from wristctl.config.camera import CalibrateCameraSettings, CharucoBoard
 from wristctl.errors import UserError
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.view import View

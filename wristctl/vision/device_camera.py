@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import cv2
 
-from wristctl.config.vision import Device
+from wristctl.config.camera import Device
 from wristctl.loop_priority import beside_the_loop
 from wristctl.processes import check_hardware_allowed
 from wristctl.vision.camera import CameraError, Frame, grey_of, without_warnings

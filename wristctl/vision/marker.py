@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.vision import Gates, Markers
+from wristctl.config.camera import Gates, Markers
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import Detector, edges, square_angle
 from wristctl.vision.view import View

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from wristctl.arrays import Array
+from wristctl.config.camera import CharucoBoard, Markers, SceneSettings
 from wristctl.config.choices import PLANTS
-from wristctl.config.vision import CharucoBoard, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.charuco import board_of

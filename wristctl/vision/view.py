@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.vision import SceneSettings
+from wristctl.config.camera import SceneSettings
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:

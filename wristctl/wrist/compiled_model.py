@@ -16,10 +16,10 @@ from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, 
 from wristctl.wrist import tendons
 from wristctl.wrist.arcs import Chords, chords, tip
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import NoTendons
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.segments import Segments, load_segments
+from wristctl.wrist.tendon_mechanics import NoTendons
 
 
 class Terms(NamedTuple):

@@ -30,13 +30,13 @@ from wristctl.wrist.chain import (
     tip_derivatives,
 )
 from wristctl.wrist.dynamics import bias
-from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.kinematics import Planar
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.statics import settled
+from wristctl.wrist.tendon_mechanics import travel
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 FOLDED = math.pi

@@ -17,7 +17,9 @@ from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import chords, spring, tendon_torques
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
-from wristctl.wrist.elastic import (
+from wristctl.wrist.jacobian import residual_jacobians
+from wristctl.wrist.plant import path_along, path_before
+from wristctl.wrist.tendon_mechanics import (
     PATH,
     ElasticTendons,
     NoTendons,
@@ -28,8 +30,6 @@ from wristctl.wrist.elastic import (
     row_of,
     stiffen,
 )
-from wristctl.wrist.jacobian import residual_jacobians
-from wristctl.wrist.plant import path_along, path_before
 
 
 @compiled

@@ -10,12 +10,12 @@ from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist.arcs import ARC_LIMIT, tip
 from wristctl.wrist.chain import angle_along, tip_derivatives
 from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.elastic import travel
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import arcs_backbone, chain_tip
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.statics import equilibrium
+from wristctl.wrist.tendon_mechanics import travel
 
 _load = replacing("stiffness", "force_y")
 

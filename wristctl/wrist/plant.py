@@ -28,8 +28,8 @@ from wristctl.lanes.compiled import by_type, implements, kernel, spelled_out
 from wristctl.lanes.lane import dot, planar, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
-from wristctl.wrist.elastic import ElasticTendons, NoTendons, PulledTendons, RealTendons, update_memory
 from wristctl.wrist.kinematics import Backbone
+from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, update_memory
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: An
     """Move coordinates and rates on by h [s] with `spool_input` held.
 
     It is what the spools of both sides hold, (plus, minus) or twice that: by the type of `tendons` pulls [N] or lengths
-    reeled in [m]. Pulls at any place are `wristctl.wrist.elastic.pulls_along`'s, and end stops are
+    reeled in [m]. Pulls at any place are `wristctl.wrist.tendon_mechanics.pulls_along`'s, and end stops are
     `wristctl.wrist.integrator`'s. Returns an estimate of the step's error in the bending angle and in its rate
     [rad, rad/s], as an embedded solution of lower order gives it.
     """

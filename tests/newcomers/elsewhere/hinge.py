@@ -17,9 +17,9 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, turn
 from wristctl.lanes.named_tuples import replacing
-from wristctl.wrist.elastic import pulls_along
 from wristctl.wrist.kinematics import Planar
 from wristctl.wrist.plant import PlantModel
+from wristctl.wrist.tendon_mechanics import pulls_along
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
+from wristctl.config.camera import CalibrateCameraSettings
 from wristctl.config.study import Study
-from wristctl.config.vision import CalibrateCameraSettings
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
-from wristctl.config.vision import CharucoBoard, Markers
+from wristctl.config.camera import CharucoBoard, Markers
 from wristctl.errors import UserError
 from wristctl.plotting.style import BLACK, GREY
 from wristctl.vision.charuco import DICTIONARY as BOARD_DICTIONARY

@@ -284,8 +284,8 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
 
 
 def _row(result: ComparedRow, shown: Iterable[str], repeated: bool, theirs: bool) -> tuple[str | float, ...]:
-    from wristctl.comparison.comparison_data import metrics_of
-    from wristctl.comparison.statistics import spread
+    from wristctl.commands.compare.csv_data import metrics_of
+    from wristctl.comparison.repetition_spread import spread
 
     metrics = metrics_of(result)
     never = "failed" if result.repeated.failed.any() else "never"
@@ -303,7 +303,7 @@ def step_table(times: dict[str, StepTime]) -> Table:
 
 
 def _paper(result: ComparedRow) -> tuple[str, str]:
-    from wristctl.comparison.comparison_data import metrics_of
+    from wristctl.commands.compare.csv_data import metrics_of
     from wristctl.comparison.paper import T2, verdict
 
     if result.controller not in T2:

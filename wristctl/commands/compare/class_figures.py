@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.comparison.class_standing import ClassStanding
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.comparison_data import metrics_of
 from wristctl.plotting.loop_figures import envelope, label
 from wristctl.plotting.style import (
     BLACK,

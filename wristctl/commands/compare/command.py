@@ -164,8 +164,8 @@ class Compared(StudyResult):
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
         import pandas as pd
 
+        from wristctl.commands.compare.csv_data import frame
         from wristctl.comparison.combinations import paper_cells
-        from wristctl.comparison.comparison_data import frame
         from wristctl.comparison.world_ranking import ranking_frame
 
         if self.rankings:
@@ -174,7 +174,7 @@ class Compared(StudyResult):
 
     def series(self) -> dict[str, np.ndarray]:
         """Courses over time, one row per combination, every fifth sample; SI units."""
-        from wristctl.comparison.comparison_data import series
+        from wristctl.commands.compare.csv_data import series
 
         return dict(series(self.rows))
 
@@ -227,12 +227,12 @@ def size(study: Study) -> Size:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
+    from wristctl.commands.compare.csv_data import frame, repetitions_frame, series
     from wristctl.commands.truth_table import truth_tables
     from wristctl.comparison.class_standing import class_standings, of_ranking, standings_frame
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.combinations import paper_cells
-    from wristctl.comparison.comparison_data import frame, repetitions_frame, series
-    from wristctl.comparison.statistics import spread
+    from wristctl.comparison.repetition_spread import spread
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.worlds import Draws
 

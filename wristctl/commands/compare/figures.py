@@ -13,10 +13,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
+from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.comparison_data import metrics_of
 from wristctl.comparison.paper import T2
-from wristctl.comparison.statistics import spread
+from wristctl.comparison.repetition_spread import spread
 from wristctl.config.loop import Loop
 from wristctl.plotting.style import (
     BLACK,

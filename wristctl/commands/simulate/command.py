@@ -206,7 +206,7 @@ def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
     """Every metric: its value, or of several repetitions the median with its 95 % interval."""
     import pandas as pd
 
-    from wristctl.comparison.statistics import spread
+    from wristctl.comparison.repetition_spread import spread
     from wristctl.simulation.metrics import METRICS
 
     findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")

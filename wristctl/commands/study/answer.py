@@ -59,7 +59,7 @@ def quietest(ranking: WorldRanking, rows: Sequence[int]) -> int:
 
 
 def _rig(ranking: WorldRanking) -> str:
-    from wristctl.comparison.geometric_means import plain
+    from wristctl.comparison.bootstrap import plain
 
     groups = ranking.standing.groups
     if not groups:

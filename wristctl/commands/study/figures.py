@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.geometric_means import plain
+from wristctl.comparison.bootstrap import plain
 from wristctl.comparison.paired_worlds import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.plotting.style import (

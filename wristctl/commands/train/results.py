@@ -38,7 +38,7 @@ def ranking_tables(
     findings: Findings, settings: TrainSettings, trials: dict[str, list[TrainingResult]], table: pd.DataFrame
 ) -> list[Table]:
     """Mean and 95 % interval of every measure over the seeds of each network, and what ranking they support."""
-    from wristctl.comparison.statistics import spread
+    from wristctl.comparison.repetition_spread import spread
     from wristctl.learning.evaluation import MEASURES
     from wristctl.learning.ranking import mean_interval, trained_alike
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2, Printed, verdict
-from wristctl.comparison.statistics import spread
+from wristctl.comparison.repetition_spread import spread
 
 if TYPE_CHECKING:
     import pandas as pd
