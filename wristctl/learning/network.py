@@ -12,8 +12,8 @@ from wristctl.config.learning import Activation
 from wristctl.learning.domain import Domain
 from wristctl.wrist.kinematics import AnglePath, TipPath
 
-# Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine
-# the threads of a linear algebra library wait for each other, ten times longer than the product takes on one.
+# Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine the
+# threads of a linear algebra library wait for each other, ten times longer than the product takes on one.
 BLOCK = 12
 
 # Slope of leaky ReLU below zero.

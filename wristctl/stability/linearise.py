@@ -116,8 +116,7 @@ HOLD = Controller(
 )
 
 
-# Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and
-# at
+# Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and at
 # how many frequencies the plant is asked.
 _EXACT, _SHORTEST, _FREQUENCIES = 1e-6, 2e-5, 24
 _OUTPUTS = {name: RECORDED.index(name) for name in ("theta", "rate", "torque_wanted", "tension_plus", "tension_minus")}

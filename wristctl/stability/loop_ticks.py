@@ -100,8 +100,8 @@ def _flat(part: StatePart) -> Array:
     return part.array.reshape(len(part.array), -1, part.array.shape[-1])
 
 
-# Difference quotients are over so many times a variable's typical size, to both sides; the smaller with bristles,
-# which turn round within 20 um.
+# Difference quotients are over so many times a variable's typical size, to both sides; the smaller with bristles, which
+# turn round within 20 um.
 SMALL, SMALLER = 1e-6, 1e-8
 # Ticks before the first guess of a resting point.
 _WARM_UP = 200
