@@ -105,7 +105,7 @@ class RootLocus:
 
 
 def root_locus(over: str, closed: At, span: float) -> RootLocus:
-    """The locus from 1/span to span times the gain, of the loop that `at` gives."""
+    """The locus from 1/span to span times the gain, of the loop that `closed` gives."""
     factors = np.geomspace(1.0 / span, span, _POINTS)
     modes = [_modes(closed, float(factor)) for factor in factors]
     poles = [np.array([(mode.growth, mode.frequency) for mode in swings]).reshape(-1, 2) for swings in modes]

@@ -28,7 +28,7 @@ def outlined(image: NDArray[Any], corners: Array, cells: int) -> Array:
 
 
 def _lines(image: NDArray[Any], vertices: NDArray[np.complex128], margin: float) -> tuple[Any, Any]:
-    """A point on, and the direction of, each side (4,) of the square of corners `at`.
+    """A point on, and the direction of, each side (4,) of the square of corners `vertices`.
 
     Across each of many places along a side, the edge is the centre of the rise to white, wherever it lies between
     pixels; a place counts by how much rise there is.

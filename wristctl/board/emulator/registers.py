@@ -60,7 +60,7 @@ def read(chip: Chip, address: int) -> int:
 
 @kernel
 def write(chip: Chip, address: int, value: int) -> None:
-    """Do what a store to this address does."""
+    """Store a value at this address, with the effects of its register."""
     memory = chip.memory
     if not IO_FIRST <= address <= IO_LAST:
         memory[address] = value
