@@ -23,12 +23,12 @@ from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
 
+# Periods that are remembered at least.
 _KEPT = 60_000
-"""Periods that are remembered at least."""
 
 
 class Truth(NamedTuple):
-    """What a wrist did, once a millisecond."""
+    """True motion of a wrist, once a millisecond."""
 
     time: Array
     """(T,) [s] on the board's clock"""
@@ -48,7 +48,7 @@ class Truth(NamedTuple):
 
 
 class MotorMotion(NamedTuple):
-    """What the board made of its motors, axis by axis."""
+    """Motion of the motors as the board commanded it, axis by axis."""
 
     steps: tuple[int, ...]
     """microsteps that reeled in, less those that paid out, since power-on"""
@@ -93,7 +93,7 @@ class BenchWrist:
 
     @property
     def motion(self) -> MotorMotion:
-        """What the board made of its motors up to `time`."""
+        """Motion of the motors up to `time`, as the board commanded it."""
         spools = self._spools
         last = tuple(None if cycle < 0 else float(cycle) / FREQUENCY for cycle in spools.stepped)
         return MotorMotion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
@@ -148,7 +148,7 @@ class BenchWrist:
             self._periods += count
 
     def truth(self, since: float = 0.0) -> Truth:
-        """What it did after `since` [s], as far back as the last minute."""
+        """True motion after `since` [s], as far back as the last minute."""
         fresh = max(0, min(self._rows, self._periods - round(since / PERIOD)))
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
@@ -163,27 +163,27 @@ class BenchWrist:
     def angles(self, times: Array) -> Array:
         """Coordinates (k, q) at k times within what `truth` remembers, straight lines between milliseconds."""
         first = max(0, round((times.min()) / PERIOD) - 2)
-        known = self.truth(first * PERIOD)
-        return np.stack([np.interp(times, known.time, angle) for angle in known.theta.T], axis=-1)
+        truth = self.truth(first * PERIOD)
+        return np.stack([np.interp(times, truth.time, angle) for angle in truth.theta.T], axis=-1)
 
     def across(self, time: float) -> float:
         """The bend across the plane at a time within what `truth` remembers [rad]."""
-        known = self.truth(max(0.0, time - 2.0 * PERIOD))
-        return float(np.interp(time, known.time, known.across))
+        truth = self.truth(max(0.0, time - 2.0 * PERIOD))
+        return float(np.interp(time, truth.time, truth.across))
 
     def _face(self, direction: str) -> None:
         self._plane = DIRECTIONS[direction].plane
         plant = plant_of(*facing(self._wrist, self._drawn, direction))
-        other = next(each for each in DIRECTIONS.values() if each.plane != self._plane)
-        beside = plant_of(*facing(self._wrist, self._drawn, other.name))
+        across = next(across for across in DIRECTIONS.values() if across.plane != self._plane)
+        beside = plant_of(*facing(self._wrist, self._drawn, across.name))
         self._across = across_of(beside, away_of(self._plane, self._positive))
         self._spools.bent[:] = 0.0
         self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
-        own = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
+        tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
         self._tendons = unmoved(self._spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[: self._n])
-        of_tendons(self._tendons, AXES)[:] = own
+        of_tendons(self._tendons, AXES)[:] = tendon_states
         self._axes = axes
 
     def _make_room(self, count: int) -> None:

@@ -1,4 +1,4 @@
-"""What goes wrong between the board's pins and the tendons: wires, drives, rotors, pulleys."""
+"""Faults between the board's pins and the tendons: wires, drives, rotors, pulleys."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from wristctl.config.bench import FaultKind, InjectedFault
 
 
 class Faults:
-    """Which faults are on at a time of the board's clock [s]; those of trials only once one begins."""
+    """Schedule of faults by the board's clock [s]; those of trials are on only once a trial begins."""
 
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = tuple(faults)
@@ -36,11 +36,11 @@ class Faults:
         return min((time for fault in self.of((kind,)) if (time := self.begun(fault)) > after), default=math.inf)
 
     def of(self, kinds: Sequence[FaultKind]) -> list[InjectedFault]:
-        """Those of these kinds, on or not."""
+        """Faults of these kinds, on or not."""
         return [fault for fault in self._faults if fault.kind in kinds]
 
     def active(self, kinds: Sequence[FaultKind], time: float) -> list[InjectedFault]:
-        """Those of these kinds that are on."""
+        """Faults of these kinds that are on."""
         return [fault for fault in self.of(kinds) if 0.0 <= time - self.begun(fault) < (fault.duration or math.inf)]
 
     def begun(self, fault: InjectedFault) -> float:
@@ -48,16 +48,16 @@ class Faults:
         return self._starts[fault.since] + fault.at
 
 
+# (E, 3) changes of output latches: cycle, port, value.
 Edges = NDArray[np.int64]
-"""(E, 3) changes of output latches: cycle, port, value."""
 
 _PORT_A, _PORT_C = ord("A"), ord("C")
 _ALL_OFF = (1 << AXES) - 1
 _WIRES: tuple[FaultKind, ...] = ("direction-flipped", "direction-stuck", "motor-stalled", "drive-off", "supply-off")
 _POWER: tuple[FaultKind, ...] = ("drive-off", "supply-off")
 _TENDONS: tuple[FaultKind, ...] = ("tendon-detached", "tendon-slipped")
+# Slack of a tendon that is off its pulley [m].
 _OFF = 1.0
-"""Slack of a tendon that is off its pulley [m]."""
 
 
 class MotorFaults:
@@ -94,13 +94,13 @@ class MotorFaults:
 
     def give_way(self, time: float) -> list[tuple[int, float]]:
         """Axes whose tendons give way up to a time [s], and by how much [m]; each once."""
-        found = []
+        detached = []
         for number, fault in enumerate(self._faults.of(_TENDONS)):
             begun = self._faults.begun(fault)
             if begun <= time and (number, begun) not in self._given_way:
                 self._given_way.add((number, begun))
-                found.append((fault.axis, _OFF if fault.kind == "tendon-detached" else 1e-3 * fault.size))
-        return found
+                detached.append((fault.axis, _OFF if fault.kind == "tendon-detached" else 1e-3 * fault.size))
+        return detached
 
     def next(self, after: float) -> float:
         """When the next tendon gives way after a time [s]; infinite where none does."""
@@ -111,12 +111,12 @@ class MotorFaults:
             return edges
         edges = edges.copy()
         for port, width in ((_PORT_A, 2), (_PORT_C, 1)):
-            at, field = edges[:, 1] == port, (1 << width) - 1
-            told = edges[at, 2]
-            heard = told & ~((1 << width * AXES) - 1)
+            on_port, field = edges[:, 1] == port, (1 << width) - 1
+            levels = edges[on_port, 2]
+            heard = levels & ~((1 << width * AXES) - 1)
             for motor, axis in enumerate(self._order):
-                heard |= (told >> width * axis & field) << width * motor
-            edges[at, 2] = heard
+                heard |= (levels >> width * axis & field) << width * motor
+            edges[on_port, 2] = heard
         return edges
 
     def _ends(self, fault: InjectedFault) -> tuple[float, float]:

@@ -28,7 +28,7 @@ _PORT_A, _PORT_C = ord("A"), ord("C")
 
 
 class Stepper(NamedTuple):
-    """What the four motors have in common; lengths of tendon [m] and pulls [N] at the spool."""
+    """Constants that the four motors have in common; lengths of tendon [m] and pulls [N] at the spool."""
 
     turn: float  # of the field: four full steps
     holding: float
@@ -109,7 +109,7 @@ def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
 
 @compiled
 def _turn(spools: Any, motor: Any, stiffness: float) -> None:
-    """Where the spools stand after a period, by the pulls at its start."""
+    """Turn the spools for a period, by the pulls at its start."""
     for axis in range(AXES):
         pull = spools.pull[axis]
         if spools.energised[axis]:
@@ -123,9 +123,12 @@ def _turn(spools: Any, motor: Any, stiffness: float) -> None:
 
 
 class Hanging(NamedTuple):
-    """What hangs on the board: the plant (its model and the values of its parameters), a tendon's stiffness [N/m], the
-    values of Nonideal and the state that go with four of them, the motors, the axes of two tendons on the + and two on
-    the - side, and what bends across the plane (wrist.across.Across)."""
+    """Load of the motors: plant and tendons.
+
+    The plant (its model and the values of its parameters), a tendon's stiffness [N/m], the values of Nonideal and the
+    state that go with four of them, the motors, the axes of two tendons on the + and two on the - side, and what bends
+    across the plane (wrist.across.Across).
+    """
 
     model: Any
     values: Any
@@ -173,12 +176,12 @@ def follow(
     zero = zero_like(reeled[0])
     tendons = RealTendons(hanging.stiffness + zero, read_nonideal(rows_of(hanging.nonideal)), rows_of(hanging.tendons))
     ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
-    at = 0
+    edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        while at < edges.shape[0] and edges[at, 0] < middle:
-            _hear(spools, motor, edges[at, 0], edges[at, 1], edges[at, 2])
-            at += 1
+        while edge < edges.shape[0] and edges[edge, 0] < middle:
+            _hear(spools, motor, edges[edge, 0], edges[edge, 1], edges[edge, 2])
+            edge += 1
         _turn(spools, motor, hanging.stiffness)
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
@@ -200,4 +203,4 @@ def follow(
             out[k, 2 * n + axis] = spools.pull[axis]
             out[k, 2 * n + AXES + axis] = spools.reeled[axis]
         out[k, 2 * n + 2 * AXES] = spools.bent[0]
-    return at
+    return edge

@@ -106,13 +106,13 @@ def connect(
     theirs.close()
     film.close()
     try:
-        told = ours.recv()
+        address = ours.recv()
     except EOFError as error:
         fix = "wristctl hw emulate --wrist shows why"
         raise BoardError("host", "the emulated bench did not start", fix=fix) from error
-    if isinstance(told, UserError):
-        raise told
-    return RealTimeBench((bench, camera), ours, told, folder / "frame")
+    if isinstance(address, UserError):
+        raise address
+    return RealTimeBench((bench, camera), ours, address, folder / "frame")
 
 
 def _serve(

@@ -1,4 +1,4 @@
-"""What stands on the emulated bench, in virtual as in real time: board, wrist, camera, and what goes wrong."""
+"""Rig of the emulated bench, in virtual as in real time: board, wrist, camera and faults."""
 
 import logging
 import os
@@ -48,7 +48,7 @@ class Rig:
 
     @cached_property
     def scene(self) -> Scene:
-        """What draws the camera's pictures; made when the first is wanted."""
+        """Scene that draws the camera's pictures; made when the first is wanted."""
         return Scene(*self._drawn)
 
     def catch_up(self, edges: NDArray[np.void] | None = None) -> None:

@@ -26,8 +26,8 @@ from wristctl.seeds import Entropy
 
 log = logging.getLogger(__name__)
 
+# A latency timer [s] that is no longer than this is that of USB itself: nothing is held back.
 _AT_ONCE = 1e-3
-"""A latency timer [s] that is no longer than this is that of USB itself: nothing is held back."""
 
 
 class FaultyLine:
@@ -57,7 +57,7 @@ class FaultyLine:
         return self.there
 
     def receive(self) -> bytes:
-        """What clients have sent, as far as the board hears it."""
+        """Receive the clients' bytes, as far as the board hears them."""
         received = b"" if self._lost else self._line.receive()
         if not received or self._faults.on("host-silent", self._clock()):
             return b""
@@ -108,19 +108,19 @@ class BenchRecord:
         """Write, in one piece."""
         self._last, self._written = self._wrist.motion, time.monotonic()
         newest = self._wrist.truth(self._wrist.time - PERIOD)
-        said = {
+        record = {
             "schema": SCHEMA,
             "ended": ended,
             "time": self._written,
             "last_heard": _moved(self._line.heard, start),
-            "last_step": [_moved(at, start) for at in self._last.last_step],
+            "last_step": [_moved(step_time, start) for step_time in self._last.last_step],
             "steps": self._last.steps,
             "energised": self._last.energised,
             "theta": float(newest.angle[-1]),
             "pull": newest.pull.sum(axis=0).tolist(),
         }
         part = self._path.with_name(f".{self._path.name}.part")
-        part.write_text(json.dumps(said, indent=2) + "\n")
+        part.write_text(json.dumps(record, indent=2) + "\n")
         os.replace(part, self._path)
 
 
@@ -128,10 +128,10 @@ def _moved(time: float | None, start: float) -> float | None:
     return None if time is None else start + time
 
 
+# Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors.
 _LINGER = 2.0
-"""Seconds for which the bench goes on after its client has gone: long enough for the board to stop the motors."""
+# Cycles that the wrist follows in one go.
 _TOGETHER = FREQUENCY // 500
-"""Cycles that the wrist follows in one go."""
 
 
 class BenchServer:
@@ -155,7 +155,7 @@ class BenchServer:
         rig.chip.run(FREQUENCY // 100)
         rig.catch_up()  # so that what is to be compiled is, before real time begins
         self.camera: str | None = None
-        """Where its pictures can be had as a stream."""
+        """Address of the camera's stream."""
         try:
             self.camera = film.recv()
         except EOFError as error:
@@ -192,14 +192,16 @@ class BenchServer:
     def motion(self) -> MotorMotion:
         """As `Bench.motion`."""
         motion = self._rig.wrist.motion
-        return motion._replace(last_step=tuple(at if at is None else at + self._start for at in motion.last_step))
+        return motion._replace(
+            last_step=tuple(tick if tick is None else tick + self._start for tick in motion.last_step)
+        )
 
     def stop(self) -> None:
         """End soon."""
         self._until = -math.inf
 
     def _round(self, edges: NDArray[np.void], start: float) -> None:
-        """What is due again and again: `edges` are the chip's newest, its clock was 0 at `start`.
+        """Do the periodic work: `edges` are the chip's newest, its clock was 0 at `start`.
 
         The line is seen to at once, for a client waits for it; all else once in a while.
         """

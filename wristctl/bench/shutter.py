@@ -52,7 +52,7 @@ def spoiled(image: Image, kind: FaultKind, size: float, number: int, rng: np.ran
 
 
 class Painter(Protocol):
-    """What draws the wrist: `vision.scene.Scene`."""
+    """Drawer of the wrist: `vision.scene.Scene`."""
 
     def render(
         self, theta: Array, rng: np.random.Generator, covered: bool = False, swapped: bool = False,
@@ -73,11 +73,11 @@ class Exposure(NamedTuple):
     covered: bool
     swapped: bool
     noise: Entropy
-    """of the `shown` frame's random stream: its first number decides whether it is lost, the others are its noise"""
+    """entropy of the `shown` frame's random stream: the first number decides about its loss, the others make noise"""
     across: float = 0.0
     """bend across the plane, away from the camera [rad]"""
     turned: float = 0.0
-    """by how much the tip's marker has slipped [rad]"""
+    """slip of the tip's marker [rad]"""
     spoiled: tuple[tuple[FaultKind, float], ...] = ()
     """kinds and sizes of what spoils the picture"""
 
@@ -94,9 +94,9 @@ def picture(exposure: Exposure, painter: Painter) -> Frame:
     return Frame(image, exposure.time, exposure.number)
 
 
+# Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how many
+# are drawn at most; moments whose mean a part shows.
 _SMEAR, _MOST_INSTANTS, _WITHIN = np.deg2rad(0.25), 8, 8
-"""Turn of the last disc (about half a pixel of its marker's way) for which a part of the exposure is drawn, and how
-many are drawn at most; moments whose mean a part shows."""
 
 
 class Shutter:
@@ -128,25 +128,25 @@ class Shutter:
         """Whether this frame gets through."""
         dropped = np.random.default_rng(self._noise(number)).random() < self._settings.dropped
         faults, time = self._faults, self._time(number)
-        thinned = any(number % round(each.size) for each in faults.active(("frames-thinned",), time))
+        thinned = any(number % round(fault.size) for fault in faults.active(("frames-thinned",), time))
         return not (dropped or thinned or faults.on("frames-dropped", time))
 
     def expose(self, number: int) -> Exposure:
-        """What this frame is made of; its exposure is over, and not longer ago than the wrist remembers."""
+        """Exposure of a frame; it is over, and not longer ago than the wrist remembers."""
         faults, time = self._faults, self._time(number)
         shown = self._shown(number, time)
-        late = sum(each.size for each in faults.active(("pictures-late",), time))
-        at = self._time(shown) - late
+        late = sum(fault.size for fault in faults.active(("pictures-late",), time))
+        middle = self._time(shown) - late
         half = 0.5 * self._settings.exposure
-        ends = self._wrist.angles(np.array([at - half, at + half]))
+        ends = self._wrist.angles(np.array([middle - half, middle + half]))
         turned = abs(float(np.diff(self._wrist.tip_angle(ends))[0]))
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
-        moments = at + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
+        moments = middle + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
-        covered, swapped = (faults.on(kind, at) for kind in ("marker-covered", "markers-swapped"))
-        turned = math.radians(sum(each.size for each in faults.active(("marker-turned",), at)))
-        spoiled = tuple((each.kind, each.size) for each in faults.active(PICTURE_FAULTS, time))
-        across = self._wrist.across(at)
+        covered, swapped = (faults.on(kind, middle) for kind in ("marker-covered", "markers-swapped"))
+        turned = math.radians(sum(fault.size for fault in faults.active(("marker-turned",), middle)))
+        spoiled = tuple((fault.kind, fault.size) for fault in faults.active(PICTURE_FAULTS, time))
+        across = self._wrist.across(middle)
         stamp = self._stamp(time)
         return Exposure(
             number, stamp, shown, parts, covered, swapped, self._noise(shown), across, turned, spoiled
@@ -155,19 +155,19 @@ class Shutter:
     def _shown(self, number: int, time: float) -> int:
         """The frame whose picture this one shows."""
         shown = [number]
-        for each in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
-            first = math.floor(self._faults.begun(each) * self._settings.frame_rate)
-            shown.append(first - (number % round(each.size) if each.kind == "camera-repeats" else 0))
+        for fault in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
+            first = math.floor(self._faults.begun(fault) * self._settings.frame_rate)
+            shown.append(first - (number % round(fault.size) if fault.kind == "camera-repeats" else 0))
         return min(shown)
 
     def _stamp(self, time: float) -> float:
         stuck = self._faults.since("stamps-stuck", time)
         return (time if stuck is None else stuck) + sum(
-            each.size for each in self._faults.active(("stamps-shifted",), time)
+            fault.size for fault in self._faults.active(("stamps-shifted",), time)
         )
 
     def _noise(self, number: int) -> Entropy:
-        first, stream = next(each for each in reversed(self._streams) if each[0] <= number)
+        first, stream = next(begun for begun in reversed(self._streams) if begun[0] <= number)
         return *stream, number - first
 
     def _time(self, number: int) -> float:

@@ -45,7 +45,7 @@ class BenchTransport(VirtualTransport):
             super().write(self._garbled(data))
 
     def read(self, timeout: float) -> bytes:
-        """What the chip has sent; runs it for up to `timeout` s until there is something. Raises PortLost."""
+        """Read the chip's bytes; runs it for up to `timeout` s until there are some. Raises PortLost."""
         self._see_port()
         self._stand_still("answers-held")
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
@@ -58,7 +58,7 @@ class BenchTransport(VirtualTransport):
         return self._garbled(data)
 
     def _arrived(self, late: int) -> bytes:
-        """What the chip has sent and the cable, which takes so many cycles, has handed over by now."""
+        """Bytes of the chip that the cable, which takes so many cycles, has handed over by now."""
         if sent := self.chip.read():
             self._on_the_way.append((self.chip.cycles + late, sent))
         data = b""
@@ -162,12 +162,12 @@ class VirtualBench:
         self._rig.begin(start, disturbances, noise)
 
     def truth(self, since: float = 0.0) -> Truth:
-        """What the wrist did after `since`, as far back as the last minute."""
+        """True motion of the wrist after `since`, as far back as the last minute."""
         self._rig.catch_up()
         return self._rig.wrist.truth(since)
 
     def motion(self) -> MotorMotion:
-        """What the board has made of its motors so far."""
+        """Motion of the motors so far, as the board commanded it."""
         self._rig.catch_up()
         return self._rig.wrist.motion
 

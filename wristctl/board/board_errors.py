@@ -1,4 +1,4 @@
-"""What can go wrong between host and board; each error says whether host, cable or firmware is to blame."""
+"""Errors between host and board; each says whether host, cable or firmware is to blame."""
 
 import errno
 
@@ -13,11 +13,11 @@ from wristctl.board.messages import (
 )
 from wristctl.errors import UserError
 
+# Exit codes.
 HARDWARE, SAFETY_STOP = 4, 5
-"""Exit codes."""
 
+# Seconds of waiting for an answer beyond what was to be waited: the computer did not let the host run.
 _OVERSLEPT = 0.02
-"""Seconds of waiting for an answer beyond what was to be waited: the computer did not let the host run."""
 
 
 class BoardError(UserError):
@@ -34,14 +34,14 @@ class PortUnusable(BoardError):
     def __init__(self, port: str, cause: Exception) -> None:
         number, text = getattr(cause, "errno", None), str(cause).lower()
         if number == errno.EACCES or "permission" in text or "access is denied" in text:
-            what, fix = "no permission to open the port", "sudo usermod -aG dialout $USER, then log in again"
+            problem, fix = "no permission to open the port", "sudo usermod -aG dialout $USER, then log in again"
         elif number in (errno.EBUSY, errno.EAGAIN) or "lock" in text or "busy" in text:
-            what, fix = "another program uses the port", "close it (wristctl, an Arduino serial monitor)"
+            problem, fix = "another program uses the port", "close it (wristctl, an Arduino serial monitor)"
         elif "://" in port:
-            what, fix = f"cannot connect ({cause})", "start the server first: wristctl hw emulate --tcp 5000"
+            problem, fix = f"cannot connect ({cause})", "start the server first: wristctl hw emulate --tcp 5000"
         else:
-            what, fix = "there is no such port", "wristctl hw ports lists the ports of this computer"
-        super().__init__("host", what, port, fix)
+            problem, fix = "there is no such port", "wristctl hw ports lists the ports of this computer"
+        super().__init__("host", problem, port, fix)
 
 
 class PortLost(BoardError):
@@ -57,12 +57,13 @@ class NoAnswer(BoardError):
     def __init__(self, port: str, command: Command, attempts: int, bytes_seen: int, overslept: float = 0.0) -> None:
         asked = f"to {command.name} after {attempts} attempts"
         if bytes_seen:
-            what = f"only garbled bytes ({bytes_seen}) in answer {asked}"
+            problem = f"only garbled bytes ({bytes_seen}) in answer {asked}"
             fix = "check --baud; if another program runs on the board: wristctl hw flash"
-            super().__init__("firmware", what, port, fix)
+            super().__init__("firmware", problem, port, fix)
         elif overslept > _OVERSLEPT:
-            what = f"no answer {asked}, of which this computer slept through {1e3 * overslept:.0f} ms"
-            super().__init__("host", what, port, "close other programs, or give the loop priority: hw-run --priority")
+            problem = f"no answer {asked}, of which this computer slept through {1e3 * overslept:.0f} ms"
+            fix = "close other programs, or give the loop priority: hw-run --priority"
+            super().__init__("host", problem, port, fix)
         else:
             fix = "check USB cable and power, and that this is the board's port: wristctl hw ports"
             super().__init__("cable", f"no answer {asked}", port, fix)
@@ -72,11 +73,11 @@ class WrongFirmware(BoardError):
     """The board speaks by another message table."""
 
     def __init__(self, port: str, theirs: int, version: tuple[int, ...], ours: int) -> None:
-        what = (
+        problem = (
             f"the board's firmware {'.'.join(map(str, version))} has the message table {theirs:08x}, "
             f"this host {ours:08x}"
         )
-        super().__init__("firmware", what, port, f"wristctl hw flash --port {port}")
+        super().__init__("firmware", problem, port, f"wristctl hw flash --port {port}")
 
 
 class Refused(BoardError):
@@ -91,10 +92,10 @@ class Restarted(BoardError):
     """The board has started anew under a session."""
 
     def __init__(self, port: str) -> None:
-        what = "the board has restarted; its drives are off and its positions lost"
+        problem = "the board has restarted; its drives are off and its positions lost"
         super().__init__(
             "cable",
-            what,
+            problem,
             port,
             "check its supply and that nobody pressed reset; enable and home",
             SAFETY_STOP,
@@ -106,12 +107,12 @@ class Faulted(BoardError):
 
     def __init__(self, port: str, faults: Fault, silence: float, watchdog: float) -> None:
         self.faults = faults
-        each = [fault for fault in Fault if fault in faults]
-        what = "; ".join(FAULT_MEANING[fault] for fault in each) or "a fault is latched"
-        fix = "; ".join(dict.fromkeys(FAULT_FIX[fault] for fault in each))
+        latched = [fault for fault in Fault if fault in faults]
+        problem = "; ".join(FAULT_MEANING[fault] for fault in latched) or "a fault is latched"
+        fix = "; ".join(dict.fromkeys(FAULT_FIX[fault] for fault in latched))
         firmware = Fault.HANG in faults or Fault.WATCHDOG in faults
         late = silence > watchdog
         if faults == Fault.LINK and late:
-            what += f" of {1e3 * watchdog:.0f} ms: this computer was silent for {1e3 * silence:.0f} ms"
+            problem += f" of {1e3 * watchdog:.0f} ms: this computer was silent for {1e3 * silence:.0f} ms"
         blamed = "firmware" if firmware else "cable" if faults == Fault.LINK and not late else "host"
-        super().__init__(blamed, what, port, fix, SAFETY_STOP)
+        super().__init__(blamed, problem, port, fix, SAFETY_STOP)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 from wristctl.board.driver import Board
 from wristctl.board.messages import Command, Configure, Status
 
+# A twentieth of a turn at 1/16 step.
 WIRING_STEPS = 160
-"""A twentieth of a turn at 1/16 step."""
+# Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer.
 _SILENCE = 0.5
-"""Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer."""
 
 
 class RoundTrips(NamedTuple):
@@ -36,8 +36,8 @@ def move_a_little(board: Board, axis: int) -> Status:
     """Energise the drives, creep axis `axis` forward by WIRING_STEPS and back, and release them."""
     board.set_up(Configure(watchdog=_SILENCE))
     start = list(board.enable().position)
-    there = [position + WIRING_STEPS * (k == axis) for k, position in enumerate(start)]
-    board.jog(there)
+    moved = [position + WIRING_STEPS * (k == axis) for k, position in enumerate(start)]
+    board.jog(moved)
     board.jog(start)
     return board.disable()
 
@@ -57,6 +57,6 @@ def latency_timer(port: str, system: Path = SYSTEM) -> float | None:
 
 
 def shorter(port: str, system: Path = SYSTEM) -> str:
-    """How to have it hand over at once."""
+    """Advice that makes a USB adapter hand over at once."""
     file = system / Path(port).resolve().name / "latency_timer"
     return f"echo 1 | sudo tee {file}; for good: the udev rule of docs/hardware/rig.md"

@@ -22,12 +22,12 @@ WIRE_RANGE = {"u8": (0, 2**8), "u16": (0, 2**16), "u32": (0, 2**32), "i16": (-(2
 CODES = {"State": "states", "Result": "results", "Command": "commands"}
 BITS = {"Fault": "faults", "Flag": "flags", "Reset": "resets"}
 _KINDS = {
-    "State": "What the board is doing.",
-    "Result": "What it answers to a command.",
-    "Command": "What a host may ask.",
-    "Fault": "Why it stopped, one bit each.",
-    "Flag": "What its status says besides, one bit each.",
-    "Reset": "Why it started, one bit each; a boot loader may have hidden it.",
+    "State": "State of the board.",
+    "Result": "Result of a command.",
+    "Command": "Command of a host.",
+    "Fault": "Reasons of a stop, one bit each.",
+    "Flag": "Flags of a status, one bit each.",
+    "Reset": "Reasons of a reset, one bit each; a boot loader may have hidden it.",
 }
 MARK = "Made from messages.toml by dictionary.py: change that file, not this one."
 
@@ -85,7 +85,7 @@ def c_header(table: MessageTable) -> str:
     lines += ["#define COMMANDS(X) \\"]
     for name, entry in commands.items():
         length = f"sizeof(struct {name.lower()}_command)" if entry["fields"] else "0"
-        bound, feeds = (str(entry[each]).lower() for each in ("bound", "feeds"))
+        bound, feeds = (str(entry[column]).lower() for column in ("bound", "feeds"))
         lines += [f"  X({name}, WHEN_{entry['when'].upper()}, {length}, {bound}, {feeds}) \\"]
     return "\n".join([*lines, "", *_c_handlers(commands), "", *_c_answers(table), "", "#endif", ""])
 
@@ -162,7 +162,7 @@ def _c_checks(entry: MessageTable) -> list[str]:
 def python_module(table: MessageTable) -> str:
     """Return messages.py: constants, codes with their meanings, and one named tuple per message with its layout."""
     protocol, commands = table["protocol"], table["commands"]
-    out = [f'"""What host and board say to each other. {MARK}"""', "", "from __future__ import annotations", ""]
+    out = [f'"""Messages between host and board. {MARK}"""', "", "from __future__ import annotations", ""]
     out += ["from enum import IntEnum, IntFlag", "from typing import NamedTuple", ""]
     out += ["from wristctl.board.layout import Field, Layout", ""]
     out += [f"PROTOCOL_VERSION = {protocol['version']}", f"FIRMWARE_VERSION = {tuple(protocol['firmware'])}"]
@@ -173,8 +173,8 @@ def python_module(table: MessageTable) -> str:
         out += ["", "", f"class {kind}({'IntEnum' if kind in CODES else 'IntFlag'}):", f'    """{_KINDS[kind]}"""', ""]
         out += [f"    {name} = {_number(entry)}  # {entry['meaning']}" for name, entry in table[group].items()]
     out += ["", ""]
-    told = [(kind, prose) for kind in ("Result", "Fault") for prose in PROSE]
-    for kind, prose in (*told, ("Reset", "meaning")):
+    explained = [(kind, prose) for kind in ("Result", "Fault") for prose in PROSE]
+    for kind, prose in (*explained, ("Reset", "meaning")):
         out += [f"{kind.upper()}_{prose.upper()} = {{"]
         for name, entry in table[(CODES | BITS)[kind]].items():
             out += [f"    {kind}.{name}: {json.dumps(entry[prose])},"]

@@ -40,8 +40,8 @@ from wristctl.board.transport import Transport
 
 _ANSWER = 0x80
 
+# Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises.
 Overheard = Callable[[float, str, bytes], None]
-"""Takes the time [s], the way (sent or came) and the bytes that went over the wire then; never raises."""
 
 
 def nobody(time: float, way: str, data: bytes) -> None:
@@ -50,7 +50,7 @@ def nobody(time: float, way: str, data: bytes) -> None:
 
 @dataclass
 class Traffic:
-    """What the driver has seen on the wire since it was made."""
+    """Counts of the driver's traffic on the wire since it was made."""
 
     sent: int = 0
     resent: int = 0
@@ -82,7 +82,7 @@ class Exchange:
     def ask(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:
         """Result and payload of the answer, each attempt waited for `patience` seconds. Raises NoAnswer."""
         self._sequence = (self._sequence + 1) & 0xFF
-        frame, seen, began = (
+        frame, bytes_before, began = (
             encode(command, self._sequence, payload),
             self.traffic.bytes_read,
             self.transport.now(),
@@ -100,30 +100,30 @@ class Exchange:
                     self._last_fed = began
                 return answer
         overslept = self.transport.now() - began - attempts * patience
-        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - seen, overslept)
+        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - bytes_before, overslept)
 
     def _answer(self, command: Command, deadline: float) -> bytes | None:
-        found = None
-        while found is None and (left := deadline - self.transport.now()) > 0:
+        answer = None
+        while answer is None and (left := deadline - self.transport.now()) > 0:
             data = self.transport.read(left)
             self.traffic.bytes_read += len(data)
             if data:
                 self._overheard(self.transport.now(), "came", data)
             for frame in self._decoder.feed(data):
                 if (
-                    found is None
+                    answer is None
                     and (frame.code, frame.sequence) == (command | _ANSWER, self._sequence)
                     and frame.payload
                 ):
-                    found = frame.payload
+                    answer = frame.payload
                     self.traffic.answers += 1
                 else:
                     self.traffic.stale += 1
-        return found
+        return answer
 
 
+# Seconds for which a step rate lives where nobody says otherwise.
 LEAST_LIFE: float = Rate._field_defaults["life"]
-"""Seconds for which a step rate lives where nobody says otherwise."""
 
 Axes = tuple[float, float, float, float]
 
@@ -141,8 +141,8 @@ def four(values: Sequence[float], kind: Callable[[float], Any]) -> tuple[Any, An
     return first, second, third, fourth
 
 
+# Times a command is sent before the driver gives up, all of them within the board's watchdog time.
 ATTEMPTS = 3
-"""Times a command is sent before the driver gives up, all of them within the board's watchdog time."""
 
 _START_PATIENCE, _START_TIME = 0.1, 3.0
 _FIRST_OF_HELLO = struct.Struct("<BI3B")  # protocol, dictionary, firmware: in this place in every version
@@ -177,7 +177,7 @@ class Board:
 
     @property
     def traffic(self) -> Traffic:
-        """What was seen on the wire."""
+        """Counts of the traffic on the wire."""
         return self._exchange.traffic
 
     @property
@@ -212,8 +212,8 @@ class Board:
 
     def enable(self) -> Status:
         """Switch the drives on, and wait until they hold; refused where others have set the board up meanwhile."""
-        told = b"".join(LAYOUTS[type(each)].pack(each) for each in (self._configured, self._limits))
-        self.send(Enable(ENABLE_KEY, crc(told)))
+        settings = b"".join(LAYOUTS[type(message)].pack(message) for message in (self._configured, self._limits))
+        self.send(Enable(ENABLE_KEY, crc(settings)))
         return self.wait_while(Flag.SETTLING, timeout=2.0)
 
     def read(self) -> Status:
@@ -221,7 +221,7 @@ class Board:
         return self.send(Command.STATUS)
 
     def counters(self) -> Counters:
-        """What the board has seen on the wire since its reset."""
+        """Counters of the board's traffic on the wire since its reset."""
         _result, counters = self._ask(Command.COUNTERS, b"")
         return Counters(*counters)
 
@@ -308,8 +308,8 @@ class Board:
         status = self.wait_while(Flag.MOVING, timeout=30.0)
         if status.position != move.position:
             self.see_restart()
-            what = f"the axes stand at {status.position}, not at {move.position}"
-            raise BoardError("firmware", what, self.transport.name, "home again")
+            problem = f"the axes stand at {status.position}, not at {move.position}"
+            raise BoardError("firmware", problem, self.transport.name, "home again")
         return status
 
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
@@ -337,8 +337,8 @@ class Board:
                 return self._exchange.ask(command, b"", _START_PATIENCE, attempts=1)
             except NoAnswer:
                 if self.transport.now() > deadline:
-                    sent, seen = self.traffic.sent, self.traffic.bytes_read
-                    raise NoAnswer(self.transport.name, command, sent, seen) from None
+                    sent, bytes_read = self.traffic.sent, self.traffic.bytes_read
+                    raise NoAnswer(self.transport.name, command, sent, bytes_read) from None
 
     def faulted(self, status: Status) -> Faulted:
         """The error that tells of the faults of this status."""

@@ -7,8 +7,8 @@ ends whatever a cut-off frame has left behind. The CRC is CRC-16/CCITT-FALSE, hi
 from binascii import crc_hqx
 from typing import NamedTuple
 
+# Bytes that code, sequence, payload and CRC may have together.
 LONGEST = 254
-"""Bytes that code, sequence, payload and CRC may have together."""
 
 
 class WireFrame(NamedTuple):
@@ -44,15 +44,15 @@ def stuff(data: bytes) -> bytes:
 
 def unstuff(data: bytes) -> bytes:
     """The bytes that `stuff` was given. ValueError where that cannot be."""
-    out, at = bytearray(), 0
-    while at < len(data):
-        end = at + data[at]
-        if data[at] == 0 or end > len(data):
+    out, position = bytearray(), 0
+    while position < len(data):
+        end = position + data[position]
+        if data[position] == 0 or end > len(data):
             raise ValueError("not COBS")
-        out += data[at + 1 : end]
-        if end < len(data) and data[at] != 0xFF:
+        out += data[position + 1 : end]
+        if end < len(data) and data[position] != 0xFF:
             out.append(0)
-        at = end
+        position = end
     return bytes(out)
 
 
@@ -65,9 +65,9 @@ class Decoder:
 
     def feed(self, data: bytes) -> list[WireFrame]:
         """The frames that these bytes complete."""
-        *whole, rest = (bytes(self._part) + data).split(b"\0")
-        self._part[:] = rest[-2 * LONGEST :]
-        return [frame for each in whole if each and (frame := self._frame(each))]
+        *pieces, remainder = (bytes(self._part) + data).split(b"\0")
+        self._part[:] = remainder[-2 * LONGEST :]
+        return [frame for piece in pieces if piece and (frame := self._frame(piece))]
 
     def _frame(self, stuffed: bytes) -> WireFrame | None:
         try:

@@ -1,4 +1,4 @@
-"""How a message lies in its bytes: little-endian, no padding, values scaled to whole counts."""
+"""Layout of a message in its bytes: little-endian, no padding, values scaled to whole counts."""
 
 import struct
 from collections.abc import Callable
@@ -50,8 +50,8 @@ class Layout:
 
     def unpack(self, message: Callable[..., M], payload: bytes) -> M:
         """Return the message in this payload. struct.error where the length is wrong."""
-        counts, values, at = self.struct.unpack(payload), [], 0
+        counts, values, position = self.struct.unpack(payload), [], 0
         for field in self.fields:
-            values.append(field.from_wire(counts[at : at + field.count]))
-            at += field.count
+            values.append(field.from_wire(counts[position : position + field.count]))
+            position += field.count
         return message(*values)

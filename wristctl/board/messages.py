@@ -1,4 +1,4 @@
-"""What host and board say to each other. Made from messages.toml by dictionary.py: change that file, not this one."""
+"""Messages between host and board. Made from messages.toml by dictionary.py: change that file, not this one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_PAYLOAD = 48  # bytes: of any message, either way
 
 
 class State(IntEnum):
-    """What the board is doing."""
+    """State of the board."""
 
     DISABLED = 0  # drives off, nothing moves; from here ENABLE
     ENABLED = 1  # drives on, motion commands are obeyed
@@ -34,7 +34,7 @@ class State(IntEnum):
 
 
 class Result(IntEnum):
-    """What it answers to a command."""
+    """Result of a command."""
 
     OK = 0  # done
     LENGTH = 1  # the message has the wrong length
@@ -52,7 +52,7 @@ class Result(IntEnum):
 
 
 class Command(IntEnum):
-    """What a host may ask."""
+    """Command of a host."""
 
     HELLO = 1  # who are you? Its answer's first three fields keep their place in every version
     PING = 2  # are you there? Keeps the link watchdog fed while nothing moves
@@ -73,7 +73,7 @@ class Command(IntEnum):
 
 
 class Fault(IntFlag):
-    """Why it stopped, one bit each."""
+    """Reasons of a stop, one bit each."""
 
     LINK = 1  # no command arrived within the watchdog time
     ESTOP_COMMAND = 2  # the host sent an emergency stop
@@ -84,7 +84,7 @@ class Fault(IntFlag):
 
 
 class Flag(IntFlag):
-    """What its status says besides, one bit each."""
+    """Flags of a status, one bit each."""
 
     HOMED = 1  # positions are trusted
     MOVING = 2  # some axis is moving or waiting for its next step
@@ -97,7 +97,7 @@ class Flag(IntFlag):
 
 
 class Reset(IntFlag):
-    """Why it started, one bit each; a boot loader may have hidden it."""
+    """Reasons of a reset, one bit each; a boot loader may have hidden it."""
 
     POWER_ON = 1  # power came on
     EXTERNAL = 2  # the reset line was pulled: a program has opened the port, or the button was pressed

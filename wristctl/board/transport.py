@@ -11,11 +11,11 @@ from serial.tools import list_ports
 from wristctl.board.board_errors import BoardError, PortLost, PortUnusable
 from wristctl.processes import check_hardware_allowed
 
+# Seconds that a Mega's boot loader waits for a program after a reset, and some more.
 BOOT_TIME = 2.0
-"""Seconds that a Mega's boot loader waits for a program after a reset, and some more."""
 
+# USB vendors: Arduino (two), and the makers of the serial chips CH340, FT232 and CP210x.
 _BOARD_VENDORS = {0x2341, 0x2A03, 0x1A86, 0x0403, 0x10C4}
-"""USB vendors: Arduino (two), and the makers of the serial chips CH340, FT232 and CP210x."""
 
 
 class Transport(Protocol):
@@ -30,7 +30,7 @@ class Transport(Protocol):
         """Send."""
 
     def read(self, timeout: float) -> bytes:
-        """What has come; waits up to `timeout` s for the first byte."""
+        """Read the bytes that have come; waits up to `timeout` s for the first byte."""
 
     def now(self) -> float:
         """Seconds on a clock that only moves forward."""
@@ -67,7 +67,7 @@ class SerialTransport:
             self._serial.write(data)
 
     def read(self, timeout: float) -> bytes:
-        """What has come; waits up to `timeout` s for the first byte. Raises PortLost."""
+        """Read the bytes that have come; waits up to `timeout` s for the first byte. Raises PortLost."""
         with self._watched():
             self._serial.timeout = timeout
             first: bytes = self._serial.read(1)
@@ -114,15 +114,15 @@ class PortFound(NamedTuple):
 
 def ports() -> list[PortFound]:
     """The serial ports, those that may be a board first."""
-    found = [
-        PortFound(each.device, each.description or "", each.serial_number or "", each.vid in _BOARD_VENDORS)
-        for each in list_ports.comports()
+    found_ports = [
+        PortFound(port.device, port.description or "", port.serial_number or "", port.vid in _BOARD_VENDORS)
+        for port in list_ports.comports()
     ]
-    return sorted(found, key=lambda port: (not port.board_like, port.device))
+    return sorted(found_ports, key=lambda port: (not port.board_like, port.device))
 
 
+# The name of the port that is no port: the emulated board in this process, in virtual time.
 EMULATED = "emulated"
-"""The name of the port that is no port: the emulated board in this process, in virtual time."""
 
 
 def open_transport(port: str | None, baud: int, exclusive: bool = True) -> Transport:

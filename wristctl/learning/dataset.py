@@ -19,11 +19,11 @@ from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.statics import equilibria_at
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Samples that validation and test need at least: one sample has no spread to explain.
 LEAST_SHARE = 2
-"""Samples that validation and test need at least: one sample has no spread to explain."""
 
+# Why a sample is held out of training; KEPT is not.
 KEPT, HELD_PAYLOAD, HELD_POSE = range(3)
-"""Why a sample is held out of training; KEPT is not."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,16 @@ class Samples:
     theta: Array
     """(N,) bending angle of the last disc [rad]"""
     arc_length: Array
-    """(N,) of the single arc that ends at the tip [m]"""
+    """(N,) length of the single arc that ends at the tip [m]"""
     domain: Domain
     others: Array
     """(N, K) inputs after x and y"""
     names: tuple[str, ...]
-    """of those, keys of OTHERS"""
+    """names of the columns of `others`, keys of OTHERS"""
     held_out: NDArray[np.int64]
     """(N,) KEPT, HELD_PAYLOAD or HELD_POSE"""
     segments: int
-    """of the wrist they come from; 1: any"""
+    """segments of the samples' wrist; 1: any"""
     recording: NDArray[np.int64] | None = None
     """(N,) which recording each was measured in; None where each was drawn by itself"""
 
@@ -59,18 +59,18 @@ class Samples:
         return not self.names and bool(np.abs(exact_angle(self.tip) - self.theta).max() < 1e-9)
 
     def tips_alone(self) -> Samples:
-        """The same without the inputs after x and y."""
+        """Samples without the inputs after x and y."""
         domain = Domain(self.domain.theta, self.domain.arc_length)
         return replace(self, others=self.others[:, :0], names=(), domain=domain)
 
     def arrays(self) -> dict[str, Array]:
         """The samples as named arrays; `from_arrays` reads them back without loss."""
         ends = np.array([self.domain.theta, self.domain.arc_length, *self.domain.others])
-        own = {name: self.others[:, k] for k, name in enumerate(self.names)}
+        inputs_by_name = {name: self.others[:, k] for k, name in enumerate(self.names)}
         more = {"held_out": self.held_out} if self.held_out.any() else {}
         more |= {} if self.recording is None else {"recording": self.recording}
         arrays = {"tip": self.tip, "theta": self.theta, "arc_length": self.arc_length, "domain": ends}
-        return arrays | own | more | {"segments": np.array(self.segments)}
+        return arrays | inputs_by_name | more | {"segments": np.array(self.segments)}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> Samples:
@@ -141,16 +141,16 @@ def split_samples(
 
 
 def _split_recordings(recording: NDArray[np.int64], train_share: float, rng: np.random.Generator) -> Split:
-    found = rng.permutation(np.unique(recording))
-    if len(found) < 3:
+    recordings = rng.permutation(np.unique(recording))
+    if len(recordings) < 3:
         raise UserError(
-            f"{len(found)} recording{'s' * (len(found) != 1)}: training, choosing and judging need one each",
+            f"{len(recordings)} recording{'s' * (len(recordings) != 1)}: training, choosing and judging need one each",
             where="train.data",
             fix="measure more, or train with split: sample, which judges by neighbours of what it was trained on",
         )
-    train = min(max(1, round(len(found) * train_share)), len(found) - 2)
-    validation = train + max(1, (len(found) - train) // 2)
-    parts = found[:train], found[train:validation], found[validation:]
+    train = min(max(1, round(len(recordings) * train_share)), len(recordings) - 2)
+    validation = train + max(1, (len(recordings) - train) // 2)
+    parts = recordings[:train], recordings[train:validation], recordings[validation:]
     rows = tuple(np.flatnonzero(np.isin(recording, part)) for part in parts)
     if min(map(len, rows)) < LEAST_SHARE:
         raise UserError("a recording with a single sample", "train.data", "leave it out")
@@ -180,11 +180,11 @@ def _samples(
     )
 
 
+# [m/s^2]
 GRAVITY = 9.81
-"""[m/s^2]"""
 
+# Equilibria that are searched together: a bound on memory.
 BLOCK = 20_000
-"""Equilibria that are searched together: a bound on memory."""
 
 
 def draw_equilibria(
@@ -204,16 +204,16 @@ def draw_equilibria(
     which = np.arange(count) % len(tilts)
     pose, hand = tilts[which], wrist.hand_mass * (1.0 + payload)
 
-    found = []
+    batches = []
     for begin in range(0, count, BLOCK):
         some = slice(begin, begin + BLOCK)
         parameters = np.tile(segments(wrist, n), (len(theta[some]), 1))
         parameters[:, Segments._fields.index("hand_mass")] = hand[some]
         parameters[:, Segments._fields.index("gravity_x")] = -GRAVITY * np.cos(pose[some])
         parameters[:, Segments._fields.index("gravity_y")] = GRAVITY * np.sin(pose[some])
-        found.append(equilibria_at(parameters, n, theta[some], TENDONS_PER_SIDE * wrist.pretension))
+        batches.append(equilibria_at(parameters, n, theta[some], TENDONS_PER_SIDE * wrist.pretension))
         done(begin + len(parameters))
-    bent, pulls, stable = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    bent, pulls, stable = (np.concatenate(parts) for parts in zip(*batches, strict=True))
     held = stable & (pulls.max(axis=1) <= TENDONS_PER_SIDE * wrist.tension_limit)
     if 2 * held.sum() < count:
         raise UserError(

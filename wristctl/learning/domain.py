@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.wrist.kinematics import exact_arc
 
+# Relative slack at the region's edge, so that rounding does not put an edge point outside.
 EDGE = 1e-9
-"""Relative slack at the region's edge, so that rounding does not put an edge point outside."""
 
+# Inputs that may follow x and y, with their units: tilt of the base from upright, mass of hand and payload.
 OTHERS = {"pose": "rad", "hand_mass": "kg"}
-"""Inputs that may follow x and y, with their units: tilt of the base from upright, mass of hand and payload."""
 
 Range = tuple[float, float]
 
@@ -28,7 +28,7 @@ class Domain:
     arc_length: Range
     """[m]"""
     others: tuple[Range, ...] = ()
-    """of each input after x and y"""
+    """ranges of the inputs after x and y"""
 
     def contains(self, inputs: Array) -> NDArray[np.bool_]:
         """Whether each row (..., 2 + others) lies inside; shape (...). What is not finite lies outside."""

@@ -1,4 +1,4 @@
-"""What is said of every trained network, and of what stands beside it."""
+"""Measures of every trained network and of the inverses it is compared with."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,8 +14,8 @@ from wristctl.learning.inference import Polynomial, compiled_network
 from wristctl.learning.training_result import TrainingResult
 from wristctl.wrist.kinematics import arc_tip, exact_angle
 
+# An error up to this counts as close.
 CLOSE_DEG = 0.5
-"""An error up to this counts as close."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class AngleErrors:
     """share of samples with an absolute error of at most 0.5 deg"""
 
 
+# Unit, better direction and meaning of each of AngleErrors' fields.
 ANGLE_MEASURES: dict[str, tuple[str, Literal["lower", "higher"], str]] = {
     "r2": ("", "higher", "coefficient of determination of the angle"),
     "rmse_deg": ("deg", "lower", "root mean squared error of the angle"),
     "max_error_deg": ("deg", "lower", "largest absolute error of the angle"),
     "close_share": ("1", "higher", "share of samples with an error of at most 0.5 deg"),
 }
-"""Unit, better direction and meaning of each of AngleErrors' fields."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,10 @@ def error_map(inverse: Callable[[Array], Array], domain: Domain, angles: int = 2
     return ErrorMap(tip, theta, inverse(tip) - theta)
 
 
+# Names of the places where samples were held out, by why.
 HELD_OUT = {HELD_PAYLOAD: "held-out payloads", HELD_POSE: "held-out poses"}
-"""Names of the places where samples were held out, by why."""
 
+# Unit and meaning of what `measures` gives.
 MEASURES: dict[str, tuple[str, str]] = {
     **{name: (unit, f"{text}, on the test samples") for name, (unit, _, text) in ANGLE_MEASURES.items()},
     "workspace_rmse_deg": ("deg", "RMSE on a dense grid over the whole domain"),
@@ -92,7 +93,6 @@ MEASURES: dict[str, tuple[str, str]] = {
     "validation_over_train": ("1", "validation loss over training loss"),
     "epochs": ("1", "epochs done"),
 }
-"""Unit and meaning of what `measures` gives."""
 
 
 @dataclass(frozen=True)
@@ -109,15 +109,15 @@ class Place:
 def places(samples: Samples, split: Split) -> list[Place]:
     """The test samples, by reason where they were held out, and the whole domain where its angles are known."""
     held = samples.held_out[split.test]
-    found = [Place("test samples", samples.inputs[split.test], samples.theta[split.test])]
+    regions = [Place("test samples", samples.inputs[split.test], samples.theta[split.test])]
     for code, name in HELD_OUT.items():
         rows = split.test[held == code]
         if 0 < len(rows) < len(split.test):
-            found.append(Place(name, samples.inputs[rows], samples.theta[rows]))
+            regions.append(Place(name, samples.inputs[rows], samples.theta[rows]))
     if samples.curvature_is_constant:
         grid = error_map(exact_angle, samples.domain)
-        found.append(Place("whole workspace", grid.tip, grid.theta))
-    return found
+        regions.append(Place("whole workspace", grid.tip, grid.theta))
+    return regions
 
 
 def inverses(
@@ -137,21 +137,21 @@ def inverses(
 def measures(trial: TrainingResult, where: Sequence[Place]) -> dict[str, float]:
     """Every one of MEASURES, NaN for places that these data do not have."""
     columns, angle = trial.network.sizes[0], compiled_network(trial.network)
-    found = {
+    errors = {
         place.name: angle_errors(
             angle(place.inputs.reshape(-1, place.inputs.shape[-1])[:, :columns]), place.theta.ravel()
         )
         for place in where
     }
-    test, whole = found["test samples"], found.get("whole workspace")
+    test, workspace = errors["test samples"], errors.get("whole workspace")
     held_out = {
-        f"{name.replace(' ', '_').replace('-', '_')}_rmse_deg": found[name].rmse_deg if name in found else math.nan
+        f"{name.replace(' ', '_').replace('-', '_')}_rmse_deg": errors[name].rmse_deg if name in errors else math.nan
         for name in HELD_OUT.values()
     }
     return {
         **vars(test),
-        "workspace_rmse_deg": whole.rmse_deg if whole else math.nan,
-        "workspace_max_error_deg": whole.max_error_deg if whole else math.nan,
+        "workspace_rmse_deg": workspace.rmse_deg if workspace else math.nan,
+        "workspace_max_error_deg": workspace.max_error_deg if workspace else math.nan,
         **held_out,
         "gradient_norm": trial.gradient_norm,
         "train_loss": trial.epochs[-1].train_loss,

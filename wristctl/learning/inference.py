@@ -20,8 +20,8 @@ from wristctl.arrays import Array
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.learning.network import LEAK, Network, Scaler
 
+# Degree of the polynomial's terms: 21 terms in x and y, 126 with pose and mass.
 DEGREE = 5
-"""Of the whole term: 21 terms in x and y, 126 with pose and mass."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Polynomial:
 
     @property
     def multiply_adds(self) -> int:
-        """Of one angle."""
+        """Multiply-adds of one angle."""
         return int(self.powers.size + len(self.factors))
 
     def angle(self, inputs: Array) -> Array:
@@ -60,11 +60,11 @@ class Polynomial:
 
 _ACTIVATIONS = ("sigmoid", "tanh", "silu", "relu", "leaky-relu")
 
+# Inputs timed at once: enough to hide the call, few enough to be done within one slice of a busy machine's time.
 CHUNK = 50
-"""Inputs timed at once: enough to hide the call, few enough to be done within one slice of a busy machine's time."""
 
+# From inputs (N, D) to angles (N,) [rad].
 Timed = Callable[[Array], Array]
-"""From inputs (N, D) to angles (N,) [rad]."""
 
 
 @compiled
@@ -106,22 +106,22 @@ def _add_columns(total: Any, factors: Any, columns: Any) -> None:
 def _angles(sizes: Any, kind: int, packed: Any, inputs: Any, value: Any, result: Any, out: Any) -> None:
     for sample in range(len(out)):
         value[: sizes[0]] = inputs[sample]
-        at = 0
+        position = 0
         for layer in range(1, len(sizes)):
-            before, here = sizes[layer - 1], sizes[layer]
-            total = result[:here]
-            total[:] = packed[at : at + here]
-            at += here
+            before, width = sizes[layer - 1], sizes[layer]
+            total = result[:width]
+            total[:] = packed[position : position + width]
+            position += width
             fours = before // 4 * 4
             for j in range(0, fours, 4):
-                _add_columns(total, value[j : j + 4], packed[at : at + 4 * here])
-                at += 4 * here
+                _add_columns(total, value[j : j + 4], packed[position : position + 4 * width])
+                position += 4 * width
             for j in range(fours, before):
-                _add_column(total, value[j], packed[at : at + here])
-                at += here
+                _add_column(total, value[j], packed[position : position + width])
+                position += width
             if layer < len(sizes) - 1:
                 _activate(kind, total)
-            value[:here] = total
+            value[:width] = total
         out[sample] = value[0]
 
 

@@ -9,15 +9,15 @@ import torch
 from torch import Tensor, nn
 from torch.func import functional_call, grad, vmap
 
+# Samples evaluated at once where no gradient step is taken batch by batch.
 BLOCK = 4096
-"""Samples evaluated at once where no gradient step is taken batch by batch."""
 
 FIRST_DAMPING, LEAST_DAMPING = 1e-2, 1e-16
+# Factors of the damping after a step that lowered the objective, and after one that did not.
 ACCEPTED, REJECTED = 1.0 / 3.0, 4.0
-"""What the damping is multiplied by after a step that lowered the objective, and after one that did not."""
 
+# Rejected steps in a row after which the weights stay as they are.
 TRIES = 20
-"""Rejected steps in a row after which the weights stay as they are."""
 
 
 class LevenbergMarquardt:
@@ -50,7 +50,7 @@ class LevenbergMarquardt:
         return before
 
     def state_dict(self) -> dict[str, float]:
-        """What the steps to come depend on beside the weights."""
+        """State of the optimiser beside the weights."""
         return {"damping": self.damping}
 
     def load_state_dict(self, state: dict[str, float]) -> None:
@@ -62,14 +62,14 @@ class LevenbergMarquardt:
         named = {name: value.detach() for name, value in self.model.named_parameters()}
 
         def output(values: dict[str, Tensor], row: Tensor) -> Tensor:
-            found: Tensor = functional_call(self.model, values, (row,))
-            return found[0]
+            output: Tensor = functional_call(self.model, values, (row,))
+            return output[0]
 
         gradients = vmap(grad(output), in_dims=(None, 0))
         curvature = self.weight_decay * torch.eye(len(weights), dtype=x.dtype, device=x.device)
         slope = self.weight_decay * weights
         for some, wanted in blocks(x, y):
-            jacobian = torch.cat([each.flatten(1) for each in gradients(named, some).values()], dim=1)
+            jacobian = torch.cat([gradient.flatten(1) for gradient in gradients(named, some).values()], dim=1)
             with torch.no_grad():
                 residual = self.model(some) - wanted
             curvature += 2.0 / len(x) * (jacobian.T @ jacobian)

@@ -14,10 +14,10 @@ from wristctl.learning.domain import OTHERS, Domain
 from wristctl.records.measured_table import ANGLE, LENGTH, NUMBER, TIME, Expected
 from wristctl.wrist.kinematics import exact_arc
 
+# Columns of a table of a run that hold a course.
 NEEDED = ("tip_x", "tip_y", "theta")
-"""Columns of a table of a run that hold a course."""
+# Other names of the columns in CSV files.
 _NAMES = {"x": "tip_x", "y": "tip_y", "angle": "theta"}
-"""What people call them."""
 _PLACES = {"tip_x": LENGTH, "tip_y": LENGTH, "x": LENGTH, "y": LENGTH}
 DATA = Expected(
     "measured data",
@@ -45,7 +45,7 @@ class RecordedCourse:
     """(T, 2)"""
     theta: Array
     others: Mapping[str, Array]
-    """of the inputs after x and y, keys of `learning.domain.OTHERS`"""
+    """inputs after x and y, keys of `learning.domain.OTHERS`"""
 
 
 def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse]:
@@ -53,9 +53,9 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
 
     A column `trial` parts them; of arrays (rows, T) each row is one.
     """
-    if not all(each in columns for each in NEEDED):
+    if not all(column in columns for column in NEEDED):
         return
-    arrays = {each: np.asarray(columns[each], np.float64) for each in (*NEEDED, *OTHERS) if each in columns}
+    arrays = {column: np.asarray(columns[column], np.float64) for column in (*NEEDED, *OTHERS) if column in columns}
     shape = arrays["theta"].shape
     if "trial" in columns and len(shape) == 1:
         whose = np.asarray(columns["trial"])
@@ -64,10 +64,10 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
         rows = range(shape[0]) if len(shape) == 2 else (slice(None),)
         parts = [(name, np.index_exp[row]) for row in rows]
     for label, rows in parts:
-        own = {key: np.broadcast_to(each, shape)[rows].ravel() for key, each in arrays.items()}
-        known = np.isfinite(np.stack(list(own.values()))).all(axis=0)
-        if known.any():
-            kept = {key: each[known] for key, each in own.items()}
+        values = {key: np.broadcast_to(array, shape)[rows].ravel() for key, array in arrays.items()}
+        finite = np.isfinite(np.stack(list(values.values()))).all(axis=0)
+        if finite.any():
+            kept = {key: array[finite] for key, array in values.items()}
             tip = np.column_stack([kept["tip_x"], kept["tip_y"]])
             yield RecordedCourse(label, tip, kept["theta"], {key: kept[key] for key in OTHERS if key in kept})
 
@@ -75,7 +75,7 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
 def read_courses(file: Path) -> list[RecordedCourse]:
     """The recordings in a CSV file whose header has units. Raises UserError with line and column for what is none."""
     table = DATA.read(file)
-    columns = {_NAMES.get(name, name): each for name, each in table.columns.items()}
+    columns = {_NAMES.get(name, name): column for name, column in table.columns.items()}
     if len(columns) < len(table.columns):
         raise UserError("the same column under two names", f"{file}:1", "leave one out")
     for name in NEEDED:
@@ -83,8 +83,8 @@ def read_courses(file: Path) -> list[RecordedCourse]:
             raise UserError(f"no column {name}", str(file), f"a header such as {DATA.example}")
     off = np.flatnonzero(np.abs(columns["theta"]) > np.pi)
     if off.size:
-        told = f"an angle of {np.rad2deg(columns['theta'][off[0]]):.4g} deg"
-        raise UserError(told, table.at(int(off[0])), "put the angle's unit into the header")
+        problem = f"an angle of {np.rad2deg(columns['theta'][off[0]]):.4g} deg"
+        raise UserError(problem, table.at(int(off[0])), "put the angle's unit into the header")
     return list(courses_in(columns, file.name))
 
 
@@ -92,17 +92,18 @@ def samples_of_courses(courses: Sequence[RecordedCourse], count: int, rng: np.ra
     """At most `count` samples of recordings. Raises UserError where too few are known, or inputs differ."""
     names = [tuple(course.others) for course in courses]
     if len(set(names)) > 1:
-        odd = next(course for course, own in zip(courses, names, strict=True) if own != names[0])
-        own, usual = (", ".join(each) or "none" for each in (odd.others, names[0]))
-        what = f"inputs {own} beside the tip, where others have {usual}"
-        raise UserError(what, odd.name, "the same columns in each recording")
-    whole = sum(len(course.theta) for course in courses)
-    if whole < _FEWEST:
-        raise UserError(f"{whole} samples are known", "gen-data", f"at least {_FEWEST}: name longer recordings")
-    rows = np.sort(rng.choice(whole, min(count, whole), replace=False))
-    tip, theta = np.concatenate([each.tip for each in courses])[rows], np.concatenate([c.theta for c in courses])[rows]
-    others = np.stack([np.concatenate([each.others[key] for each in courses])[rows] for key in names[0]] or [theta], -1)
-    others = others[:, : len(names[0])]
-    recording = np.repeat(np.arange(len(courses)), [len(each.theta) for each in courses])[rows]
+        odd = next(course for course, inputs in zip(courses, names, strict=True) if inputs != names[0])
+        unusual, usual = (", ".join(inputs) or "none" for inputs in (odd.others, names[0]))
+        problem = f"inputs {unusual} beside the tip, where others have {usual}"
+        raise UserError(problem, odd.name, "the same columns in each recording")
+    total = sum(len(course.theta) for course in courses)
+    if total < _FEWEST:
+        raise UserError(f"{total} samples are known", "gen-data", f"at least {_FEWEST}: name longer recordings")
+    rows = np.sort(rng.choice(total, min(count, total), replace=False))
+    tip, theta = (np.concatenate([getattr(course, name) for course in courses])[rows] for name in ("tip", "theta"))
+    columns = [np.concatenate([course.others[key] for course in courses])[rows] for key in names[0]]
+    inputs = np.stack(columns or [theta], -1)
+    inputs = inputs[:, : len(names[0])]
+    recording = np.repeat(np.arange(len(courses)), [len(course.theta) for course in courses])[rows]
     held, arc = np.zeros(len(theta), np.int64), exact_arc(tip)[1]
-    return Samples(tip, theta, arc, Domain.around(tip, others), others, names[0], held, 1, recording)
+    return Samples(tip, theta, arc, Domain.around(tip, inputs), inputs, names[0], held, 1, recording)

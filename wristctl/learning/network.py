@@ -12,12 +12,12 @@ from wristctl.config.learning import Activation
 from wristctl.learning.domain import Domain
 from wristctl.wrist.kinematics import AnglePath, TipPath
 
+# Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine the
+# threads of a linear algebra library wait for each other, ten times longer than the product takes on one.
 BLOCK = 12
-"""Tips propagated at once: few enough that the products of the paper's layers stay on one thread. On a busy machine
-the threads of a linear algebra library wait for each other, ten times longer than the product takes on one."""
 
+# Slope of leaky ReLU below zero.
 LEAK = 0.01
-"""Slope of leaky ReLU below zero."""
 
 
 def _sigmoid(z: Array) -> tuple[Array, Array, Array]:
@@ -46,6 +46,7 @@ def _leaky_relu(z: Array) -> tuple[Array, Array, Array]:
     return z * slope, slope, np.zeros_like(z)
 
 
+# Activations with their first and second derivatives. At its kink ReLU takes the slope from below.
 ACTIVATIONS: dict[Activation, Callable[[Array], tuple[Array, Array, Array]]] = {
     "sigmoid": _sigmoid,
     "relu": _relu,
@@ -53,7 +54,6 @@ ACTIVATIONS: dict[Activation, Callable[[Array], tuple[Array, Array, Array]]] = {
     "tanh": _tanh,
     "silu": _silu,
 }
-"""Each activation with its first and second derivative. At its kink ReLU takes the slope from below."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Network:
     others: tuple[str, ...] = ()
     """inputs after x and y"""
     segments: int = 1
-    """of the wrist that it learned; 1: any"""
+    """segments of the wrist that it learned; 1: any"""
 
     @property
     def parameters(self) -> int:
@@ -111,7 +111,7 @@ class Network:
 
     @property
     def multiply_adds(self) -> int:
-        """Of one angle, activations not counted."""
+        """Multiply-adds of one angle, activations not counted."""
         return sum(weight.size for weight in self.weights)
 
     @property

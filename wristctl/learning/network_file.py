@@ -17,10 +17,10 @@ from wristctl.learning.domain import OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing
 
+# Path of the network in a train run.
 NETWORK = "models/network.safetensors"
-"""Where a train run keeps its network."""
+# The one entry of the file's metadata: of several, safetensors writes the order at random.
 ENTRY = "wristctl"
-"""The one entry of the file's metadata: of several, safetensors writes the order at random."""
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -92,7 +92,7 @@ def save_network(network: Network, path: Path, training: dict[str, object]) -> N
 def load_network(path: Path) -> Network:
     """Read a network. Raises UserError for anything that `save_network` would not have written."""
     header, tensors = _read(path)
-    weights, biases, others = [], [], header.others
+    weights, biases, entries = [], [], header.others
     for layer, (inputs, neurons) in enumerate(pairwise((2 + len(header.others), *header.hidden, 1))):
         weights.append(_tensor(path, tensors, f"{layer}.weight", (neurons, inputs)))
         biases.append(_tensor(path, tensors, f"{layer}.bias", (neurons,)))
@@ -101,18 +101,18 @@ def load_network(path: Path) -> Network:
         tuple(biases),
         header.activation,
         Scaler(
-            np.array([*header.input.mean, *(each.mean for each in others)]),
-            np.array([*header.input.deviation, *(each.deviation for each in others)]),
+            np.array([*header.input.mean, *(entry.mean for entry in entries)]),
+            np.array([*header.input.deviation, *(entry.deviation for entry in entries)]),
         ),
         Scaler(np.array(header.output.mean), np.array(header.output.deviation)),
-        Domain(header.domain.theta, header.domain.arc_length, tuple(each.range for each in others)),
-        tuple(each.name for each in others),
+        Domain(header.domain.theta, header.domain.arc_length, tuple(entry.range for entry in entries)),
+        tuple(entry.name for entry in entries),
         header.segments,
     )
 
 
 def training_record(path: Path) -> dict[str, object]:
-    """What `save_network` was told about the training. Raises UserError like `load_network`."""
+    """Record of the training that `save_network` wrote. Raises UserError like `load_network`."""
     return _read(path)[0].training
 
 
@@ -151,5 +151,5 @@ def _columns(scaler: Scaler) -> dict[str, tuple[float, ...]]:
     return {"mean": tuple(scaler.mean.tolist()), "deviation": tuple(scaler.deviation.tolist())}
 
 
-def _broken(path: Path, what: str) -> UserError:
-    return UserError(what, where=str(path), fix="use a file from models/ of a sealed train run, or train again")
+def _broken(path: Path, problem: str) -> UserError:
+    return UserError(problem, where=str(path), fix="use a file from models/ of a sealed train run, or train again")

@@ -1,4 +1,4 @@
-"""What a comparison of trainings supports: means with intervals, and tests between rows paired by seed or fold."""
+"""Comparison of trainings: means with intervals, and tests between rows paired by seed or fold."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.learning import NetworkSettings
 
+# Significance level, after Holm's correction over all pairs of a group.
 LEVEL = 0.05
-"""Significance level, after Holm's correction over all pairs of a group."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Ranking:
 
     order: tuple[str, ...]
     friedman_p: float
-    """that all rows are alike; nan for fewer than three rows"""
+    """p value of Friedman's test that all rows are alike; nan for fewer than three rows"""
     pairs: tuple[Pair, ...]
 
     def supports_best(self, name: str) -> bool:
@@ -62,15 +62,15 @@ def rank(errors: Mapping[str, Sequence[float] | Array]) -> Ranking:
 
     columns = {name: np.asarray(values, float) for name, values in errors.items()}
     order = tuple(sorted(columns, key=lambda name: columns[name].mean()))
-    found = []
+    comparisons = []
     for better, worse in combinations(order, 2):
         difference = columns[worse] - columns[better]
         p = float(wilcoxon(difference).pvalue) if np.any(difference != 0.0) else 1.0
-        found.append((better, worse, float(np.median(difference)), p))
-    whole = float(friedmanchisquare(*columns.values()).pvalue) if len(columns) > 2 else np.nan
-    corrected = holm([p for *_, p in found])
-    pairs = tuple(Pair(a, b, difference, p) for (a, b, difference, _), p in zip(found, corrected, strict=True))
-    return Ranking(order, whole, pairs)
+        comparisons.append((better, worse, float(np.median(difference)), p))
+    friedman_p = float(friedmanchisquare(*columns.values()).pvalue) if len(columns) > 2 else np.nan
+    corrected = holm([p for *_, p in comparisons])
+    pairs = tuple(Pair(a, b, difference, p) for (a, b, difference, _), p in zip(comparisons, corrected, strict=True))
+    return Ranking(order, friedman_p, pairs)
 
 
 def holm(p: Sequence[float]) -> list[float]:

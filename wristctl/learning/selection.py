@@ -18,22 +18,22 @@ from wristctl.learning.training_result import Job, TrainingResult
 
 @dataclass(frozen=True)
 class CrossValidated:
-    """One point of the grid and what the folds said of it."""
+    """Point of the grid with its errors on the folds."""
 
     settings: NetworkSettings
     depth: int
     multiply_adds: int
     rmse: Array
-    """(folds,) of the angle on the part held out [rad]"""
+    """(folds,) RMSE of the angle on the part held out [rad]"""
 
     @property
     def mean(self) -> float:
-        """Over the folds [rad]; infinite where one diverged."""
+        """Mean over the folds [rad]; infinite where one diverged."""
         return float(self.rmse.mean())
 
     @property
     def standard_error(self) -> float:
-        """Of that mean [rad]."""
+        """Standard error of the mean over the folds [rad]."""
         return float(self.rmse.std(ddof=1) / np.sqrt(len(self.rmse)))
 
 
@@ -76,11 +76,11 @@ def fold_jobs(
     rows, seeds = np.concatenate([split.train, split.validation]), seed.spawn(folds)
     parts = np.array_split(rows, folds)
     if recording is not None:
-        whole = np.unique(recording[rows])
-        if len(whole) < folds:
-            what, fix = f"{len(whole)} recordings are too few for {folds} folds", "measure more, or fewer folds"
-            raise UserError(what, "train.grid.folds", fix)
-        parts = [rows[np.isin(recording[rows], part)] for part in np.array_split(whole, folds)]
+        recordings = np.unique(recording[rows])
+        if len(recordings) < folds:
+            problem, fix = f"{len(recordings)} recordings are too few for {folds} folds", "measure more, or fewer folds"
+            raise UserError(problem, "train.grid.folds", fix)
+        parts = [rows[np.isin(recording[rows], part)] for part in np.array_split(recordings, folds)]
     if min(len(part) for part in parts) < 2:
         raise UserError(f"{len(rows)} samples are too few for {folds} folds", "train.grid.folds", "draw more samples")
     cuts = [Split(np.setdiff1d(rows, part, assume_unique=True), part, split.test) for part in parts]
@@ -93,41 +93,42 @@ def fold_jobs(
 
 def candidates(trials: Sequence[TrainingResult], folds: int) -> list[CrossValidated]:
     """The grid's points out of the trials of `fold_jobs`."""
-    found = []
+    points = []
     for first in range(0, len(trials), folds):
-        own = trials[first : first + folds]
-        losses = np.array([trial.validation_loss for trial in own])
+        members = trials[first : first + folds]
+        losses = np.array([trial.validation_loss for trial in members])
         rmse = np.sqrt(np.where(np.isfinite(losses), losses, np.inf))
-        network = own[0].network
-        found.append(CrossValidated(own[0].job.settings, len(network.weights) - 1, network.multiply_adds, rmse))
-    return found
+        network = members[0].network
+        points.append(CrossValidated(members[0].job.settings, len(network.weights) - 1, network.multiply_adds, rmse))
+    return points
 
 
-def choose(found: Sequence[CrossValidated]) -> Choice:
+def choose(points: Sequence[CrossValidated]) -> Choice:
     """The network of the fewest multiply-adds within one standard error of the least error.
 
     Breiman et al., Classification and Regression Trees (1984), section 3.4. Raises UserError where all diverged.
     """
-    finite = [each for each in found if np.isfinite(each.mean)]
+    finite = [point for point in points if np.isfinite(point.mean)]
     if not finite:
         raise UserError("every network of the grid diverged", "train.learning_rate", "choose less")
-    best = min(finite, key=lambda each: each.mean)
+    best = min(finite, key=lambda point: point.mean)
     limit = best.mean + best.standard_error
-    chosen = min((each for each in finite if each.mean <= limit), key=lambda each: (each.multiply_adds, each.mean))
+    good = [point for point in finite if point.mean <= limit]
+    chosen = min(good, key=lambda point: (point.multiply_adds, point.mean))
     reason = (
         f"{_named(chosen)} is the cheapest network ({chosen.multiply_adds} multiply-adds) whose cross-validated RMSE "
         f"({np.degrees(chosen.mean):.3g} deg) lies within one standard error ({np.degrees(best.standard_error):.2g} "
         f"deg) of the least ({np.degrees(best.mean):.3g} deg, {_named(best)})"
     )
-    return Choice(found, chosen, best, reason)
+    return Choice(points, chosen, best, reason)
 
 
 def _named(candidate: CrossValidated) -> str:
     return f"{'-'.join(map(str, candidate.settings.hidden))} {candidate.settings.activation}"
 
 
+# Hidden layers of the paper's network.
 THREE = 3
-"""Hidden layers of the paper's network."""
 
 
 @dataclass(frozen=True)
@@ -151,37 +152,37 @@ class DepthComparison:
     """whether three layers are better than every other depth at LEVEL; None where there are none of three"""
 
 
-def compare_depths(found: Sequence[CrossValidated]) -> list[DepthComparison]:
+def compare_depths(points: Sequence[CrossValidated]) -> list[DepthComparison]:
     """Every activation of a grid, in its order; all networks were judged on the same folds."""
-    activations = dict.fromkeys(each.settings.activation for each in found)
-    return [_compared(name, [each for each in found if each.settings.activation == name]) for name in activations]
+    activations = dict.fromkeys(point.settings.activation for point in points)
+    return [_compared(name, [point for point in points if point.settings.activation == name]) for name in activations]
 
 
-def _compared(activation: Activation, found: Sequence[CrossValidated]) -> DepthComparison:
+def _compared(activation: Activation, points: Sequence[CrossValidated]) -> DepthComparison:
     from scipy.stats import ttest_rel
 
     least: dict[int, CrossValidated] = {}
-    for each in found:
-        if each.depth not in least or each.mean < least[each.depth].mean:
-            least[each.depth] = each
-    three, others = least.get(THREE), [depth for depth in least if depth != THREE]
+    for point in points:
+        if point.depth not in least or point.mean < least[point.depth].mean:
+            least[point.depth] = point
+    three, rivals = least.get(THREE), [depth for depth in least if depth != THREE]
     if three is None:
-        return DepthComparison(activation, tuple(Depth(each, np.nan, "") for _, each in sorted(least.items())), None)
+        return DepthComparison(activation, tuple(Depth(point, np.nan, "") for _, point in sorted(least.items())), None)
     p = [
         float(ttest_rel(least[depth].rmse, three.rmse).pvalue)
         if np.isfinite([least[depth].mean, three.mean]).all()
         else np.nan
-        for depth in others
+        for depth in rivals
     ]
-    corrected = dict(zip(others, holm(p), strict=True))
-    depths = [_beside(each, three, corrected.get(depth, np.nan)) for depth, each in sorted(least.items())]
-    best = all(least[depth].mean > three.mean and corrected[depth] < LEVEL for depth in others)
+    corrected = dict(zip(rivals, holm(p), strict=True))
+    depths = [_beside(point, three, corrected.get(depth, np.nan)) for depth, point in sorted(least.items())]
+    best = all(least[depth].mean > three.mean and corrected[depth] < LEVEL for depth in rivals)
     return DepthComparison(activation, tuple(depths), best)
 
 
-def _beside(each: CrossValidated, three: CrossValidated, p: float) -> Depth:
-    if each is three:
-        return Depth(each, p, "")
+def _beside(point: CrossValidated, three: CrossValidated, p: float) -> Depth:
+    if point is three:
+        return Depth(point, p, "")
     if not p < LEVEL:
-        return Depth(each, p, "no difference shown")
-    return Depth(each, p, "better" if each.mean < three.mean else "worse")
+        return Depth(point, p, "no difference shown")
+    return Depth(point, p, "better" if point.mean < three.mean else "worse")

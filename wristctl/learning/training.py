@@ -47,8 +47,8 @@ def write_checkpoint(file: Path, mark: str, state: dict[str, object]) -> None:
 def read_checkpoint(file: Path, mark: str) -> dict[str, Any]:
     """The state of the training with this fingerprint; UserError where it is another's or cannot be read."""
     try:
-        found = torch.load(file, weights_only=True, map_location="cpu")
-        training, state = found["training"], found["state"]
+        checkpoint = torch.load(file, weights_only=True, map_location="cpu")
+        training, state = checkpoint["training"], checkpoint["state"]
     except (RuntimeError, OSError, EOFError, KeyError, TypeError, BadZipFile, pickle.UnpicklingError) as error:
         raise UserError("not a readable checkpoint", str(file), "delete it, or train without resume") from error
     if training != mark:
@@ -60,11 +60,11 @@ def read_checkpoint(file: Path, mark: str) -> dict[str, Any]:
     return dict(state)
 
 
+# Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding.
 DTYPE = torch.float64
-"""Doubles take a third longer than singles, and let the frozen network equal the trained one to rounding."""
 
+# Time between two checkpoints [s].
 SAVE_EVERY = 5.0
-"""Time between two checkpoints [s]."""
 
 LAYERS: dict[Activation, Callable[[], nn.Module]] = {
     "sigmoid": nn.Sigmoid,
@@ -124,7 +124,7 @@ class _Problem:
 
         def tensors(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
             scaled = self.input.scale(inputs[rows]), self.output.scale(theta[rows])
-            x, y = (torch.tensor(each, dtype=DTYPE, device=device) for each in scaled)
+            x, y = (torch.tensor(values, dtype=DTYPE, device=device) for values in scaled)
             return x, y
 
         self.train, self.validation = tensors(job.split.train), tensors(job.split.validation)
@@ -191,10 +191,10 @@ class _Course:
     @property
     def ended(self) -> bool:
         """All epochs done, diverged, or out of patience."""
-        done, patience = len(self.epochs), self.settings.patience
-        stale = patience > 0 and done - self.best_epoch >= patience
-        return done > 0 and (
-            done >= self.settings.epochs or stale or not math.isfinite(self.epochs[-1].validation_loss)
+        epochs, patience = len(self.epochs), self.settings.patience
+        stale = patience > 0 and epochs - self.best_epoch >= patience
+        return epochs > 0 and (
+            epochs >= self.settings.epochs or stale or not math.isfinite(self.epochs[-1].validation_loss)
         )
 
     def advance(self) -> None:

@@ -18,12 +18,12 @@ from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
 from wristctl.processes import safe_path, serve_parent
 
+# Told the job's number and its last epoch.
 Report = Callable[[int, Epoch], None]
-"""Told the job's number and its last epoch."""
 
 _given: dict[str, Any] = {}
+# Seconds in which trainings that are interrupted come to the end of an epoch; their checkpoints stay in any case.
 _TO_END = 0.35
-"""Seconds in which trainings that are interrupted come to the end of an epoch; their checkpoints stay in any case."""
 
 
 def train_all(
@@ -56,12 +56,12 @@ def _over_processes(
     samples: Samples, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
 ) -> list[TrainingResult]:
     context = multiprocessing.get_context("spawn")
-    told, stop, begun = context.SimpleQueue(), context.Event(), context.Event()
-    given = {"samples": samples, "device": device, "checkpoints": checkpoints}
-    given |= {"told": told, "stop": stop, "begun": begun}
+    progress, stop, begun = context.SimpleQueue(), context.Event(), context.Event()
+    setup = {"samples": samples, "device": device, "checkpoints": checkpoints}
+    setup |= {"told": progress, "stop": stop, "begun": begun}
     interrupted = False
     try:
-        with ProcessPoolExecutor(workers, context, _begin, (given,)) as pool, _ended():
+        with ProcessPoolExecutor(workers, context, _begin, (setup,)) as pool, _ended():
             with deferred():  # the workers' too, which begin with it
                 futures = [pool.submit(_work, number, job) for number, job in enumerate(jobs)]
             pending: set[Future[TrainingResult | None]] = set(futures)
@@ -69,8 +69,8 @@ def _over_processes(
             while pending and time.monotonic() < until:
                 try:
                     _, pending = wait(pending, timeout=0.2)
-                    while not told.empty():
-                        report(*told.get())
+                    while not progress.empty():
+                        report(*progress.get())
                 except KeyboardInterrupt:
                     interrupted, until = True, time.monotonic() + _TO_END * begun.is_set()
                     stop.set()  # what had not begun comes back with nothing
@@ -81,10 +81,10 @@ def _over_processes(
         raise UserError(
             "a worker process died", "train.workers", "train again with resume: RUN and fewer workers"
         ) from error
-    done = [trial for trial in trials if trial is not None]
-    if interrupted and not done:
+    finished = [trial for trial in trials if trial is not None]
+    if interrupted and not finished:
         raise KeyboardInterrupt
-    return done
+    return finished
 
 
 def _came_back(future: Future[TrainingResult | None]) -> bool:
@@ -101,9 +101,9 @@ def _ended() -> Iterator[None]:
             worker.kill()  # a milder signal waits there, as it does here while they are begun
 
 
-def _begin(given: dict[str, Any]) -> None:
-    _given.update(given)
-    given["begun"].set()
+def _begin(setup: dict[str, Any]) -> None:
+    _given.update(setup)
+    setup["begun"].set()
     serve_parent()
 
 

@@ -1,4 +1,4 @@
-"""Trainings: what each is given, and what came of it."""
+"""Trainings: their jobs and their results."""
 
 import math
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ class Job:
     """One training: of which network, on which samples, from which random start."""
 
     name: str
-    """its own among those trained together; names its checkpoint"""
+    """unique among trainings that run together; names the checkpoint"""
     settings: NetworkSettings
     split: Split
     seed: np.random.SeedSequence
     trial: int = 0
-    """which of the trainings of its network, from 0"""
+    """number of the training of its network, from 0"""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Epoch:
     """Losses of one pass over the training data: mean squared errors of the angle [rad^2]."""
 
     trial: int
-    """which of the trainings, from 0"""
+    """number of the training, from 0"""
     epoch: int
     """from 1"""
     train_loss: float
@@ -40,14 +40,14 @@ class Epoch:
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """What came of one training."""
+    """Result of one training."""
 
     job: Job
     network: Network
-    """of the last epoch; with patience, of the one with the least validation loss"""
+    """network of the last epoch; with patience, of the epoch with the least validation loss"""
     epochs: tuple[Epoch, ...]
     validation_loss: float
-    """of the network [rad^2]; not finite where the training diverged"""
+    """validation loss of the network [rad^2]; not finite where the training diverged"""
     gradient_norm: float
     """norm of the training loss's gradient (scaled angle, no weight decay) at these weights; nan if interrupted"""
     interrupted: bool

@@ -18,8 +18,8 @@ from wristctl.stability.sampled_loop import Complex, Mode
 from wristctl.stability.smooth_loop import FrictionReading
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Share of a stepper's acceleration from which its profile's lag of v/(2 a) turns a swing by 0.15 rad and more.
 _SHARE = 0.3
-"""Of a stepper's acceleration, from which its profile's lag of v/(2 a) turns a swing by 0.15 rad and more."""
 
 
 class LinearityLimit(NamedTuple):
@@ -51,17 +51,17 @@ class Swing:
         return self._size(error * self._output("theta") + rate * self._output("rate"))
 
     def tension(self) -> float:
-        """Of what is commanded of the two sides against each other [N]."""
+        """Amplitude of the commanded difference between the tensions of the two sides [N]."""
         commanded = self._size(self._output("tension_plus") - self._output("tension_minus"))
         return commanded / (self.factor if self.linear.at_frames else 1.0)
 
     def motor(self, order: int = 0) -> float:
-        """Of what the motors of the two sides count against each other, or of its derivative [1/s^order]."""
+        """Amplitude of the difference between the motors' counts of the two sides, or of its derivative [1/s^order]."""
         sides = np.array(self.linear.names) == "motor"
         if self.mode is None:
             return math.nan
-        both = self.mode.states[:, sides] @ np.array([1.0, -1.0], complex)
-        return self._size(both) / self.factor * abs(self.turning) ** order
+        winding_difference = self.mode.states[:, sides] @ np.array([1.0, -1.0], complex)
+        return self._size(winding_difference) / self.factor * abs(self.turning) ** order
 
     @property
     def turning(self) -> complex:
@@ -84,53 +84,57 @@ def linearity_limits(
     swing: Swing, loop: Loop, wrist: WristParameters, friction: FrictionReading, surface: Surface | None,
     gains: dict[str, float],
 ) -> list[LinearityLimit]:  # fmt: skip
-    """What linearisation leaves out of a loop, and the swings from which, or up to which, it is felt: those first."""
-    world, level, found = World(loop, wrist), loop.actuator.level, list[LinearityLimit]()
+    """List the effects that linearisation leaves out of a loop, with the swings from or up to which they are felt.
+
+    Effects that are felt from a swing on come last.
+    """
+    world, level, limits = World(loop, wrist), loop.actuator.level, list[LinearityLimit]()
     if loop.sensor.level == "camera":
         noise = math.radians(world.sensor.noise_deg)
-        found.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
+        limits.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
     if level != "ideal":
         motor = motor_of(loop.actuator)
         step, scale = (motor.step, 1.0) if level == "tendon" else (motor.stiffness * motor.step, motor.stiffness)
-        told = LinearityLimit("a motor's microstep", False, _over(0.5 * step, swing.motor()), "no steps: any length")
+        finest = LinearityLimit("a motor's microstep", False, _over(0.5 * step, swing.motor()), "no steps: any length")
         speed = scale * loop.actuator.step_length * world.actuator.step_rate
-        found += [
-            told,
+        limits += [
+            finest,
             LinearityLimit("a motor's speed", True, _over(speed, swing.motor(1)), "as fast as it has to be"),
         ]
     if level == "tendon":
         play = loop.plant.actuator.backlash / world.plant.tendon_offset
-        found += [LinearityLimit("backlash", False, play, "none")] if play else []
+        limits += [LinearityLimit("backlash", False, play, "none")] if play else []
         acceleration = _SHARE * loop.actuator.step_length * world.actuator.step_acceleration
         most = _over(acceleration, swing.motor(2))
-        found += [LinearityLimit("the stepper's acceleration", True, most, "where it is told to be after a period")]
-        found += [*_friction(world, friction), _slack(world, swing.linear)]
+        limits += [LinearityLimit("the stepper's acceleration", True, most, "where it is told to be after a period")]
+        limits += [*_friction(world, friction), _slack(world, swing.linear)]
     if loop.limits:
         left = wrist.tension_limit - max(swing.linear.tensions)
         most = _over(left, swing.tension())
-        found.append(LinearityLimit("saturation", True, most, f"none: tensions rest {left:.3g} N below their limit"))
+        limits.append(LinearityLimit("saturation", True, most, f"none: tensions rest {left:.3g} N below their limit"))
     if surface is not None:
         error, rate, integral = surface.weights(gains)
         sigma = swing.angle(error + (integral / swing.turning if swing.mode else 0.0), rate)
         most = _over(surface.layer(gains), sigma)
-        found.append(LinearityLimit("the boundary layer's end", True, most, "the sliding term as inside the layer"))
+        limits.append(LinearityLimit("the boundary layer's end", True, most, "the sliding term as inside the layer"))
     if loop.plant.end_stop_deg is not None:
         room = math.radians(loop.plant.end_stop_deg) - abs(swing.linear.theta)
-        found.append(LinearityLimit("the end stops", True, room, "none"))
-    found += [LinearityLimit(each, True, math.nan, "left out") for each in _passing(loop)]
-    return sorted(found, key=lambda each: (each.above, math.isnan(each.swing), each.swing))
+        limits.append(LinearityLimit("the end stops", True, room, "none"))
+    limits += [LinearityLimit(event, True, math.nan, "left out") for event in _passing(loop)]
+    return sorted(limits, key=lambda limit: (limit.above, math.isnan(limit.swing), limit.swing))
 
 
 def _passing(loop: Loop) -> list[str]:
-    """What happens at times, or may."""
-    acting = [each.meaning for name, each in DISTURBANCES.items() if name != "load" and each.acts(loop.disturbances)]
+    """Names of a loop's disturbances and faults that act only at times."""
+    passing = [disturbance for name, disturbance in DISTURBANCES.items() if name != "load"]
+    acting = [disturbance.meaning for disturbance in passing if disturbance.acts(loop.disturbances)]
     facts = {"broken_at": "a tendon that breaks", "slips_at": "a spool that slips", "torque": "a motor that stalls"}
-    return [*acting, *(told for name, told in facts.items() if getattr(loop.plant.actuator, name) is not None)]
+    return [*acting, *(fault for name, fault in facts.items() if getattr(loop.plant.actuator, name) is not None)]
 
 
-def _over(most: float, each: float) -> float:
+def _over(most: float, amplitude: float) -> float:
     """Up to which swing a signal stays below its most; inf where it does not swing along."""
-    return math.inf if each == 0.0 else most / each
+    return math.inf if amplitude == 0.0 else most / amplitude
 
 
 def _slack(world: World, linear: LinearLoop) -> LinearityLimit:

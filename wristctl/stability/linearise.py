@@ -23,15 +23,15 @@ from wristctl.stability.loop_ticks import LoopTicks, TickSlopes
 from wristctl.stability.sampled_loop import Complex, LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading, smooth
 
+# Change in one tick, in typical sizes, that is none.
 _STILL = 1e-8
-"""Change in one tick, in typical sizes, that is none."""
 _TRIES = 60
+# Longest step of Newton's method, in typical sizes.
 _FURTHEST = 0.3
-"""Of one step of Newton's method, in typical sizes."""
+# Directions in which the state may drift, in typical sizes: an integrator's that nothing drives.
 _FREE = 1e-10
-"""Directions in which the state may drift, in typical sizes: an integrator's that nothing drives."""
+# Iterations that find the tendons' path at a position of the wrist.
 _TURNS = 5
-"""Of finding the path that belongs to where the wrist is."""
 _THETA = RECORDED.index("theta")
 
 
@@ -42,7 +42,7 @@ class RestingPoint(NamedTuple):
     ticks: list[TickSlopes]
 
     def recorded(self, name: str) -> float:
-        """What the kernel records there, by its name in RECORDED."""
+        """Value that the kernel records at the resting point, by its name in RECORDED."""
         return float(self.ticks[0].recorded[RECORDED.index(name)])
 
 
@@ -51,24 +51,24 @@ def resting_point(loop: LoopTicks) -> RestingPoint | None:
 
     All of them must leave the same state, so that a loop which grows fast within its cycle is found as well as another.
     """
-    tried = [RestingPoint(each, loop.slopes(each)) for each in loop.guesses()]
-    for point in sorted(tried, key=lambda each: change_in(loop, each)):
-        found = _newton(loop, point)
-        if change_in(loop, found) < _STILL:
-            return found
+    tried = [RestingPoint(state, loop.slopes(state)) for state in loop.guesses()]
+    for point in sorted(tried, key=lambda candidate: change_in(loop, candidate)):
+        rest = _newton(loop, point)
+        if change_in(loop, rest) < _STILL:
+            return rest
     return None
 
 
 def with_relaxed_bristles(loop: LoopTicks, sliding: LoopTicks, point: RestingPoint) -> RestingPoint:
-    """Where a loop with friction rests whose bristles are relaxed, which is where the same one rests without friction.
+    """Resting point of a loop with friction and relaxed bristles: the resting point of the same loop without friction.
 
     `point` is that one's, in the state of its own loop, `sliding`.
     """
     state = np.zeros(len(loop.sizes))
-    own, known = np.array(loop.names), np.array(sliding.names)
+    names, sliding_names = np.array(loop.names), np.array(sliding.names)
     for name in dict.fromkeys(sliding.names):
-        state[own == name] = point.state[known == name]
-    path = own == "path"
+        state[names == name] = point.state[sliding_names == name]
+    path = names == "path"
     for _ in range(_TURNS):
         state[path] = loop.slopes(state)[0].after[path]
     return _newton(loop, RestingPoint(state, loop.slopes(state)))
@@ -76,14 +76,14 @@ def with_relaxed_bristles(loop: LoopTicks, sliding: LoopTicks, point: RestingPoi
 
 def change_in(loop: LoopTicks, point: RestingPoint) -> float:
     """The largest change of any variable in any tick, in typical sizes; inf where the wrist is not where it can be."""
-    if not all(math.isfinite(each.recorded[_THETA]) for each in point.ticks):
+    if not all(math.isfinite(tick.recorded[_THETA]) for tick in point.ticks):
         return math.inf
-    change = max(float(np.abs((each.after - point.state) / loop.sizes).max()) for each in point.ticks)
+    change = max(float(np.abs((tick.after - point.state) / loop.sizes).max()) for tick in point.ticks)
     return change if math.isfinite(change) else math.inf
 
 
 def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
-    sizes, own = loop.sizes, np.eye(len(loop.sizes))
+    sizes, identity = loop.sizes, np.eye(len(loop.sizes))
     best = point
     for _ in range(_TRIES):
         now = change_in(loop, point)
@@ -91,9 +91,9 @@ def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
             best = point
         if not math.isfinite(now) or now < 1e-3 * _STILL:
             break
-        ticks = list({id(each): each for each in point.ticks}.values())
-        change = np.concatenate([(each.after - point.state) / sizes for each in ticks])
-        slopes = np.concatenate([each.transition * sizes / sizes[:, None] - own for each in ticks])
+        ticks = list({id(tick): tick for tick in point.ticks}.values())
+        change = np.concatenate([(tick.after - point.state) / sizes for tick in ticks])
+        slopes = np.concatenate([tick.transition * sizes / sizes[:, None] - identity for tick in ticks])
         step = np.linalg.lstsq(slopes, change, rcond=_FREE)[0]
         state = point.state - min(1.0, _FURTHEST / max(float(np.abs(step).max()), 1e-300)) * sizes * step
         if np.array_equal(state, point.state):
@@ -116,9 +116,9 @@ HOLD = Controller(
 )
 
 
+# Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and at
+# how many frequencies the plant is asked.
 _EXACT, _SHORTEST, _FREQUENCIES = 1e-6, 2e-5, 24
-"""Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and at
-how many frequencies the plant is asked."""
 _OUTPUTS = {name: RECORDED.index(name) for name in ("theta", "rate", "torque_wanted", "tension_plus", "tension_minus")}
 
 
@@ -133,15 +133,15 @@ class LinearLoop:
     closed: SampledLoop
     plant: SampledLoop
     theta: float
-    """Where it rests [rad], and the torque [N m] and tensions [N] that hold it there."""
+    """Angle at rest [rad]; `torque` [N m] and `tensions` [N] hold the wrist there."""
     torque: float
     tensions: tuple[float, float]
     names: Sequence[str]
-    """What each of the closed loop's variables is."""
+    """Names of the closed loop's variables."""
     at_frames: bool
     """Whether it is cut where frames are taken."""
     bend: float
-    """By how much of its size the law's slope differs over a hundred times the small change."""
+    """Relative difference of the law's slope between a small change and a hundred times it."""
 
 
 def linearise(
@@ -160,13 +160,13 @@ def linearise(
         ticks = LoopTicks(law, gains, smooth(loop, "stuck"), wrist, theta)
         point = with_relaxed_bristles(ticks, sliding, point)
     memory = np.array(ticks.names) == "memory"
-    own = np.isin(ticks.names, ("memory", "estimate", "estimate at the frame", "delivered", "frame"))
+    controller_rows = np.isin(ticks.names, ("memory", "estimate", "estimate at the frame", "delivered", "frame"))
     torque = point.recorded("torque_wanted")
     alone = smooth(loop.model_copy(update={"sensor": Sensor()}), friction)
-    held, steps = _held(torque, alone, wrist, theta, point.state[~own])
+    held, steps = _held(torque, alone, wrist, theta, point.state[~controller_rows])
     camera = loop.sensor.level == "camera"
     exact = LoopTicks(law, gains, _stepped(smooth(loop, friction), steps), wrist, theta).slopes(point.state)
-    closed = [_seen(each) if camera else _commanded(each, memory, held) for each in exact]
+    closed = [_seen(tick) if camera else _commanded(tick, memory, held) for tick in exact]
     return LinearLoop(
         closed=SampledLoop(ticks.period, closed),
         plant=SampledLoop(ticks.period, [_alone(held)]),
@@ -209,7 +209,7 @@ def _stepped(loop: Loop, steps: int) -> Loop:
 
 
 def _outputs(tick: TickSlopes) -> dict[str, Array]:
-    return {name: tick.outputs[at] for name, at in _OUTPUTS.items()}
+    return {name: tick.outputs[column] for name, column in _OUTPUTS.items()}
 
 
 def _seen(tick: TickSlopes) -> LinearTick:
@@ -240,10 +240,10 @@ def _alone(held: TickSlopes) -> LinearTick:
 
 
 def _bend(ticks: LoopTicks, point: RestingPoint) -> float:
-    """By how much of its size the torque's slope changes over a hundred times the small change."""
-    at, worst = _OUTPUTS["torque_wanted"], 0.0
+    """Relative difference of the torque's slope between a small change and a hundred times it."""
+    column, worst = _OUTPUTS["torque_wanted"], 0.0
     for near, far in zip(point.ticks, ticks.slopes(point.state, 100.0), strict=True):
-        size = float(np.abs(near.outputs[at] * ticks.sizes).max())
+        size = float(np.abs(near.outputs[column] * ticks.sizes).max())
         if size > 0.0:
-            worst = max(worst, float(np.abs((far.outputs[at] - near.outputs[at]) * ticks.sizes).max()) / size)
+            worst = max(worst, float(np.abs((far.outputs[column] - near.outputs[column]) * ticks.sizes).max()) / size)
     return worst if math.isfinite(worst) else math.inf

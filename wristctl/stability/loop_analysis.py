@@ -18,8 +18,8 @@ from wristctl.stability.sampled_loop import Complex, Mode, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading
 
 _DECAYED, _LONGEST, _SAMPLES = 1e-5, 60.0, 20_000
+# Decay [1/s] of what does not end within the longest time [s]: it is left out of how long to look.
 _SLOW = 30.0 * NEUTRAL
-"""Decay [1/s] of what does not end within the longest time [s]: it is left out of how long to look."""
 
 
 @dataclass(frozen=True)
@@ -62,30 +62,30 @@ def step_info(time: Array, angle: Array) -> tuple[float, float, float, float]:
 def _course(loop: SampledLoop, lasts: float) -> tuple[Array, Array]:
     """Every tick, or, where that were too many, every so many cycles; from one to the next they are one map."""
     count, cycle = math.ceil(lasts / loop.period), len(loop.ticks)
-    whole, forced = np.eye(len(loop.ticks[0].into)), np.zeros(len(loop.ticks[0].into))
+    cycle_map, forced = np.eye(len(loop.ticks[0].into)), np.zeros(len(loop.ticks[0].into))
     rows, pushes = [], []
     for tick in loop.ticks:
-        rows.append(tick.outputs["theta"] @ whole)
+        rows.append(tick.outputs["theta"] @ cycle_map)
         pushes.append(tick.outputs["theta"] @ forced)
-        whole, forced = tick.transition @ whole, tick.transition @ forced + tick.reference
+        cycle_map, forced = tick.transition @ cycle_map, tick.transition @ forced + tick.reference
     stride = max(1, count // (_SAMPLES * cycle))
     if stride > 1:
         rows, pushes = rows[:1], pushes[:1]
-        one, push = whole, forced
+        one, push = cycle_map, forced
         for _ in range(stride - 1):
-            whole, forced = one @ whole, one @ forced + push
-    state, found = np.zeros(len(forced)), []
+            cycle_map, forced = one @ cycle_map, one @ forced + push
+    state, angles = np.zeros(len(forced)), []
     for _ in range(math.ceil(count / (cycle * stride)) + 1):
-        found.append(np.array(rows) @ state + pushes)
-        state = whole @ state + forced
-    angle = np.concatenate(found)
-    each = loop.period * (cycle * stride if stride > 1 else 1)
-    return each * np.arange(len(angle), dtype=np.float64), angle
+        angles.append(np.array(rows) @ state + pushes)
+        state = cycle_map @ state + forced
+    angle = np.concatenate(angles)
+    interval = loop.period * (cycle * stride if stride > 1 else 1)
+    return interval * np.arange(len(angle), dtype=np.float64), angle
 
 
 _POINTS, _HALVINGS = 41, 12
+# The closed loop with a gain times a factor; None where it rests nowhere near.
 At = Callable[[float], SampledLoop | None]
-"""The closed loop with a gain times a factor; None where it rests nowhere near."""
 
 
 @dataclass(frozen=True)
@@ -104,35 +104,37 @@ class RootLocus:
     swings: tuple[float, float]
 
 
-def root_locus(over: str, at: At, span: float) -> RootLocus:
-    """The locus from 1/span to span times the gain, of the loop that `at` gives."""
+def root_locus(over: str, closed: At, span: float) -> RootLocus:
+    """The locus from 1/span to span times the gain, of the loop that `closed` gives."""
     factors = np.geomspace(1.0 / span, span, _POINTS)
-    modes = [_modes(at, float(each)) for each in factors]
-    poles = [np.array([(mode.growth, mode.frequency) for mode in each]).reshape(-1, 2) for each in modes]
-    stable = [bool(each) and each[0].growth < NEUTRAL for each in modes]
+    modes = [_modes(closed, float(factor)) for factor in factors]
+    poles = [np.array([(mode.growth, mode.frequency) for mode in swings]).reshape(-1, 2) for swings in modes]
+    stable = [bool(swings) and swings[0].growth < NEUTRAL for swings in modes]
     middle = _POINTS // 2
     if not stable[middle]:
         return RootLocus(over, factors, poles, math.nan, math.nan, (math.nan, math.nan))
     low = next((k for k in range(middle, -1, -1) if not stable[k]), None)
     high = next((k for k in range(middle, _POINTS) if not stable[k]), None)
-    least, slow = (0.0, math.nan) if low is None else _limit(at, float(factors[low + 1]), float(factors[low]))
-    most, fast = (math.inf, math.nan) if high is None else _limit(at, float(factors[high - 1]), float(factors[high]))
+    least, slow = (0.0, math.nan) if low is None else _limit(closed, float(factors[low + 1]), float(factors[low]))
+    most, fast = (
+        (math.inf, math.nan) if high is None else _limit(closed, float(factors[high - 1]), float(factors[high]))
+    )
     return RootLocus(over, factors, poles, least, most, (slow, fast))
 
 
-def _modes(at: At, factor: float) -> list[Mode]:
-    loop = at(factor)
+def _modes(closed: At, factor: float) -> list[Mode]:
+    loop = closed(factor)
     return [] if loop is None else loop.modes()
 
 
-def _limit(at: At, good: float, bad: float) -> tuple[float, float]:
+def _limit(closed: At, good: float, bad: float) -> tuple[float, float]:
     """The limit between a factor with which it is stable and one with which it is not, and its swing there [Hz]."""
     for _ in range(_HALVINGS):
         middle = math.sqrt(good * bad)
-        modes = _modes(at, middle)
+        modes = _modes(closed, middle)
         good, bad = (middle, bad) if modes and modes[0].growth < NEUTRAL else (good, middle)
-    found = _modes(at, bad)
-    return good, found[0].frequency if found else math.nan
+    modes_beyond = _modes(closed, bad)
+    return good, modes_beyond[0].frequency if modes_beyond else math.nan
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class AnalysedRow:
-    """What is analysed: a law with its gains, by name, in a loop of a wrist, its tendons' friction taken so."""
+    """Subject of an analysis: a law with its gains, by name, in a loop of a wrist, with one reading of friction."""
 
     law: Controller
     gains: dict[str, float]
@@ -178,13 +180,13 @@ class AnalysedRow:
             linear = self.linear(theta)
             if linear is None:
                 return None
-            found, omega = margins(linear.closed), frequencies(linear.closed)
-            factor = found.most.value if found.stable and np.isfinite(found.most.value) else 1.0
-            swings = [each for each in linear.closed.modes(factor) if each.frequency > 0.0]
+            loop_margins, omega = margins(linear.closed), frequencies(linear.closed)
+            factor = loop_margins.most.value if loop_margins.stable and np.isfinite(loop_margins.most.value) else 1.0
+            swings = [mode for mode in linear.closed.modes(factor) if mode.frequency > 0.0]
             swing = Swing(linear, swings[0] if swings else None, factor)
             limits = linearity_limits(swing, self.loop, self.wrist, self.friction, self.law.surface, self.gains)
             response, plant = linear.closed.response(omega), linear.plant.response(omega)
-            return LoopAnalysis(linear, found, step_response(linear.closed), limits, omega, response, plant)
+            return LoopAnalysis(linear, loop_margins, step_response(linear.closed), limits, omega, response, plant)
 
     def locus(self, theta: float, over: str, span: float) -> RootLocus:
         """The root locus about theta [rad] over a gain of the law, or, where that is `loop`, over the loop's own."""

@@ -26,8 +26,8 @@ from wristctl.stability.smooth_loop import cycle_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.tendon_mechanics import OF_A_TENDON, PATH, PulledTendons, RealTendons
 
+# Typical sizes [rad, rad/s, N, m], by which small changes are measured.
 _ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
-"""Typical sizes [rad, rad/s, N, m], by which small changes are measured."""
 
 
 class StatePart(NamedTuple):
@@ -40,7 +40,7 @@ class StatePart(NamedTuple):
 
 
 class Remembered(NamedTuple):
-    """How far back a loop remembers: ticks of what its motors delivered, and frames under way."""
+    """Length of a loop's memory: ticks of its motors' delivered lengths, and frames under way."""
 
     ticks: int
     frames: int
@@ -59,10 +59,10 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
     if not isinstance(drive, IdealDrive):
         yield StatePart("motor", state.motors, np.array([0, 2]), np.full(2, size))
     if isinstance(state.tendons, RealTendons):
-        rows, own = state.tendons.state, len(OF_A_TENDON)
-        count = (rows.shape[1] - PATH - k) // own
+        rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
+        count = (rows.shape[1] - PATH - k) // per_tendon
         yield StatePart("path", rows, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
-        bristles = PATH + own * np.arange(count)
+        bristles = PATH + per_tendon * np.arange(count)
         yield StatePart("bristle", rows, bristles, np.ones(count))
         yield StatePart("tendon creep", rows, bristles + 1, np.full(count, _LENGTH))
     if isinstance(state.tendons, (PulledTendons, RealTendons)):
@@ -82,17 +82,17 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
 
 def read_state(parts: Iterator[StatePart], count: int) -> Array:
     """The state of each rollout, (count, variables)."""
-    found = [to_rows(np.ascontiguousarray(_flat(each)[:, each.rows]), count) for each in parts if len(each.rows)]
-    return np.concatenate(found, axis=1)
+    columns = [to_rows(np.ascontiguousarray(_flat(part)[:, part.rows]), count) for part in parts if len(part.rows)]
+    return np.concatenate(columns, axis=1)
 
 
 def write_state(parts: Iterator[StatePart], states: Array) -> None:
     """Put the states (count, variables) where they stand."""
-    at = 0
-    for each in parts:
-        if len(each.rows):
-            _flat(each)[:, each.rows] = to_blocks(states[:, at : at + len(each.rows)])
-            at += len(each.rows)
+    column = 0
+    for part in parts:
+        if len(part.rows):
+            _flat(part)[:, part.rows] = to_blocks(states[:, column : column + len(part.rows)])
+            column += len(part.rows)
 
 
 def _flat(part: StatePart) -> Array:
@@ -100,18 +100,18 @@ def _flat(part: StatePart) -> Array:
     return part.array.reshape(len(part.array), -1, part.array.shape[-1])
 
 
+# Difference quotients are over so many times a variable's typical size, to both sides; the smaller with bristles, which
+# turn round within 20 um.
 SMALL, SMALLER = 1e-6, 1e-8
-"""Difference quotients are over so many times a variable's typical size, to both sides; the smaller with bristles,
-which turn round within 20 um."""
+# Ticks before the first guess of a resting point.
 _WARM_UP = 200
-"""Ticks before the first guess of a resting point."""
+# Ticks that an observer may look back: each is two variables more.
 _LONGEST_MEMORY = 200
-"""Ticks that an observer may look back: each is two variables more."""
 
 
 _ALIVE = SUMS.index("alive")
+# Inputs by which a tick is differentiated beside its state, in the order of their lanes.
 _OTHERS = ("by_frame", "by_gain", "by_reference")
-"""What a tick is differentiated by beside its state, in the order of their lanes."""
 
 
 class TickSlopes(NamedTuple):
@@ -126,14 +126,14 @@ class TickSlopes(NamedTuple):
     transition: Array
     """(x, x)"""
     outputs: Array
-    """Of what is recorded, (columns, x)."""
+    """Derivative of the recorded values by the state, (columns, x)."""
     seen: bool
     by_frame: Array
-    """Of the next state by an angle added to the frame, (x,)."""
+    """Derivative of the next state by an angle added to the frame, (x,)."""
     by_gain: Array
-    """By the law's first gain, (x,)."""
+    """Derivative of the next state by the law's first gain, (x,)."""
     by_reference: Array
-    """By the reference angle, (x,)."""
+    """Derivative of the next state by the reference angle, (x,)."""
 
 
 def looks_back(loop: Loop) -> tuple[int, Remembered]:
@@ -148,12 +148,12 @@ def looks_back(loop: Loop) -> tuple[int, Remembered]:
     early = cycle * (2 + math.ceil(2.0 * late / cycle))
     frames = schedule(sensor, period, (early + 2 * cycle) * period, loop.sensor)
     ticks = np.arange(early, early + cycle)
-    taken, arrived = (np.searchsorted(each, ticks) for each in (frames.captures, frames.arrivals))
+    taken, arrived = (np.searchsorted(grid, ticks) for grid in (frames.captures, frames.arrivals))
     back = int((ticks - frames.dated[arrived - 1]).max())
     if back > _LONGEST_MEMORY:
-        what = f"the observer looks back over {back} control periods, more than {_LONGEST_MEMORY} can be analysed"
+        problem = f"the observer looks back over {back} control periods, more than {_LONGEST_MEMORY} can be analysed"
         shortest = 1e3 * period * back / _LONGEST_MEMORY
-        raise UserError(what, "loop.control_period", f"at least {shortest:.2g} ms behind this camera")
+        raise UserError(problem, "loop.control_period", f"at least {shortest:.2g} ms behind this camera")
     return early, Remembered(back, int((taken - arrived).max()))
 
 
@@ -176,8 +176,8 @@ class LoopTicks:
         self._first = self._early + self.cycle * math.ceil(_WARM_UP / self.cycle)
         self._make(2)
         parts = list(self._parts(0))
-        self.sizes = np.concatenate([each.sizes for each in parts])
-        self.names = [each.name for each in parts for _ in each.rows]
+        self.sizes = np.concatenate([part.sizes for part in parts])
+        self.names = [part.name for part in parts for _ in part.rows]
         self._make(2 * (len(self.sizes) + len(_OTHERS)) + 1)
 
     def guesses(self) -> list[Array]:
@@ -191,20 +191,20 @@ class LoopTicks:
         return states
 
     def slopes(self, state: Array, times: float = 1.0) -> list[TickSlopes]:
-        """Each tick of a cycle, taken from the same state (x,), differentiated over so many times a small change.
+        """Differentiate the ticks of a cycle from one state (x,), over `times` a small change.
 
         Ticks at which no frame is taken or arrives are all the same one.
         """
         between = None
         small = times * (SMALLER if "bristle" in self.names else SMALL)
-        found = []
+        cycle = []
         for tick in range(self._first, self._first + self.cycle):
             frames = self._frames()
             plain = tick not in frames.captures and tick not in frames.arrivals
-            each = between if plain and between is not None else self._tick(tick, state, small)
-            between = each if plain else between
-            found.append(each)
-        return found
+            slopes = between if plain and between is not None else self._tick(tick, state, small)
+            between = slopes if plain else between
+            cycle.append(slopes)
+        return cycle
 
     def _tick(self, tick: int, state: Array, small: float) -> TickSlopes:
         n, changes = len(state), small * self.sizes
@@ -213,15 +213,15 @@ class LoopTicks:
         states[np.arange(1, 2 * n, 2), np.arange(n)] -= changes
         self._count_to(tick)
         write_state(self._parts(tick), states)
-        seen = self._shift_frame(tick, 2 * n)
+        frame_taken = self._shift_frame(tick, 2 * n)
         self._batch.state.sums[:, _ALIVE] = 1.0
         self._run(tick, tick + 1)
         after, recorded = self._states(tick + 1), to_rows(self._batch.state.record[:, tick], self._count)
         after[to_rows(self._batch.state.sums, self._count)[:, _ALIVE] <= 0.0] = math.nan
         steps = np.append(changes, [SMALL, self._gain_step(), SMALL])[:, None]
-        by, outputs = ((each[:-1:2] - each[1:-1:2]) / (2.0 * steps) for each in (after, recorded))
-        others = dict(zip(_OTHERS, by[n:], strict=True))
-        return TickSlopes(after[-1], recorded[-1], by[:n].T, outputs[:n].T, seen=seen, **others)
+        by, outputs = ((values[:-1:2] - values[1:-1:2]) / (2.0 * steps) for values in (after, recorded))
+        input_slopes = dict(zip(_OTHERS, by[n:], strict=True))
+        return TickSlopes(after[-1], recorded[-1], by[:n].T, outputs[:n].T, seen=frame_taken, **input_slopes)
 
     def _shift_frame(self, tick: int, lane: int) -> bool:
         """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
@@ -249,19 +249,19 @@ class LoopTicks:
             gains[-5:-3, :1] += self._gain_step() * np.array([[1.0], [-1.0]])
         k = self._model.coordinates(self._world.loop.plant_segments)
         lanes = Lanes(which, np.zeros(count, np.int64), [(0,)] * count)
-        made = batch(
+        lanes_batch = batch(
             self._law, gains, motions, [self._world], lanes, self._model,
             lambda plant: np.full(k, self._theta / k), len(RECORDED) + k,
         )  # fmt: skip
-        self._count, self._batch = count, made._replace(setup=made.setup._replace(ticks=1))
-        self._scratch = made.scratch()
+        self._count, self._batch = count, lanes_batch._replace(setup=lanes_batch.setup._replace(ticks=1))
+        self._scratch = lanes_batch.scratch()
 
     def _frames(self) -> Schedule:
         """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
         never = np.zeros((1, 0, 1), np.int64), *np.zeros((2, 1, 1), np.int64)
         schedule = self._batch.world.schedule
         schedule = schedule if isinstance(schedule, Schedule) else Schedule(*never)
-        return Schedule(*(each[0, ..., 0] for each in schedule))
+        return Schedule(*(ticks[0, ..., 0] for ticks in schedule))
 
     def _parts(self, tick: int) -> Iterator[StatePart]:
         return state_parts(self._batch, self._law.memory, tick, self._back)
@@ -273,13 +273,13 @@ class LoopTicks:
         """Set the camera's counters to what they are before a tick."""
         watch, frames = self._batch.state.watch, self._frames()
         if isinstance(watch, Watch):
-            taken, arrived = (int(np.searchsorted(each, tick)) for each in (frames.captures, frames.arrivals))
+            taken, arrived = (int(np.searchsorted(grid, tick)) for grid in (frames.captures, frames.arrivals))
             watch.turn[:, 0], watch.turn[:, 1] = taken, arrived
             watch.observer.at[:] = frames.dated[arrived - 1]
 
     def _run(self, begin: int, end: int) -> None:
-        own = self._batch
-        self._kernel(own.setup, own.course, own.world, own.state, self._scratch, Span(0, own.blocks, begin, end))
+        lot = self._batch
+        self._kernel(lot.setup, lot.course, lot.world, lot.state, self._scratch, Span(0, lot.blocks, begin, end))
 
 
 def _at_rest(theta: float, samples: int, period: float) -> Motion:

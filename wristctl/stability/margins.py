@@ -1,4 +1,4 @@
-"""How much more, or less, gain and how much more delay a linear loop bears, and how much it amplifies.
+"""Gain, delay and phase margins of a linear loop, and its peaks of sensitivity.
 
 Margins where the loop's transfer crosses the real axis and the unit circle (Astrom and Murray 2008, section 9.3),
 each tried by counting the closed loop's unstable poles on both sides of it: a crossing need not be a stability limit,
@@ -28,34 +28,34 @@ class PoleCount:
         self._loop = loop
         self._radius = max(math.exp(neutral * loop.lasts), 1.0 + _ROUNDING)
         closed = loop.multipliers()
-        self._own = int(np.sum(np.abs(closed) > self._radius))
+        self._poles_beyond = int(np.sum(np.abs(closed) > self._radius))
         self._z = self._radius * np.exp(1j * self._angles(np.concatenate([closed, loop.multipliers(0.0)])))
         self._back = loop.returned(self._z)
         self._turns = self._winding(1.0, 0.0)
 
     def unstable(self, factor: float, delay: float = 0.0) -> int:
-        """How many there are with the loop's gain times a factor and so much more delay [s]."""
-        return self._own + self._turns - self._winding(factor, delay)
+        """Count the unstable poles with the loop's gain times a factor and an added delay [s]."""
+        return self._poles_beyond + self._turns - self._winding(factor, delay)
 
     def _winding(self, factor: float, delay: float) -> int:
-        """How often the determinant goes round 0, which half a circle tells, since the other is its mirror image."""
+        """Winding number of the determinant about 0, from half the circle: the other half is its mirror image."""
         back = self._back[:, self._loop.cuts] if delay == 0.0 else self._late(delay)
-        whole = np.linalg.det(np.eye(back.shape[-1]) - factor * back)
-        return round(float(np.sum(np.angle(whole[1:] / whole[:-1]))) / math.pi)
+        determinants = np.linalg.det(np.eye(back.shape[-1]) - factor * back)
+        return round(float(np.sum(np.angle(determinants[1:] / determinants[:-1]))) / math.pi)
 
     def _late(self, delay: float) -> Complex:
-        """What comes back at the cuts later by a delay [s], on the straight line between two ticks."""
+        """Delay the signals that return at the cuts by a time [s], linearly between two ticks."""
         count, ticks = len(self._loop.ticks), delay / self._loop.period
-        whole = math.floor(ticks)
-        found = np.zeros((len(self._z), len(self._loop.cuts), len(self._loop.cuts)), complex)
+        whole_ticks = math.floor(ticks)
+        delayed = np.zeros((len(self._z), len(self._loop.cuts), len(self._loop.cuts)), complex)
         for row, cut in enumerate(self._loop.cuts):
-            for back, share in ((whole, 1.0 + whole - ticks), (whole + 1, ticks - whole)):
-                cycles, at = divmod(cut - back, count)
-                found[:, row] += share * (self._z**cycles)[:, None] * self._back[:, at]
-        return found
+            for back, share in ((whole_ticks, 1.0 + whole_ticks - ticks), (whole_ticks + 1, ticks - whole_ticks)):
+                cycles, tick = divmod(cut - back, count)
+                delayed[:, row] += share * (self._z**cycles)[:, None] * self._back[:, tick]
+        return delayed
 
     def _angles(self, poles: Complex) -> Array:
-        """Of z on the upper half of its circle, closer together near the poles."""
+        """Angles of z on the upper half of its circle, denser near the poles."""
         angles, damping = np.abs(np.angle(poles)), np.abs(np.abs(poles) - self._radius)
         angles, damping = angles[damping < _NEAR * angles], damping[damping < _NEAR * angles]
         close = [np.abs(angles + side * width * damping) for width in _CLOSE_TURNS for side in (-1.0, 1.0)]
@@ -64,15 +64,15 @@ class PoleCount:
         return np.asarray(every[every <= math.pi])
 
 
+# Largest rounding error of a pole on the unit circle.
 _ROUNDING = 1e-7
-"""By how much a pole on the unit circle may be off it."""
 
 
+# Growth [1/s] below which a mode stays as it is: an integrator that nothing drives, a slow leak.
 NEUTRAL = 1e-3
-"""Growth [1/s] below which a mode stays as it is: an integrator that nothing drives, a slow leak."""
 _LEAST_OMEGA, _PER_DECADE = 1e-2, 120
+# Damping of poles near which a response is looked at too, and at which distances from their frequency, in it.
 _LIGHT, _CLOSE = 0.1, (0.0, 0.1, 0.3, 1.0, 3.0)
-"""Damping of poles near which a response is looked at too, and at which distances from their frequency, in it."""
 
 
 class Crossing(NamedTuple):
@@ -83,19 +83,19 @@ class Crossing(NamedTuple):
 
     @property
     def delay(self) -> float:
-        """Of a phase margin, the delay [s] that takes it up."""
+        """Delay [s] that takes up a phase margin."""
         return (self.value % (2.0 * math.pi)) / self.omega
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Of a loop as it is where `stable`; else where it would be stable, if anywhere, and no delay."""
+    """Margins of a loop: about its own gain where it is `stable`, else the gains that make it so, and no delay."""
 
     stable: bool
     growth: float
-    """Of the least stable mode [1/s]."""
+    """Growth of the least stable mode [1/s]."""
     least: Crossing
-    """Of the factors of the loop's gain in which it is stable; a factor 0 where none is too small, nan where none is
+    """Least factor of the gain with which the loop is stable; 0 where none is too small, nan where none is
     right. At this limit it swings at `omega`."""
     most: Crossing
     """inf: none is too large."""
@@ -113,14 +113,14 @@ class Margins:
 
 
 def frequencies(loop: SampledLoop) -> Array:
-    """Where to look at a loop [rad/s], up to half its sampling rate: evenly by decades, and closely about its poles."""
+    """Frequencies [rad/s] to evaluate a loop at, to half its sampling rate: even by decades, dense near its poles."""
     most = half_rate(loop)
     count = max(2, round(_PER_DECADE * math.log10(most / _LEAST_OMEGA)))
-    found = [np.geomspace(min(_LEAST_OMEGA, 0.1 * most), most, count)]
+    grids = [np.geomspace(min(_LEAST_OMEGA, 0.1 * most), most, count)]
     for pole in swinging(loop):
-        found.append(abs(pole.imag) + np.outer((-1.0, 1.0), _CLOSE).ravel() * abs(pole.real))
-    every = np.unique(np.concatenate(found))
-    return np.asarray(every[(every >= found[0][0]) & (every <= most)])
+        grids.append(abs(pole.imag) + np.outer((-1.0, 1.0), _CLOSE).ravel() * abs(pole.real))
+    every = np.unique(np.concatenate(grids))
+    return np.asarray(every[(every >= grids[0][0]) & (every <= most)])
 
 
 def swinging(loop: SampledLoop) -> Complex:
@@ -144,43 +144,45 @@ def margins(loop: SampledLoop) -> Margins:
     gains, phases = crossings(loop, omega, response)
     poles = PoleCount(loop, NEUTRAL)
     stable = poles.unstable(1.0) == 0
-    least, most = _stable_gains(loop, poles, [each for each in phases if each.value > 0.0], stable)
-    delay, at = (math.nan, math.nan) if not stable else _delay(loop, poles, gains)
+    least, most = _stable_gains(loop, poles, [crossing for crossing in phases if crossing.value > 0.0], stable)
+    delay, delay_omega = (math.nan, math.nan) if not stable else _delay(loop, poles, gains)
     amplified = np.abs(1.0 / (1.0 + response))
     carried = np.abs(response) * amplified
-    smallest = min(gains, key=lambda each: abs(each.value), default=Crossing(math.nan, math.inf))
+    smallest = min(gains, key=lambda crossing: abs(crossing.value), default=Crossing(math.nan, math.inf))
     return Margins(
-        stable, loop.growth(), least, most, delay, at, smallest, gains, phases,
-        *(_peak(loop, omega, each, of) for each, of in ((amplified, _amplified), (carried, _carried))),
+        stable, loop.growth(), least, most, delay, delay_omega, smallest, gains, phases,
+        *(_peak(loop, omega, values, of) for values, of in ((amplified, _amplified), (carried, _carried))),
     )  # fmt: skip
 
 
 def crossings(loop: SampledLoop, omega: Array, response: Complex) -> tuple[list[Crossing], list[Crossing]]:
-    """Where |L| is 1, with phase margins in (-pi, pi], and where L is real and negative, with the gain's factor there.
+    """Crossings of a transfer L: of gain 1, with phase margins in (-pi, pi], and of phase -180 deg, with gain factors.
 
     At frequency 0, and at half the sampling rate of a loop of one rate, L is real: there the loop runs away, or turns
     with every sample. Where an integrator holds it at frequency 0, it cannot run away.
     """
     gains = [
-        Crossing(at, float(np.angle(-_at(loop, at))))
-        for at in _zeros(omega, np.log(np.abs(response) + 1e-300), lambda at: math.log(abs(_at(loop, at)) + 1e-300))
+        Crossing(frequency, float(np.angle(-_transfer(loop, frequency))))
+        for frequency in _zeros(
+            omega, np.log(np.abs(response) + 1e-300), lambda omega: math.log(abs(_transfer(loop, omega)) + 1e-300)
+        )
     ]
     end = len(omega) - 1  # at half the rate rounding decides the sign of what is 0
-    turns = _zeros(omega[:end], response.imag[:end], lambda at: _at(loop, at).imag)
+    turns = _zeros(omega[:end], response.imag[:end], lambda frequency: _transfer(loop, frequency).imag)
     turns += omega[end:].tolist()
-    values = [(at, _at(loop, at).real) for at in turns]
-    still = _at(loop, _STILL * float(omega[0]))
+    values = [(frequency, _transfer(loop, frequency).real) for frequency in turns]
+    still = _transfer(loop, _STILL * float(omega[0]))
     if abs(still.imag) < _STILL * abs(still.real) < 1.0:
         values.append((0.0, still.real))
-    return gains, [Crossing(at, -1.0 / value) for at, value in values if value < -_NOTHING]
+    return gains, [Crossing(frequency, -1.0 / value) for frequency, value in values if value < -_NOTHING]
 
 
 _STILL = 1e-3
+# Size of a transfer below which the loop counts as open.
 _NOTHING = 1e-9
-"""Of a transfer, below which nothing comes back."""
 
 
-def _at(loop: SampledLoop, omega: float) -> complex:
+def _transfer(loop: SampledLoop, omega: float) -> complex:
     return complex(loop.response(np.array([omega]))[0])
 
 
@@ -193,11 +195,11 @@ def _carried(response: complex) -> float:
 
 
 def _zeros(omega: Array, values: Array, function: Callable[[float], float]) -> list[float]:
-    """Where values over omega change their sign, found as closely as numbers allow."""
-    found = []
+    """Roots of a function between the frequencies at which its values change their sign."""
+    roots = []
     for k in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-        found.append(float(brentq(function, omega[k], omega[k + 1], xtol=1e-15 * omega[k + 1], rtol=1e-14)))
-    return found
+        roots.append(float(brentq(function, omega[k], omega[k + 1], xtol=1e-15 * omega[k + 1], rtol=1e-14)))
+    return roots
 
 
 def _peak(loop: SampledLoop, omega: Array, values: Array, of: Callable[[complex], float]) -> Crossing:
@@ -206,12 +208,12 @@ def _peak(loop: SampledLoop, omega: Array, values: Array, of: Callable[[complex]
     low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
     for _ in range(_SECTIONS):
         inner = low + _GOLDEN * (high - low), high - _GOLDEN * (high - low)
-        if of(_at(loop, inner[0])) > of(_at(loop, inner[1])):
+        if of(_transfer(loop, inner[0])) > of(_transfer(loop, inner[1])):
             high = inner[1]
         else:
             low = inner[0]
     middle = 0.5 * (low + high)
-    return Crossing(float(middle), max(float(values[k]), of(_at(loop, middle))))
+    return Crossing(float(middle), max(float(values[k]), of(_transfer(loop, middle))))
 
 
 _GOLDEN, _SECTIONS = 0.381966, 40
@@ -221,7 +223,7 @@ def _stable_gains(
     loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing], stable: bool
 ) -> tuple[Crossing, Crossing]:
     """The factors between which the loop is stable: about 1, or, where it is not stable there, the nearest to it."""
-    tried = _tried([each.value for each in crossed], *_FACTORS)
+    tried = _tried([crossing.value for crossing in crossed], *_FACTORS)
     good = [factor for factor in tried if poles.unstable(factor) == 0]
     if not stable and not good:
         return Crossing(math.nan, math.nan), Crossing(math.nan, math.nan)
@@ -234,10 +236,10 @@ def _stable_gains(
 
 
 def _gain_limit(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing], good: float, bad: float) -> Crossing:
-    """Where it turns unstable between these factors: at a crossing, or, of a loop of several rates, close to one."""
-    limit = math.exp(_halved(lambda at: poles.unstable(math.exp(at)) == 0, math.log(good), math.log(bad)))
+    """Stability limit between two factors: a crossing, or a factor close to one in a loop of several rates."""
+    limit = math.exp(_halved(lambda log: poles.unstable(math.exp(log)) == 0, math.log(good), math.log(bad)))
     if loop.is_steady and crossed:
-        return min(crossed, key=lambda each: abs(math.log(each.value / limit)))
+        return min(crossed, key=lambda crossing: abs(math.log(crossing.value / limit)))
     return Crossing(2.0 * math.pi * loop.modes(limit)[0].frequency, limit)
 
 
@@ -246,33 +248,33 @@ def _delay(loop: SampledLoop, poles: PoleCount, crossed: Sequence[Crossing]) -> 
 
     A crossing of a loop of one rate counts where one of the two whole ticks that follow makes it unstable.
     """
-    at = sorted(crossed, key=lambda each: each.delay)
+    by_delay = sorted(crossed, key=lambda crossing: crossing.delay)
     if loop.is_steady:
-        for each in at:
-            whole = math.ceil(each.delay / loop.period)
-            if any(poles.unstable(1.0, loop.period * ticks) for ticks in (whole, whole + 1)):
-                return each.delay, each.omega
+        for crossing in by_delay:
+            whole_ticks = math.ceil(crossing.delay / loop.period)
+            if any(poles.unstable(1.0, loop.period * ticks) for ticks in (whole_ticks, whole_ticks + 1)):
+                return crossing.delay, crossing.omega
         return math.inf, math.nan
     good = 0.0
-    for tried in _tried([each.delay for each in at], *_DELAYS):
+    for tried in _tried([crossing.delay for crossing in by_delay], *_DELAYS):
         if poles.unstable(1.0, tried) > 0:
             limit = _halved(lambda delay: poles.unstable(1.0, delay) == 0, good, tried)
-            nearest = min(at, key=lambda each: abs(each.delay - limit), default=Crossing(math.nan, math.nan))
+            nearest = min(by_delay, key=lambda edge: abs(edge.delay - limit), default=Crossing(math.nan, math.nan))
             return limit, nearest.omega
         good = tried
     return math.inf, math.nan
 
 
+# Factors of the gain, and delays [s], that are tried besides those between crossings: least, most, how many.
 _FACTORS, _DELAYS = (1e-3, 1e3, 61), (1e-3, 1.0, 31)
-"""Factors of the gain, and delays [s], that are tried besides those between crossings: least, most, how many."""
 _EXACT = 1e-7
 
 
 def _tried(edges: Sequence[float], least: float, most: float, count: int) -> list[float]:
     """Values between all edges and beyond them, and others of a grid."""
-    at = sorted(each for each in edges if each > 0.0)
-    between = [math.sqrt(low * high) for low, high in pairwise(at)]
-    ends = [0.5 * at[0], 1.1 * at[-1]] if at else []
+    positive = sorted(edge for edge in edges if edge > 0.0)
+    between = [math.sqrt(low * high) for low, high in pairwise(positive)]
+    ends = [0.5 * positive[0], 1.1 * positive[-1]] if positive else []
     return sorted({*np.geomspace(least, most, count).tolist(), *between, *ends})
 
 

@@ -1,4 +1,4 @@
-"""How the nonlinear loop comes to its sliding surface, from angles to both sides of where it rests."""
+"""Phase portrait: courses of the nonlinear loop to its sliding surface from both sides of its resting angle."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,8 @@ from wristctl.simulation.closed_loop import repeat
 from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import Draws
 
+# The name that the camera's noise goes by.
 SCENARIO = "phase portrait"
-"""The name that the camera's noise goes by."""
 _SHARES = (-1.0, -0.5, 0.5, 1.0)
 _FURTHEST_DEG = 20.0
 
@@ -62,11 +62,11 @@ def phase_portrait(
     followed = motion(goal, wrist, horizon, sample_period(loop.control_period))
     courses = []
     for begin in _begins(theta, math.radians(wrist.range_deg)):
-        (done,) = repeat(
+        (rollout,) = repeat(
             law, np.array([law.values(gains)]), [followed], np.zeros(1, np.int64), loop, wrist, [SCENARIO], draws,
             start=_from(np.full(count, begin / count)),
         )  # fmt: skip
-        course = done.first.trajectory
+        course = rollout.first.trajectory
         courses.append(_approach(law.surface, gains, course.time, course.error, course.rate))
     error, rate, _ = law.surface.weights(gains)
     return PhasePortrait(error / rate, law.surface.layer(gains) / abs(rate), courses)

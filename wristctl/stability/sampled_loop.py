@@ -61,15 +61,15 @@ class SampledLoop:
         return len(self.cuts) == 1
 
     def transitions(self, factor: float = 1.0) -> list[Array]:
-        """Of each tick, with the loop's gain times a factor: 1 is the loop as it is, 0 the open one."""
-        return [each.transition + (factor - 1.0) * each.cut * np.outer(each.into, each.back) for each in self.ticks]
+        """Transition matrices of the ticks with a factor on the gain: 1 is the closed loop, 0 the open one."""
+        return [tick.transition + (factor - 1.0) * tick.cut * np.outer(tick.into, tick.back) for tick in self.ticks]
 
     def multipliers(self, factor: float = 1.0) -> Complex:
-        """What a cycle multiplies the loop's modes by: z at poles, (x,)."""
+        """Multipliers of the loop's modes over a cycle: z at poles, (x,)."""
         return np.asarray(np.linalg.eigvals(_product(self.transitions(factor))), complex)
 
     def growth(self, factor: float = 1.0) -> float:
-        """How fast the least stable mode grows [1/s]."""
+        """Growth rate of the least stable mode [1/s]."""
         return float(np.log(max(np.abs(self.multipliers(factor)).max(), 1e-300)) / self.lasts)
 
     def modes(self, factor: float = 1.0) -> list[Mode]:
@@ -83,40 +83,40 @@ class SampledLoop:
         order = np.argsort(-np.abs(multipliers), kind="stable")
         chosen = [k for k in order if multipliers[k].imag >= 0.0 and abs(multipliers[k]) > least]
         multipliers, course = multipliers[chosen].astype(complex), [states[:, chosen].astype(complex)]
-        for each in ticks:
-            course.append(each @ course[-1].real + 1j * (each @ course[-1].imag))
+        for transition in ticks:
+            course.append(transition @ course[-1].real + 1j * (transition @ course[-1].imag))
         steps = pairwise(course)
         turned = sum(np.angle(np.sum(before.conj() * after, axis=0)) for before, after in steps)
         turned = np.angle(multipliers) + 2.0 * np.pi * np.round((turned - np.angle(multipliers)) / (2.0 * np.pi))
         growth, frequency = np.log(np.abs(multipliers)) / self.lasts, np.abs(turned) / (2.0 * np.pi * self.lasts)
         shapes = np.moveaxis(np.array(course[:-1]), -1, 0)
-        return [Mode(*each) for each in zip(growth.tolist(), frequency.tolist(), shapes, strict=True)]
+        return [Mode(*mode) for mode in zip(growth.tolist(), frequency.tolist(), shapes, strict=True)]
 
     def returned(self, z: Complex) -> Complex:
-        """What comes back over the cut at each tick where z^(cycles) goes out at one of them, (n, ticks, cuts).
+        """Signals that return over the cut at the ticks where z^(cycles) is sent at one of them, (n, ticks, cuts).
 
         The loop is open: nothing that comes back goes out again.
         """
-        triangle, own, forced, direct = self._opened
-        found = np.empty((len(z), len(self.ticks), len(self.cuts)), complex)
-        for k, each in enumerate(np.asarray(z, complex)):
-            start = scipy.linalg.solve_triangular(each * np.eye(len(triangle)) - triangle, forced)
-            found[k] = own @ start + direct
-        return found
+        triangle, rows, forced, direct = self._opened
+        returns = np.empty((len(z), len(self.ticks), len(self.cuts)), complex)
+        for k, point in enumerate(np.asarray(z, complex)):
+            start = scipy.linalg.solve_triangular(point * np.eye(len(triangle)) - triangle, forced)
+            returns[k] = rows @ start + direct
+        return returns
 
     @cached_property
     def _opened(self) -> tuple[Complex, Complex, Complex, Array]:
         """A Schur form of the open loop's cycle; in its coordinates what is seen at each tick and what goes in."""
         x, cuts = len(self.ticks[0].into), self.cuts
         far, forced = np.eye(x), np.zeros((x, len(cuts)))
-        seen, direct = np.empty((len(self.ticks), x)), np.zeros((len(self.ticks), len(cuts)))
+        outputs, direct = np.empty((len(self.ticks), x)), np.zeros((len(self.ticks), len(cuts)))
         for k, (tick, transition) in enumerate(zip(self.ticks, self.transitions(0.0), strict=True)):
-            seen[k], direct[k] = tick.back @ far, tick.back @ forced
+            outputs[k], direct[k] = tick.back @ far, tick.back @ forced
             far, forced = transition @ far, transition @ forced
             if tick.cut:
                 forced[:, cuts.index(k)] += tick.into
         triangle, turn = scipy.linalg.schur(far, output="complex")
-        return triangle, seen @ turn, turn.conj().T @ forced, direct
+        return triangle, outputs @ turn, turn.conj().T @ forced, direct
 
     def response(self, omega: Array) -> Complex:
         """The loop's transfer L at frequencies [rad/s], (n,), positive where it is fed back negatively.
@@ -126,21 +126,21 @@ class SampledLoop:
         turn this one (a Schur complement of the harmonic transfer function, Wereley 1991).
         """
         omega = np.atleast_1d(omega)
-        at = np.array(self.cuts)
-        back = self.returned(np.exp(1j * omega * self.lasts))[:, at]
+        cuts = np.array(self.cuts)
+        back = self.returned(np.exp(1j * omega * self.lasts))[:, cuts]
         if self.is_steady:
             return np.asarray(-back[:, 0, 0])
-        sent = np.exp(1j * np.outer(omega * self.period, at))
-        amplified = np.linalg.solve(np.eye(len(at)) - back, sent[:, :, None])[:, :, 0]
+        sent = np.exp(1j * np.outer(omega * self.period, cuts))
+        amplified = np.linalg.solve(np.eye(len(cuts)) - back, sent[:, :, None])[:, :, 0]
         return np.asarray(1.0 / np.mean(sent.conj() * amplified, axis=1) - 1.0)
 
 
+# Decay of a forgotten mode in one tick, as an exponent.
 _FORGOTTEN = 12.0
-"""Of a mode in one tick, as an exponent."""
 
 
 def _product(transitions: Sequence[Array]) -> Array:
-    whole = np.eye(len(transitions[0]))
-    for each in transitions:
-        whole = each @ whole
-    return whole
+    product = np.eye(len(transitions[0]))
+    for transition in transitions:
+        product = transition @ product
+    return product

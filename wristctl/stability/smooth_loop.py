@@ -9,12 +9,12 @@ from wristctl.config.plant import Actuator, Disturbances, Sensor
 
 FrictionReading = Literal["slipping", "stuck"]
 
+# Microsteps of a microstep: a length has no step that a difference quotient could see.
 _FINER = 10**12
-"""Microsteps of a microstep: a length has no step that a difference quotient could see."""
+# A stepper's profile bends with its distance over a h^2; without end to its acceleration it is a line of slope 1/h.
 _FASTER = 1e4
-"""A stepper's profile bends with its distance over a h^2; without end to its acceleration it is a line of slope 1/h."""
+# Control periods after which frames fall on ticks as they did before, at most (or four frames, where that is more).
 _LONGEST_CYCLE = 40
-"""Control periods after which frames fall on ticks as they did before, at most (or four frames, where that is more)."""
 
 
 def smooth(loop: Loop, friction: FrictionReading) -> Loop:
@@ -29,10 +29,10 @@ def smooth(loop: Loop, friction: FrictionReading) -> Loop:
     events = {"broken_at": None, "slips_at": None, "torque": None}
     if friction == "slipping":
         actuator, facts = actuator.model_copy(update={"friction": 0.0}), facts | {"friction": None}
-    seen = loop.plant.sensor.model_copy(update={"noise_deg": None, "dropped": None, "burst": 1.0})
+    sensor = loop.plant.sensor.model_copy(update={"noise_deg": None, "dropped": None, "burst": 1.0})
     world = {
         "actuator": loop.plant.actuator.model_copy(update=facts | events),
-        "sensor": seen,
+        "sensor": sensor,
         "end_stop_deg": None,
         "stiffness_spread": 0.0,
         "damping_spread": 0.0,
@@ -52,9 +52,9 @@ def cycle_of(loop: Loop) -> tuple[int, int]:
     """Control periods after which the loop repeats, and frames within: (1, 0) where sensors are ideal."""
     if loop.sensor.level == "ideal":
         return 1, 0
-    each = _frames_per_tick(loop.sensor, loop.control_period)
-    twice = 1 + (each.numerator % 2 == 0)  # a frame midway between two ticks goes to the even one
-    return twice * each.denominator, twice * each.numerator
+    frames = _frames_per_tick(loop.sensor, loop.control_period)
+    twice = 1 + (frames.numerator % 2 == 0)  # a frame midway between two ticks goes to the even one
+    return twice * frames.denominator, twice * frames.numerator
 
 
 def _steady(actuator: Actuator) -> Actuator:
@@ -67,8 +67,8 @@ def _steady(actuator: Actuator) -> Actuator:
 
 
 def _frames_per_tick(sensor: Sensor, period: float) -> Fraction:
-    each = sensor.frame_rate * period
-    return Fraction(each).limit_denominator(max(_LONGEST_CYCLE, math.ceil(4.0 / each)))
+    frames = sensor.frame_rate * period
+    return Fraction(frames).limit_denominator(max(_LONGEST_CYCLE, math.ceil(4.0 / frames)))
 
 
 def _clean(sensor: Sensor, period: float) -> Sensor:

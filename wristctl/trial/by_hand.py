@@ -10,8 +10,8 @@ from wristctl.trial.motors_ready import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 
+# Tendon [m] that one word may move.
 MOST = 5e-3
-"""Tendon [m] that one word may move."""
 
 
 class ByHand:
@@ -28,7 +28,7 @@ class ByHand:
     def jog(self, lengths: Sequence[float]) -> tuple[int, ...]:
         """Creep on by `lengths`, without soft limits; the steps made, once the axes stand."""
         steps = [sign * round(length / self._step) for sign, length in zip(self._signs, lengths, strict=True)]
-        self._board.jog([at + way for at, way in zip(self._board.read().position, steps, strict=True)])
+        self._board.jog([position + way for position, way in zip(self._board.read().position, steps, strict=True)])
         return tuple(steps)
 
     def patience(self) -> Patience:
@@ -36,7 +36,7 @@ class ByHand:
         return Patience(self._board)
 
     def home(self) -> None:
-        """Where the axes stand is zero, until the drives are released."""
+        """Make the axes' present positions zero, until the drives are released."""
         self._board.home()
 
     def go(self, axis: int, length: float) -> tuple[int, ...]:

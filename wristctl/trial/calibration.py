@@ -26,24 +26,24 @@ class WristCalibration:
     plane: str
     boot_nonce: int
     position: tuple[int, ...]
-    """Of the board's axes where the calibration left them, counted from zero."""
+    """Positions of the board's axes after the calibration, counted from zero."""
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        known = {"plane": self.plane, "boot_nonce": self.boot_nonce, "position": self.position}
-        return {"schema": SCHEMA, **self.zero.plain(), **known}
+        board = {"plane": self.plane, "boot_nonce": self.boot_nonce, "position": self.position}
+        return {"schema": SCHEMA, **self.zero.plain(), **board}
 
     @classmethod
     def load(cls, run: Run) -> Self:
         """Read a calibrate-wrist run. Raises UserError."""
         file = run.file(FILE)
         try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-            if found["schema"] != SCHEMA:
-                raise ValueError(found["schema"])
-            signs, slopes, slack = (tuple(found[name]) for name in ("signs", "steps_per_radian", "slack"))
-            zero = Zero(signs, slopes, float(found["marker"]), slack, tuple(found.get("friction", (0.0,) * len(signs))))
-            return cls(zero, found["plane"], found["boot_nonce"], tuple(found["position"]))
+            table = json.loads(file.read_text(encoding="utf-8"))
+            if table["schema"] != SCHEMA:
+                raise ValueError(table["schema"])
+            signs, slopes, slack = (tuple(table[name]) for name in ("signs", "steps_per_radian", "slack"))
+            zero = Zero(signs, slopes, float(table["marker"]), slack, tuple(table.get("friction", (0.0,) * len(signs))))
+            return cls(zero, table["plane"], table["boot_nonce"], tuple(table["position"]))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UserError("not a wrist calibration", str(file), "wristctl hw calibrate wrist") from error
 
@@ -52,14 +52,14 @@ class WristCalibration:
         hello = board.hello or board.connect()
         position = board.read().position
         if hello.boot_nonce != self.boot_nonce:
-            what = "the calibration's zero positions are lost: the board has restarted since"
+            problem = "the calibration's zero positions are lost: the board has restarted since"
         elif position != self.position:
-            what = f"the calibration left the motors at {self.position}, the board says {position}"
+            problem = f"the calibration left the motors at {self.position}, the board says {position}"
         else:
             board.home(position)
             return
-        fix = "leave out positions: stored, and zero is found anew; senses of turning are kept"
-        raise BoardError("host", what, board.transport.name, fix)
+        fix = "leave out positions: table, and zero is found anew; senses of turning are kept"
+        raise BoardError("host", problem, board.transport.name, fix)
 
 
 def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristParameters) -> WristCalibration:

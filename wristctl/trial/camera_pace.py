@@ -1,4 +1,4 @@
-"""What a camera gives: how many pictures, how old they are when they come, and what is wrong with them, in words."""
+"""Pace of a camera: rate, age and faults of its pictures, also in words."""
 
 from collections import Counter, deque
 
@@ -8,9 +8,10 @@ from wristctl.vision.camera import CameraError
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 _REMEMBERED = 90
+# Relative scatter of the time between two pictures that is worth a word.
 _UNEVEN = 0.3
-"""Of the time between two pictures: scatter that is worth a word."""
 
+# Advice about pictures that cannot be used, by their verdict.
 FIX = {
     SightingVerdict.NO_TIP: "see that nothing covers the tip's marker, and the camera's light and focus",
     SightingVerdict.NO_BASE: "see that nothing covers the clamp's marker, and the camera's light and focus",
@@ -22,7 +23,6 @@ FIX = {
     SightingVerdict.FROZEN: "the camera or its driver repeats old pictures: plug it in again, another USB port",
     SightingVerdict.STAMP: "the camera's driver gives times that cannot be: plug it in again, another USB port",
 }
-"""What to do about pictures that cannot be used."""
 
 
 class CameraPace:
@@ -31,23 +31,23 @@ class CameraPace:
     def __init__(self) -> None:
         self._seen: deque[Sighting] = deque(maxlen=_REMEMBERED)
         self.verdicts: Counter[SightingVerdict] = Counter()
-        """Of all pictures."""
+        """Count of all pictures by verdict."""
 
-    def add(self, seen: Sighting) -> None:
+    def add(self, sighting: Sighting) -> None:
         """The next picture."""
-        self._seen.append(seen)
-        self.verdicts[seen.verdict] += 1
+        self._seen.append(sighting)
+        self.verdicts[sighting.verdict] += 1
 
     @property
     def rate(self) -> float:
         """Pictures that came, per second; nan where fewer than two did."""
-        came = [each.came for each in self._seen]
+        came = [sighting.came for sighting in self._seen]
         return (len(came) - 1) / (came[-1] - came[0]) if len(came) > 1 and came[-1] > came[0] else float("nan")
 
     @property
     def latency(self) -> float:
         """Median age of a picture when it comes, by its stamp [s]: no more is known of it here."""
-        return float(np.median([each.came - each.time for each in self._seen])) if self._seen else float("nan")
+        return float(np.median([frame.came - frame.time for frame in self._seen])) if self._seen else float("nan")
 
     @property
     def jitter(self) -> float:
@@ -82,8 +82,8 @@ class CameraPace:
     def missing(self, now: float, stale: float) -> tuple[str, str]:
         """Why there has been no angle for `stale` seconds, and what to do about it."""
         if not self._seen or now - self._seen[-1].came > stale:
-            known = f"; until then {self.said()[len('the ') :]}" if len(self._seen) > 1 else ""
-            return f"no picture has come{known}", "see the camera's cable, and that no other program uses it"
+            until_then = f"; until then {self.said()[len('the ') :]}" if len(self._seen) > 1 else ""
+            return f"no picture has come{until_then}", "see the camera's cable, and that no other program uses it"
         newest = self._seen[-1].verdict
         if newest is not SightingVerdict.OK:
             return f"newest frame: {newest}", FIX[newest]
@@ -95,11 +95,11 @@ class CameraPace:
         `hidden` is an age [s] that their time stamps do not tell of.
         """
         if (oldest := self.oldest + hidden) > stale:
-            what = (
+            problem = (
                 f"{self.said()}: where one is lost the angle is {1e3 * oldest:.0f} ms old before the next, beyond "
                 f"safety.stale ({1e3 * stale:.0f} ms)"
             )
-            raise CameraError(what, "camera", self._faster(hidden))
+            raise CameraError(problem, "camera", self._faster(hidden))
 
     def _faster(self, hidden: float = 0.0) -> str:
         least = np.ceil(20.0 * (self.oldest + hidden)) / 20.0

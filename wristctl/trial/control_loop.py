@@ -29,28 +29,28 @@ from wristctl.trial.tracking import Tracking
 from wristctl.trial.tracking_monitor import Following
 from wristctl.trial.warnings_report import Oddities
 
+# Takes each tick's row of the log, to show it.
 Shown = Callable[[dict[str, Any]], None]
-"""Takes each tick's row of the log, to show it."""
 
+# Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
+# longer [s] that takes for each step/s of all axes together, whose interrupts come first.
 _UNDERWAY, _BUSY = 0.37, 6.6e-9
-"""Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
-longer [s] that takes for each step/s of all axes together, whose interrupts come first."""
 
 
+# Seconds within which motors at any speed have ramped down.
 _COMING_TO_REST = 0.5
-"""Seconds within which motors at any speed have ramped down."""
 _NO_ANSWER = Answer(math.nan, math.nan, math.nan, math.nan, False)
 
 
 class Task(NamedTuple):
-    """What the loop follows, and as what."""
+    """Motion that the loop follows, with its trial."""
 
     motion: Motion
     """Sampled at the loop's period."""
     course: Array
-    """Its angle, rate and acceleration, (T, 3)."""
+    """Reference angle, rate and acceleration of the motion, (T, 3)."""
     trial: int
-    """Its number; -1 between trials."""
+    """Number of the trial; -1 between trials."""
     begin: float
     """When it begins, on the clock."""
     faults: HostFaults
@@ -120,7 +120,7 @@ class ControlLoop:
             self._clock.wait(ahead)
         woken = self._clock.now() - self.next_tick if ahead > 0.0 else 0.0
         clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
-        seen = self._look(task)
+        marker = self._look(task)
         estimate, position = steering.estimate, self._reeled()
         self._watch(estimate, position, clock, clock - due)
         self._following.see(clock, estimate.load, position)
@@ -133,12 +133,12 @@ class ControlLoop:
             answer = self._answer(task, k, clock - task.begin)
             tension = self._paths.each(answer.plus, answer.minus)
             target = self._turn(tension, position, *reference[:2])
-        known = {
+        values = {
             "trial": task.trial,
             "time": clock - task.begin,
             "clock": clock,
             **estimate._asdict(),
-            **seen,
+            **marker,
             "theta_ref": reference[0],
             "rate_ref": reference[1],
             "acceleration_ref": reference[2],
@@ -154,7 +154,7 @@ class ControlLoop:
             "round_trip": self._board.round_trip,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
-        row = known | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
+        row = values | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
@@ -166,21 +166,21 @@ class ControlLoop:
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
-        found: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
-        for seen in self._tracking.look():
-            found["verdict"] = str(seen.verdict)
-            self.oddities.base(seen.corners[0])
-            self._timing.camera.add(seen)
-            if math.isfinite(seen.theta) and self._steering.see(seen.theta, seen.time - self._epoch):
-                self._last_usable = seen.time
-                self.oddities.lag.add(seen.theta, *self._following.saw(seen, seen.time - self._epoch))
-                found |= {"theta_measured": seen.theta, "captured": seen.time - task.begin}
+        marker: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
+        for sighting in self._tracking.look():
+            marker["verdict"] = str(sighting.verdict)
+            self.oddities.base(sighting.corners[0])
+            self._timing.camera.add(sighting)
+            if math.isfinite(sighting.theta) and self._steering.see(sighting.theta, sighting.time - self._epoch):
+                self._last_usable = sighting.time
+                self.oddities.lag.add(sighting.theta, *self._following.saw(sighting, sighting.time - self._epoch))
+                marker |= {"theta_measured": sighting.theta, "captured": sighting.time - task.begin}
             if task.trial >= 0:
                 used = self._clock.now() - task.begin
-                at = seen.time - task.begin
-                tip = seen.tip_x, seen.tip_y
-                self._log.frame(task.trial, seen.number, at, used, seen.theta, seen.verdict, *tip)
-        return found
+                captured = sighting.time - task.begin
+                tip = sighting.tip_x, sighting.tip_y
+                self._log.frame(task.trial, sighting.number, captured, used, sighting.theta, sighting.verdict, *tip)
+        return marker
 
     def _watch(self, estimate: Estimate, position: Array, clock: float, late: float) -> None:
         """Raises SafetyStop where the limits are exceeded."""
@@ -188,8 +188,8 @@ class ControlLoop:
         taut, _ = self._paths.taut(estimate.theta)
         status, stale = self._status, self._monitor.stale
         why, fix = self._timing.camera.missing(clock, stale) if age > stale else ("", "")
-        seen = Seen(estimate, age, why, position, taut, status.state, delay, status.lapses, clock, fix)
-        self._monitor.see(seen)
+        measured = Seen(estimate, age, why, position, taut, status.state, delay, status.lapses, clock, fix)
+        self._monitor.see(measured)
 
     def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
@@ -197,8 +197,8 @@ class ControlLoop:
         except UserError as error:
             raise SafetyStop(f"the controller failed: {error.what}", error.where, error.fix) from error
         except Exception as error:
-            what = f"the controller failed: {type(error).__name__}: {error}"
-            raise SafetyStop(what, fix="run again with --debug for the traceback") from error
+            problem = f"the controller failed: {type(error).__name__}: {error}"
+            raise SafetyStop(problem, fix="run again with --debug for the traceback") from error
         self._monitor.answer(answer)
         return answer
 
@@ -230,6 +230,6 @@ class ControlLoop:
         self.oddities.round_trips.append(self._board.round_trip)
 
     def _reeled(self) -> Array:
-        """What the spools hold [steps], by the last status."""
+        """Steps that the spools have reeled in, by the last status."""
         reeled: Array = self._signs * np.array(self._status.position, float)
         return reeled

@@ -46,10 +46,10 @@ class Stop:
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         status = self.halt.status
-        known: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
+        board: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
         if status is not None:
             faults = status.faults.name or "none"
-            known |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
+            board |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
         return {
             "reason": self.reason,
             "trial": self.trial,
@@ -57,7 +57,7 @@ class Stop:
             "motors_stand": self.halt.verified,
             "how": self.halt.how,
             "seconds": self.halt.seconds,
-            **known,
+            **board,
         }
 
 
@@ -78,7 +78,7 @@ class Experiment:
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
         self._back = controller("feedforward")
-        self.motions = {each: motion_of(settings, wrist, each, network) for each in settings.directions}
+        self.motions = {direction: motion_of(settings, wrist, direction, network) for direction in settings.directions}
         self.timing = TickTiming(settings.control_period)
         self.outcomes: dict[int, str] = {}
         self.stop: Stop | None = None
@@ -98,11 +98,11 @@ class Experiment:
             try:
                 self._all(testbed, board, shown)
             except BaseException as error:
-                told = _of_the_log(error)
+                cause = _of_the_log(error)
                 with undisturbed():
-                    self._stopped(testbed, board, told)
-                if told is not error:
-                    raise told from error
+                    self._stopped(testbed, board, cause)
+                if cause is not error:
+                    raise cause from error
                 raise
             with undisturbed():
                 halt(board, self._settings.safety.watchdog)
@@ -159,13 +159,13 @@ class Experiment:
         return loop
 
     def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
-        settings, known = self._settings, self._calibration
-        if known is not None and settings.positions == "stored":
-            known.restore(board)
-            self._let_go(board, known.zero)
-            check_zero(board, tracking, settings, self._wrist, plane, known.zero)
-            return known.zero
-        signs = known.zero.signs if known else None
+        settings, calibration = self._settings, self._calibration
+        if calibration is not None and settings.positions == "stored":
+            calibration.restore(board)
+            self._let_go(board, calibration.zero)
+            check_zero(board, tracking, settings, self._wrist, plane, calibration.zero)
+            return calibration.zero
+        signs = calibration.zero.signs if calibration else None
         return find_zero(board, tracking, settings, self._wrist, plane, signs)
 
     def _let_go(self, board: Board, zero: Zero) -> None:

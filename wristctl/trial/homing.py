@@ -27,12 +27,12 @@ from wristctl.wrist.out_of_plane import across_of
 
 log = logging.getLogger(__name__)
 
+# Springs that are stiffer than believed and friction may ask for so many times the pull that the model says.
 _HARDER = 1.5
-"""Springs that are stiffer than believed and friction may ask for so many times the pull that the model says."""
+# Shares of the believed bend that a small move may make: soft tendons and where zero was found.
 _LEAST, _MOST = 0.6, 1.35
-"""Shares of the believed bend that a small move may make: soft tendons and where zero was found."""
+# Share of the least bend that a wrist without a taut tendon may move by: noise, and springs that creep.
 _SLACK = 0.7
-"""Of the least bend that is one, what a wrist without a taut tendon may move by: noise, and springs that creep."""
 _SCREWED = "check which tendon is on which motor, and markers.positive"
 
 
@@ -44,7 +44,7 @@ class Bend(NamedTuple):
 
     @property
     def askew(self) -> float:
-        """How far it is bent, whichever way."""
+        """Size of the bend, in any direction."""
         return math.hypot(self.theta, self.away if math.isfinite(self.away) else 0.0)
 
 
@@ -60,11 +60,11 @@ class ExpectedMoves:
         self._softest = min(settings.safety.softest, self._spools.stiffness)
         self._plus, self._away = on_plus_side(plane), away_of(plane, settings.markers.positive)
         self._scale = 2.0 * settings.markers.distance / wrist.length
-        other = next(each.name for each in DIRECTIONS.values() if each.plane != plane)
-        own = across_of(in_plane(wrist, plane), self._away).stiffness
-        beside = across_of(in_plane(wrist, other), self._away).stiffness
-        self._ratio = own / beside if own > 0.0 and beside > 0.0 else 1.0
-        self._offset, self._stiffness = wrist.tendon_offset, max(0.0, own)
+        beside_plane = next(direction.name for direction in DIRECTIONS.values() if direction.plane != plane)
+        across = across_of(in_plane(wrist, plane), self._away).stiffness
+        beside = across_of(in_plane(wrist, beside_plane), self._away).stiffness
+        self._ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
+        self._offset, self._stiffness = wrist.tendon_offset, max(0.0, across)
 
     def steps(self, stiffness: float | None = None, harder: float = 1.0) -> float:
         """Reeled in for one radian in the plane, by tendons as believed or of this stiffness."""
@@ -72,9 +72,9 @@ class ExpectedMoves:
         path = self._offset * (1.0 + self._ratio) + harder * self._stiffness / (self._offset * k)
         return path / self._spools.step
 
-    def bend(self, straight: Reading, seen: Reading) -> Bend:
-        """How the wrist is bent against a reading when it was straight."""
-        return Bend(seen.theta - straight.theta, -self._scale * math.log(seen.size / straight.size))
+    def bend(self, straight: Reading, reading: Reading) -> Bend:
+        """Bend of the wrist against a reading of the straight wrist."""
+        return Bend(reading.theta - straight.theta, -self._scale * math.log(reading.size / straight.size))
 
     def _axis_of(self, plus: bool, away: int) -> int:
         """The axis that pulls to this side of the plane, and away from the camera (1) or toward it (-1)."""
@@ -89,11 +89,11 @@ class ExpectedMoves:
             return
         like = self._axis_of(plus, away)
         where = "to the other side than" if plus != self._plus[axis] else "across its plane otherwise than"
-        what = f"axis {axis} bends the wrist {where} tendon {ACTIVE[axis]} should: as tendon {ACTIVE[like]} would"
+        problem = f"axis {axis} bends the wrist {where} tendon {ACTIVE[axis]} should: as tendon {ACTIVE[like]} would"
         likely = f"motors of axes {axis} and {like} exchanged, or tendons {ACTIVE[axis]} and {ACTIVE[like]}"
         if plus != self._plus[axis] and away != self._away[axis]:
             likely = f"it turns the wrong way while others are taut, or {likely}"
-        raise SafetyStop(f"{what}; likely {likely}", "homing", _SCREWED)
+        raise SafetyStop(f"{problem}; likely {likely}", "homing", _SCREWED)
 
     def has_steps(self, steps: float) -> bool:
         """Whether steps per radian are those of the model, within `homing.steps_tolerance`."""
@@ -108,26 +108,27 @@ class ExpectedMoves:
             "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)"
         )
         ratio = steps / self.steps()
-        what = (
+        problem = (
             f"axis {axis} (tendon {ACTIVE[axis]}) takes {steps:.0f} steps for one radian, {ratio:.2f} times what the "
             f"model says ({self.steps():.0f}); likely wrong microsteps (DIP switches), a wrong pulley, or "
             + ("a slipping tendon, or others that were taut" if ratio > 1.0 else "a marker that is not fixed")
         )
-        raise SafetyStop(what, "homing", fix)
+        raise SafetyStop(problem, "homing", fix)
 
     def judge_slack(self, axis: int, slack: float) -> None:
         """Raises SafetyStop where a tendon was taut before anything was reeled in."""
         if slack >= -self._homing.taut:
             return
-        what = f"tendon {ACTIVE[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
-        raise SafetyStop(what, "homing", "slacken all tendons first: wristctl hw slacken, or by hand")
+        problem = f"tendon {ACTIVE[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
+        raise SafetyStop(problem, "homing", "slacken all tendons first: wristctl hw slacken, or by hand")
 
     def judge_friction(self, axis: int, friction: float) -> None:
         """Raises SafetyStop where a tendon sticks by more than `homing.sticks` between reeling in and letting go."""
         if friction <= self._homing.sticks:
             return
-        what = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
-        raise SafetyStop(what, "homing", "see whether it chafes or its sheath is bent sharply; or raise homing.sticks")
+        problem = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
+        fix = "see whether it chafes or its sheath is bent sharply; or raise homing.sticks"
+        raise SafetyStop(problem, "homing", fix)
 
     def judge_slackened(self, bend: Bend) -> None:
         """Raises SafetyStop where a wrist that nothing should hold moves when its tendons are let out further."""
@@ -135,39 +136,40 @@ class ExpectedMoves:
             return
         away = 1 if bend.away > 0.0 else -1
         pulls, holds = self._axis_of(bend.theta > 0.0, away), self._axis_of(bend.theta < 0.0, -away)
-        what = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
+        problem = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
         likely = (
             f"tendon {ACTIVE[holds]} is shorter than it was, caught or slipped on its pulley, or axis {pulls} "
             f"(tendon {ACTIVE[pulls]}) turns the wrong way"
         )
-        raise SafetyStop(f"{what}; likely {likely}", "homing", "see tendons and motors, then calibrate the wrist again")
+        fix = "see tendons and motors, then calibrate the wrist again"
+        raise SafetyStop(f"{problem}; likely {likely}", "homing", fix)
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
         meant = reeled / self.steps()
         if max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0) < _LEAST * meant:
-            what = (
+            problem = (
                 f"axis {axis} (tendon {ACTIVE[axis]}) bends the wrist by {math.degrees(bend.theta):.1f} deg instead of "
                 f"{math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, or it "
                 "has no power"
             )
-            raise SafetyStop(what, "homing", "calibrate the wrist again; see motor, drive and tendon")
+            raise SafetyStop(problem, "homing", "calibrate the wrist again; see motor, drive and tendon")
         self.judge_side(axis, bend)
         if abs(bend.theta) > _MOST * meant:
             self.judge_steps(axis, reeled / abs(bend.theta))
 
 
+# Share of `homing.pull` by which a tendon is reeled in to check it.
 _CHECKED = 1.2
-"""Share of `homing.pull` by which a tendon is reeled in to check it."""
+# Times as long for each reading, where a result is doubtful.
 _AGAIN = 4
-"""Times as long for each reading, where a result is doubtful."""
+# A bend at which homing stops.
 _FURTHEST_DEG = 10.0
-"""A bend at which homing stops."""
 
 
 @dataclass(frozen=True)
 class Zero:
-    """What homing finds; axes in the order of tendons 1, 2, 4, 5."""
+    """Result of homing; axes in the order of tendons 1, 2, 4, 5."""
 
     signs: tuple[int, ...]
     """1 where positive steps reel in, -1 where they pay out."""
@@ -218,8 +220,8 @@ class _Finder:
                     return reeled
             self._let_go(axis, 0)
         slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
-        what = f"axis {axis} (tendon {ACTIVE[axis]}) does not bend the wrist within {slack:g} mm"
-        raise SafetyStop(what, "homing", f"{fix}; or raise homing.slack")
+        problem = f"axis {axis} (tendon {ACTIVE[axis]}) does not bend the wrist within {slack:g} mm"
+        raise SafetyStop(problem, "homing", f"{fix}; or raise homing.slack")
 
     def slacken(self) -> None:
         """Let all tendons go, so far that none holds against another while it is measured."""
@@ -231,21 +233,21 @@ class _Finder:
 
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
-        found = self._measured(axis, about, 1)
-        if not self._expected.has_steps(found[1]):
-            found = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, found[1])
-        return found
+        measured = self._measured(axis, about, 1)
+        if not self._expected.has_steps(measured[1]):
+            measured = self._measured(axis, about, _AGAIN)
+        self._expected.judge_steps(axis, measured[1])
+        return measured
 
     def _measured(self, axis: int, about: int, slowly: int) -> tuple[float, float, float]:
         reeled, bends = [], []
-        for at in range(min(0, about - 3 * self._move), about + self._pull, self._move):
-            self._reel(axis, at)
+        for position in range(min(0, about - 3 * self._move), about + self._pull, self._move):
+            self._reel(axis, position)
             bend = self._bent(axis, slowly)
             if abs(bend.theta) > self._bend:
-                reeled.append(at)
+                reeled.append(position)
                 bends.append(bend.theta)
-            if reeled and at - reeled[0] >= 0.7 * self._pull:  # any further, the tendons opposite may hold it
+            if reeled and position - reeled[0] >= 0.7 * self._pull:  # any further, the tendons opposite may hold it
                 break
         if len(reeled) < 3:
             self._let_go(axis, -2 * self._pull)
@@ -274,8 +276,8 @@ class _Finder:
         bend = self._expected.bend(self._straight, patience.reading(self._tracking, slowly * self._settings.frames))
         if abs(bend.theta) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
-            what = f"axis {axis} bent the wrist by {math.degrees(bend.theta):.1f} deg while homing"
-            raise SafetyStop(what, "homing", "slacken all tendons first")
+            problem = f"axis {axis} bent the wrist by {math.degrees(bend.theta):.1f} deg while homing"
+            raise SafetyStop(problem, "homing", "slacken all tendons first")
         return bend
 
     def _let_go(self, axis: int, reeled: int) -> None:
@@ -319,12 +321,12 @@ def find_zero(
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
     taut, slopes, friction = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
-    slack, sticking = (tuple(spools.step * each for each in lengths) for lengths in (taut, friction))
+    slack, sticking = (tuple(spools.step * steps for steps in lengths) for lengths in (taut, friction))
     for axis in range(AXES):
         expected.judge_friction(axis, sticking[axis])
     senses = finder.settle(taut)
-    for each in zip(ACTIVE, senses, slack, slopes, strict=True):
-        log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", each[0], each[1], 1e3 * each[2], each[3])
+    for tendon, sense, length, slope in zip(ACTIVE, senses, slack, slopes, strict=True):
+        log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * length, slope)
     return Zero(senses, slopes, finder.straight, slack, sticking)
 
 
@@ -345,9 +347,9 @@ def check_zero(
     straight = patience.reading(tracking, 4 * homing.frames)
     expected.judge_slackened(expected.bend(held, straight))
     for axis in range(AXES):
-        at = np.full(AXES, slack)
-        at[axis] = reeled
-        one, two, four, five = map(int, np.array(zero.signs) * at)
+        positions = np.full(AXES, slack)
+        positions[axis] = reeled
+        one, two, four, five = map(int, np.array(zero.signs) * positions)
         board.go_to((one, two, four, five), JOG_RATE)
         patience = Patience(board)
         patience.wait(2.0 * homing.rest)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from wristctl.records.run_writer import RESERVE
 from wristctl.wrist.directions import ACTIVE
 
+# Name -> unit and meaning.
 Columns = Mapping[str, tuple[str, str]]
-"""Name -> unit and meaning."""
 
 
 def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
@@ -70,17 +70,17 @@ FRAMES: Columns = {
 }
 
 _RESERVED = 4 << 20
+# Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by.
 _AT_ONCE = 40
-"""Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by."""
 
 
 def truth_columns(segments: int) -> Columns:
-    """What the emulated bench knows besides, of a wrist of so many segments."""
-    own = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(segments)}
+    """Columns of the emulated bench's true values, for a wrist of so many segments."""
+    segment_angles = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(segments)}
     return {
         "trial": ("", "number, from 0"),
         "time": ("s", "since the trial's motion began"),
-        **own,
+        **segment_angles,
         "theta": ("rad", "true bending angle"),
         **_of_tendons("pull", "N", "true tension at the spool"),
     }
@@ -161,7 +161,7 @@ class TrialLog:
         if segments is not None:
             tables["truth"] = truth_columns(segments)
         try:
-            self.streams = {name: Stream(folder / f"{name}.csv", each, self.disk) for name, each in tables.items()}
+            self.streams = {name: Stream(folder / f"{name}.csv", table, self.disk) for name, table in tables.items()}
         except OSError:
             self.disk.give_up_reserve()
             raise
@@ -172,8 +172,8 @@ class TrialLog:
     def tick(self, row: Mapping[str, Any]) -> None:
         """One control tick; in between.csv where it belongs to no trial. Some of the truth that waits goes with it."""
         self.last.append(dict(row))
-        known = {**row, "utc": row["clock"] + time.time() - time.monotonic() if self._monotonic else math.nan}
-        self.streams["between" if row["trial"] < 0 else "log"].row(known[name] for name in LOG)
+        values = {**row, "utc": row["clock"] + time.time() - time.monotonic() if self._monotonic else math.nan}
+        self.streams["between" if row["trial"] < 0 else "log"].row(values[name] for name in LOG)
         self.streams["wire"].flush()
         self._write_truth(_AT_ONCE)
 
@@ -186,7 +186,7 @@ class TrialLog:
         self.streams["wire"].wait((clock, way, data.hex()))
 
     def truth(self, trial: int, rows: NDArray[np.float64]) -> None:
-        """What the bench knows of a trial, by the columns after the first; the ticks to come write it, or the end does.
+        """Queue true values of a trial, by the columns after the first; the ticks to come write them, or the end does.
 
         Thousands of rows in one piece would take longer than a tick may be late.
         """
@@ -200,10 +200,10 @@ class TrialLog:
     def close(self) -> None:
         """Write what is left, if need be into the space reserved for it. Raises OSError."""
         self.disk.give_up_reserve()
-        for name, each in self.streams.items():
+        for name, stream in self.streams.items():
             if name == "truth":  # the last, and the largest
                 self._write_truth(len(self._truth))
-            each.close()
+            stream.close()
 
 
 def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What must be so before motors move, and how they are stopped."""
+"""Preparation of motors before they move, and their stop."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,12 +14,12 @@ from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tracking import Tracking
 
+# Seconds within which motors at any speed have ramped down.
 _PATIENCE = 0.5
-"""Seconds within which motors at any speed have ramped down."""
 
 
 class Halt(NamedTuple):
-    """How the motors were stopped."""
+    """Outcome of stopping the motors."""
 
     verified: bool
     """Whether the board's own status says that nothing moves."""
@@ -32,21 +32,21 @@ class Halt(NamedTuple):
 def halt(board: Board, watchdog: float) -> Halt:
     """Stop the motors, first by a ramp, else by an emergency stop; never raises for a board that does not answer."""
     began = board.transport.now()
-    said = []
+    answers = []
     for command in (Command.STOP, Command.ESTOP):
         try:
             try:
                 board.send(command)
             except BoardError as error:  # in a fault it has stopped already: its status is what counts
-                said.append(str(error.what))
+                answers.append(str(error.what))
             status = _standing(board, began + _PATIENCE)
         except BoardError as error:
-            said.append(str(error.what))
+            answers.append(str(error.what))
             continue
         if status is not None:
-            how = f"{command.name}, board {status.state.name}"
-            return Halt(True, how, status, board.transport.now() - began)
-    why = said[-1] if said else "still moving"
+            command_name = f"{command.name}, board {status.state.name}"
+            return Halt(True, command_name, status, board.transport.now() - began)
+    why = answers[-1] if answers else "still moving"
     fallback = f"{why}; the board stops by itself {1e3 * watchdog:.0f} ms after the last command, else cut motor power"
     return Halt(False, fallback, None, board.transport.now() - began)
 

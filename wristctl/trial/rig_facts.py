@@ -21,15 +21,15 @@ from wristctl.vision.camera import CameraError, Frame
 from wristctl.vision.detector import PictureQuality, quality_of
 from wristctl.vision.marker import Sighting, SightingVerdict
 
+# Commands timed; seconds for which the camera is watched, and for which the computer is woken every period.
 _TRIPS, _WATCHED, _SLEPT = 100, 2.0, 1.0
-"""Commands timed; seconds for which the camera is watched, and for which the computer is woken every period."""
+# Limits that are worth a word: share of the expected pictures, scatter over their interval, seconds of age that stamps
+# do not tell, share of a period by which one tick in a hundred begins late.
 _SLOW_CAMERA, _UNEVEN, _UNSTAMPED, _WOKEN = 0.9, 0.3, 5e-3, 0.2
-"""What is worth a word: share of the expected pictures, scatter over their interval, seconds of age that stamps do not
-tell, share of a period by which one tick in a hundred begins late."""
+# Standard deviation [s] of a camera's age that is enough: what friction does to a stroke is as much.
 _SURE = 0.7e-3
-"""Standard deviation [s] of a camera's age that is enough: what friction does to a stroke is as much."""
+# Limits of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's.
 _SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
-"""Of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's."""
 
 
 class RigFacts(NamedTuple):
@@ -44,7 +44,7 @@ class RigFacts(NamedTuple):
     noise: float
     """Scatter of a resting wrist's angle [rad]."""
     woken: Array
-    """By how much the computer slept on, each time."""
+    """Delays with which the computer woke."""
     latency: Latency | None
     """None where nothing was to move."""
 
@@ -64,17 +64,17 @@ class Pictures:
     def __init__(self) -> None:
         self.qualities: list[PictureQuality] = []
 
-    def __call__(self, frame: Frame, seen: Sighting) -> None:
+    def __call__(self, frame: Frame, sighting: Sighting) -> None:
         """Take one."""
-        if np.isfinite(seen.corners[1]).all() and len(self.qualities) < _TRIPS:
-            self.qualities.append(quality_of(frame.image, seen.corners[1]))
+        if np.isfinite(sighting.corners[1]).all() and len(self.qualities) < _TRIPS:
+            self.qualities.append(quality_of(frame.image, sighting.corners[1]))
 
 
 def measure(
     testbed: Testbed, board: Board, pictures: Pictures, settings: HwRunSettings, axis: int | None,
-    told: Callable[[int], None] = lambda done: None,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> RigFacts:  # fmt: skip
-    """Of a connected board, and of what the testbed keeps of its pictures. With an `axis` its motor makes strokes.
+    """Measure a connected board and the testbed's pictures. With an `axis` its motor makes strokes.
 
     Raises SafetyStop, BoardError and CameraError.
     """
@@ -86,8 +86,8 @@ def measure(
     latency = None
     if axis is not None and usable:
         strokes = RigStrokes(board, tracking, settings, axis)
-        for made in strokes.strokes(told):
-            latency = find_latency(made)
+        for motor_strokes in strokes.strokes(progress):
+            latency = find_latency(motor_strokes)
             if latency.sd < _SURE:
                 break
         strokes.let_go()
@@ -101,9 +101,9 @@ def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[flo
     tracking.look()
     end = clock.now() + _WATCHED
     while clock.now() < end:
-        for seen in tracking.look():
-            pace.add(seen)
-            angles += [seen.theta] if math.isfinite(seen.theta) else []
+        for sighting in tracking.look():
+            pace.add(sighting)
+            angles += [sighting.theta] if math.isfinite(sighting.theta) else []
         clock.wait(2e-3)
     return pace, angles
 
@@ -119,13 +119,13 @@ def _woken(testbed: Testbed, period: float) -> Array:
 
 
 def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
-    """What is wrong with a rig for these settings, the grave first."""
-    found = [*_of_the_link(facts, settings, port), *_of_the_camera(facts, settings), *_of_the_pictures(facts)]
+    """Troubles of a rig for these settings, the grave first."""
+    met = [*_of_the_link(facts, settings, port), *_of_the_camera(facts, settings), *_of_the_pictures(facts)]
     late = float(np.quantile(facts.woken, 0.99))
     if late > _WOKEN * settings.control_period:
-        what = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"
-        found.append(Trouble(late > settings.safety.late, what, TIMING_FIX[SCHEDULING]))
-    return sorted(found, key=lambda each: not each.grave)
+        problem = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"
+        met.append(Trouble(late > settings.safety.late, problem, TIMING_FIX[SCHEDULING]))
+    return sorted(met, key=lambda trouble: not trouble.grave)
 
 
 def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
@@ -134,51 +134,51 @@ def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Tr
     trip, period = facts.trips.median + longer, settings.control_period
     if trip <= settings.safety.round_trip * period:
         return []
-    what = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * period:g} ms"
+    problem = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * period:g} ms"
     if facts.timer is not None and facts.timer > 1e-3:
-        return [Trouble(True, f"{what}: the USB adapter's latency timer is {1e3 * facts.timer:g} ms", shorter(port))]
+        return [Trouble(True, f"{problem}: the USB adapter's latency timer is {1e3 * facts.timer:g} ms", shorter(port))]
     fix = (
         "a USB adapter that holds answers back (an FTDI's latency timer is 16 ms unless told), a hub, or a longer "
         f"control_period (--set control_period={math.ceil(1e3 * trip / settings.safety.round_trip) / 1e3:g})"
     )
-    return [Trouble(True, what, fix)]
+    return [Trouble(True, problem, fix)]
 
 
 def _of_the_camera(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
-    pace, found = facts.pace, []
-    odd = [each for each in pace.verdicts if each is not SightingVerdict.OK]
+    pace, met = facts.pace, []
+    odd = [verdict for verdict in pace.verdicts if verdict is not SightingVerdict.OK]
     for verdict in odd:
         count, of = pace.verdicts[verdict], sum(pace.verdicts.values())
-        found.append(Trouble(count == of, f"{count} of {of} pictures: {verdict}", FIX[verdict]))
+        met.append(Trouble(count == of, f"{count} of {of} pictures: {verdict}", FIX[verdict]))
     if not pace.verdicts:
         return [Trouble(True, "the camera gives no pictures", "see its cable, and that no other program uses it")]
     expected, hidden = settings.sensor.frame_rate, 0.0 if facts.latency is None else facts.latency.delay
     if pace.rate < _SLOW_CAMERA * expected:
-        what = f"the camera gives {pace.rate:.3g} pictures/s; the loop's observer counts on {expected:g}"
+        problem = f"the camera gives {pace.rate:.3g} pictures/s; the loop's observer counts on {expected:g}"
         fix = f"device.fourcc: MJPG, device.frame_rate, a shorter device.exposure; or sensor.frame_rate={pace.rate:.0f}"
-        found.append(Trouble(False, what, fix))
+        met.append(Trouble(False, problem, fix))
     try:
         pace.fits(settings.safety.stale, hidden)
     except CameraError as error:
-        found.append(Trouble(True, error.what, error.fix))
+        met.append(Trouble(True, error.what, error.fix))
     if abs(hidden) > _UNSTAMPED:
-        known = max(0.0, settings.device.delay + hidden)
-        what = f"pictures are {1e3 * hidden:.0f} ms older than their time stamps say"
-        found.append(Trouble(False, what, f"--set device.delay={known:.4f}"))
+        delay = max(0.0, settings.device.delay + hidden)
+        problem = f"pictures are {1e3 * hidden:.0f} ms older than their time stamps say"
+        met.append(Trouble(False, problem, f"--set device.delay={delay:.4f}"))
     if pace.jitter * pace.rate > _UNEVEN:
-        what = f"pictures come unevenly, +-{1e3 * pace.jitter:.0f} ms"
-        found.append(Trouble(False, what, "another USB port or hub, or a computer that does less besides"))
-    return found
+        problem = f"pictures come unevenly, +-{1e3 * pace.jitter:.0f} ms"
+        met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
+    return met
 
 
 def _of_the_pictures(facts: RigFacts) -> list[Trouble]:
     quality = facts.quality
     if quality is None:
         return []
-    said = [
+    checks = [
         (quality.side < _SMALL, f"the tip's marker is {quality.side:.0f} px wide", "nearer, or larger pictures: 40 px"),
         (quality.blur > _BLURRED, f"its outline is blurred by {quality.blur:.1f} px", "focus (device.focus)"),
         (quality.white > _BRIGHT, f"its rim is white ({quality.white:.0f} of 255)", "a shorter device.exposure"),
         (quality.white - quality.black < _FAINT, "its print is faint", "more light, or a longer device.exposure"),
     ]
-    return [Trouble(False, what, fix) for so, what, fix in said if so]
+    return [Trouble(False, problem, fix) for is_bad, problem, fix in checks if is_bad]

@@ -19,10 +19,10 @@ from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tracking import Tracking
 
+# Share of its acceleration that the board plans to brake with (motion.c).
 _BRAKING = 0.9
-"""Of its acceleration the board plans to brake with (motion.c)."""
+# Seconds before and after the first answer between which it is looked for when a move began.
 _EARLY, _LATE = 0.1, 0.05
-"""Seconds before and after the first answer between which it is looked for when a move began."""
 
 
 class RampedMove(NamedTuple):
@@ -40,28 +40,28 @@ class RampedMove(NamedTuple):
         level = (far - 0.5 * top * (up + down)) / top
         left = up + level + down - time
         going = 0.5 * speeding * np.clip(time, 0.0, up) ** 2 + top * np.clip(time - up, 0.0, level)
-        made = np.where(time < up + level, going, far - 0.5 * braking * np.clip(left, 0.0, down) ** 2)
-        return np.asarray(math.copysign(1.0, self.distance) * made)
+        steps = np.where(time < up + level, going, far - 0.5 * braking * np.clip(left, 0.0, down) ** 2)
+        return np.asarray(math.copysign(1.0, self.distance) * steps)
 
-    def began(self, time: Array, made: Array) -> float:
+    def began(self, time: Array, steps: Array) -> float:
         """When it began [s], by the steps made (n,) at times (n,) [s], the first of them where it was asked for."""
 
         def misfit(begin: float) -> float:
-            return float(np.sum((self.course(time - begin) - made) ** 2))
+            return float(np.sum((self.course(time - begin) - steps) ** 2))
 
         bounds = float(time[0]) - _EARLY, float(time[0]) + _LATE
         return float(minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
 
 
+# Seconds between two samples of the model's course.
 _STEP = 1e-3
-"""Seconds between two samples of the model's course."""
+# Time constant [s] of the slow part. Without one an age comes out 2 to 3 ms too large on the emulated rig, 5 where
+# sheaths rub, and off by 6 to 8 where one plane is half as stiff as the other; half or twice as long a time changes 1.
 _SLOW = 0.15
-"""Time constant [s] of the slow part. Without one an age comes out 2 to 3 ms too large on the emulated rig, 5 where
-sheaths rub, and off by 6 to 8 where one plane is half as stiff as the other; half or twice as long a time changes 1."""
+# Delay [s] beyond which nothing is looked for.
 _LATEST = 0.5
-"""Delay [s] beyond which nothing is looked for."""
+# Delays [s] and natural frequencies [rad/s] of which the best begins the fit.
 _DELAYS, _RATES, _DAMPING = np.arange(0.0, 0.4, 0.02).tolist(), (15.0, 30.0, 60.0, 120.0), 0.5
-"""Delays [s] and natural frequencies [rad/s] of which the best begins the fit."""
 
 
 class MotorStroke(NamedTuple):
@@ -74,7 +74,7 @@ class MotorStroke(NamedTuple):
 
 
 class Latency(NamedTuple):
-    """What strokes tell."""
+    """Latency of a camera, estimated from strokes."""
 
     delay: float
     """From the middle of an exposure to its time stamp [s]."""
@@ -83,13 +83,13 @@ class Latency(NamedTuple):
     rate: float
     """The wrist's natural frequency on this tendon [rad/s]."""
     scatter: float
-    """Of the angles about the fit [rad], a standard deviation."""
+    """Standard deviation of the angles about the fit [rad]."""
     pictures: int
 
 
 def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
     """The delay by which strokes were seen. ValueError for fewer than twenty pictures."""
-    count = sum(len(each.angle) for each in strokes)
+    count = sum(len(stroke.angle) for stroke in strokes)
     if count < 20:
         raise ValueError(f"{count} pictures are too few")
 
@@ -106,17 +106,17 @@ def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
         tried += [(float(np.sum(_errors(strokes, courses, delay, 1) ** 2)), delay, rate) for delay in _DELAYS]
     _, begin, rate = min(tried)
     swing = fitted(np.array([begin, np.log(rate), np.log(_DAMPING)]), 1)  # alone, lest it be taken for the slow part
-    found = fitted(swing.x, 2)
+    fit = fitted(swing.x, 2)
     free = max(1, count - len(strokes) - 5)
-    variance = 2.0 * float(found.cost) / free
-    slope = np.asarray(found.jac, np.float64)
+    variance = 2.0 * float(fit.cost) / free
+    slope = np.asarray(fit.jac, np.float64)
     covariance = variance * np.linalg.pinv(slope.T @ slope)
-    delay, rate = float(found.x[0]), float(np.exp(found.x[1]))
+    delay, rate = float(fit.x[0]), float(np.exp(fit.x[1]))
     return Latency(delay, float(np.sqrt(covariance[0, 0])), rate, float(np.sqrt(variance)), count)
 
 
 class _Course(NamedTuple):
-    """How the model answers a stroke, from rest: at times (n,) [s], and so much of it slowly, (n,) each."""
+    """Response of the model to a stroke from rest at times (n,) [s], and its slow part, (n,) each."""
 
     time: Array
     parts: tuple[Array, Array]
@@ -124,12 +124,12 @@ class _Course(NamedTuple):
 
 def _errors(strokes: Sequence[MotorStroke], courses: Sequence[_Course], delay: float, parts: int) -> Array:
     """Angles less the model's first parts; each stroke has its own angle to begin from, all have one gain of each."""
-    seen, shown = [], []
-    for each, course in zip(strokes, courses, strict=True):
-        model = np.array([np.interp(each.stamped - delay, course.time, part) for part in course.parts[:parts]]).T
-        seen.append(each.angle - each.angle.mean())
+    measured, shown = [], []
+    for stroke, course in zip(strokes, courses, strict=True):
+        model = np.array([np.interp(stroke.stamped - delay, course.time, part) for part in course.parts[:parts]]).T
+        measured.append(stroke.angle - stroke.angle.mean())
         shown.append(model - model.mean(axis=0))
-    angle, model = np.concatenate(seen), np.concatenate(shown)
+    angle, model = np.concatenate(measured), np.concatenate(shown)
     gains: Array = np.linalg.lstsq(model, angle, rcond=1e-9)[0]
     return angle - model @ gains
 
@@ -137,31 +137,31 @@ def _errors(strokes: Sequence[MotorStroke], courses: Sequence[_Course], delay: f
 def _courses(strokes: Sequence[MotorStroke], rate: float, damping: float) -> list[_Course]:
     swing = bilinear([rate**2], [1.0, 2.0 * damping * rate, rate**2], 1.0 / _STEP)
     slow = bilinear([1.0], [_SLOW, 1.0], 1.0 / _STEP)
-    made = []
-    for each in strokes:
-        time = np.arange(each.time[0], each.time[-1], _STEP)
-        answer = lfilter(*swing, np.interp(time, each.time, each.position) - each.position[0])
-        made.append(_Course(time, (answer, lfilter(*slow, answer))))
-    return made
+    courses = []
+    for stroke in strokes:
+        time = np.arange(stroke.time[0], stroke.time[-1], _STEP)
+        answer = lfilter(*swing, np.interp(time, stroke.time, stroke.position) - stroke.position[0])
+        courses.append(_Course(time, (answer, lfilter(*slow, answer))))
+    return courses
 
 
+# Strokes after which one may know enough; that are made at most.
 COUNT, MOST = 24, 96
-"""Strokes after which one may know enough; that are made at most."""
+# Bend [rad] between which strokes go, the tendon taut at both ends; how much of it [m] they reel in at most, and how
+# fast [m/s].
 _BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(3.0), math.radians(6.0), 6e-3, 40e-3
-"""Bend [rad] between which strokes go, the tendon taut at both ends; how much of it [m] they reel in at most, and how
-fast [m/s]."""
+# Seconds between two points of a stroke's course.
 _SAMPLED = 1e-3
-"""Seconds between two points of a stroke's course."""
+# Bend [rad] at which the tendon counts as taut; at which strokes end.
 _TAKEN_UP, _FURTHEST = math.radians(1.0), math.radians(12.0)
-"""Bend [rad] at which the tendon counts as taut; at which strokes end."""
+# Tendon [m] taken up by one move, and the pause [s] after it.
 _MOVE, _REST = 0.12e-3, 0.15
-"""Tendon [m] taken up by one move, and the pause [s] after it."""
+# Seconds for which a stroke is watched before and after it begins; for the way back, and up to where it begins.
 _BEFORE, _AFTER, _BACK, _SETTLED = 0.15, 0.35, 0.4, 0.8
-"""Seconds for which a stroke is watched before and after it begins; for the way back, and up to where it begins."""
+# Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer.
 _SILENCE = 0.5
-"""Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer."""
+# Seconds until the board has read a command.
 _UNDERWAY = 0.5e-3
-"""Seconds until the board has read a command."""
 
 
 class RigStrokes:
@@ -182,7 +182,7 @@ class RigStrokes:
         board.home()
         self._straight = Patience(board).angle(tracking, 10)
 
-    def strokes(self, told: Callable[[int], None] = lambda done: None) -> Iterator[Sequence[MotorStroke]]:
+    def strokes(self, progress: Callable[[int], None] = lambda count: None) -> Iterator[Sequence[MotorStroke]]:
         """All strokes so far, whenever COUNT more are done, up to MOST; the tendon stays taut.
 
         Raises SafetyStop, BoardError and CameraError.
@@ -191,15 +191,15 @@ class RigStrokes:
         sense = 1 if taut > 0 else -1
         low, _ = self._crept(taut, sense, _BEGUN, _LONGEST)
         high, _ = self._crept(low, sense, _ENDED, _LONGEST)
-        found, rng = list[MotorStroke](), np.random.default_rng(0)
-        while len(found) < MOST:
+        strokes, rng = list[MotorStroke](), np.random.default_rng(0)
+        while len(strokes) < MOST:
             self._watch(0, JOG_RATE, _BACK)  # slack: friction is to hold back already when the stroke begins
             self._watch(low, JOG_RATE, _SETTLED)
             # at random, so that strokes begin anywhere between two pictures
-            found.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
-            told(len(found))
-            if len(found) % COUNT == 0:
-                yield found
+            strokes.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
+            progress(len(strokes))
+            if len(strokes) % COUNT == 0:
+                yield strokes
 
     def let_go(self) -> None:
         """Back to where the motor stood at first."""
@@ -215,11 +215,11 @@ class RigStrokes:
             if abs(bend) > self._taut:
                 return position, bend
             self._watch(0, JOG_RATE, _REST)
-        what = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
-        raise SafetyStop(what, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
+        problem = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
+        raise SafetyStop(problem, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
 
     def _crept(self, begin: int, sense: int, wanted: float, most: float) -> tuple[int, float]:
-        """Where [steps] slowly reeling in `most` [m] at most, from `begin`, has bent the wrist so far [rad]."""
+        """Reel in slowly, by `most` [m] at most, to a bend of `wanted` [rad]; position [steps] and bend [rad]."""
         move, bend = max(1, round(_MOVE / self._step)), 0.0
         for reeled in range(move, round(most / self._step) + move, move):
             self._watch(begin + sense * reeled, JOG_RATE, _REST)
@@ -230,15 +230,15 @@ class RigStrokes:
     def _bend(self) -> float:
         bend = Patience(self._board).angle(self._tracking, 3) - self._straight
         if abs(bend) > self._furthest:
-            what = f"axis {self._axis} bent the wrist by {math.degrees(bend):.1f} deg"
-            raise SafetyStop(what, fix="slacken all tendons")
+            problem = f"axis {self._axis} bent the wrist by {math.degrees(bend):.1f} deg"
+            raise SafetyStop(problem, fix="slacken all tendons")
         return bend
 
     def _stroke(self, low: int, high: int, before: float) -> MotorStroke:
         move = RampedMove(high - low, round(_SPEED / self._step), self._acceleration)
-        rest, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
-        stamped, angle = np.concatenate([rest[1], moved[1]]).T
-        time = np.arange(rest[0][0, 0], moved[0][-1, 0], _SAMPLED)
+        still, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
+        stamped, angle = np.concatenate([still[1], moved[1]]).T
+        time = np.arange(still[0][0, 0], moved[0][-1, 0], _SAMPLED)
         answered, steps = moved[0].T
         position = low + move.course(time - move.began(answered, steps - low))
         if len(angle) and np.abs(angle - self._straight).max() > self._furthest:
@@ -262,20 +262,21 @@ class RigStrokes:
             if now - fed > 0.2 * _SILENCE:
                 board.ping()
                 fed = now
-            angles += [(each.time, each.theta) for each in self._tracking.look() if math.isfinite(each.theta)]
+            usable = [sighting for sighting in self._tracking.look() if math.isfinite(sighting.theta)]
+            angles += [(sighting.time, sighting.theta) for sighting in usable]
             clock.wait(1e-3)
         return np.array(positions, float).reshape(-1, 2), np.array(angles, float).reshape(-1, 2)
 
 
 class AxisTried(NamedTuple):
-    """What one motor does."""
+    """Result of trying one motor."""
 
     sense: int
     """1 where positive steps reel in, -1 where they pay out."""
     taken_up: float
     """Tendon [m] until the wrist bent by half of what it may."""
     bend: float
-    """Of the wrist then [rad], + as the markers count."""
+    """Bend of the wrist then [rad], + as the markers count."""
 
 
 def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, axis: int) -> AxisTried:

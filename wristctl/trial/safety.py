@@ -24,17 +24,17 @@ class SafetyStop(UserError):
 
 
 class Seen(NamedTuple):
-    """What the monitor judges at one tick; SI units."""
+    """Values that the monitor judges at one tick; SI units."""
 
     estimate: Estimate
     age: float
     """Since the capture of the last usable marker angle."""
     verdict: str
-    """Of the newest frame, or why there was none."""
+    """Verdict of the newest frame, or why there was none."""
     position: Array
     """Spools, (4,) [steps]."""
     taut: Array
-    """Where the tendons are taut at the estimated angle, (4,) [m]."""
+    """Taut lengths of the tendons at the estimated angle, (4,) [m]."""
     state: State
     late: float
     lapses: int
@@ -42,11 +42,11 @@ class Seen(NamedTuple):
     time: float
     """On the clock [s]."""
     fix: str = ""
-    """What to do about a camera that gives no usable angle."""
+    """Advice about a camera that gives no usable angle."""
 
 
+# So many rates that have outlived their life within so many seconds are too many.
 _LAPSES, _WITHIN = 3, 1.0
-"""So many rates that have outlived their life within so many seconds are too many."""
 
 
 class Monitor:
@@ -57,28 +57,28 @@ class Monitor:
         self._lapses: int | None = None
         self._lapsed: deque[float] = deque(maxlen=_LAPSES)
 
-    def see(self, seen: Seen) -> None:
+    def see(self, tick: Seen) -> None:
         """Judge what was measured. A late tick comes first: what it sees is late as well."""
         limits = self._limits
-        if seen.late > limits.late:
-            what = f"a tick came {1e3 * seen.late:.0f} ms late"
-            raise SafetyStop(what, fix="close other programs, or a longer control_period")
-        self._count_lapses(seen)
-        if not all(map(math.isfinite, seen.estimate)):
+        if tick.late > limits.late:
+            problem = f"a tick came {1e3 * tick.late:.0f} ms late"
+            raise SafetyStop(problem, fix="close other programs, or a longer control_period")
+        self._count_lapses(tick)
+        if not all(map(math.isfinite, tick.estimate)):
             raise SafetyStop("the observer's estimate is not a number", fix="see the frames in data/frames.csv")
-        self._angle(seen.estimate.theta)
-        if abs(seen.estimate.rate) > limits.rate:
+        self._angle(tick.estimate.theta)
+        if abs(tick.estimate.rate) > limits.rate:
             fix = "gentler gains or reference, or widen safety.rate"
-            raise SafetyStop(f"rate {seen.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
-        if seen.age > limits.stale:
-            raise SafetyStop(f"no usable marker angle for {1e3 * seen.age:.0f} ms ({seen.verdict})", fix=seen.fix)
-        self._pull(seen.position, seen.taut)
-        reeled = float(np.abs(seen.position).max()) * self._spools.step
+            raise SafetyStop(f"rate {tick.estimate.rate:.1f} rad/s beyond +-{limits.rate:g} rad/s", fix=fix)
+        if tick.age > limits.stale:
+            raise SafetyStop(f"no usable marker angle for {1e3 * tick.age:.0f} ms ({tick.verdict})", fix=tick.fix)
+        self._pull(tick.position, tick.taut)
+        reeled = float(np.abs(tick.position).max()) * self._spools.step
         if reeled > limits.travel:
             fix = "a smaller reference, or widen safety.travel"
             raise SafetyStop(f"a spool {1e3 * reeled:.1f} mm from zero, beyond {1e3 * limits.travel:g} mm", fix=fix)
-        if seen.state != State.ENABLED:
-            raise SafetyStop(f"the board is {seen.state.name}, not ENABLED", fix="home again")
+        if tick.state != State.ENABLED:
+            raise SafetyStop(f"the board is {tick.state.name}, not ENABLED", fix="home again")
 
     def standing(self, theta: float, position: Array, taut: Array) -> None:
         """Judge a wrist whose motors stand by one marker angle [rad]; position and taut as of `Seen`."""
@@ -90,13 +90,13 @@ class Monitor:
         """Seconds for which the marker may be out of sight."""
         return self._limits.stale
 
-    def _count_lapses(self, seen: Seen) -> None:
-        before = seen.lapses if self._lapses is None else self._lapses
-        self._lapses = seen.lapses
-        self._lapsed.extend([seen.time] * ((seen.lapses - before) & 0xFF))
-        if len(self._lapsed) == _LAPSES and seen.time - self._lapsed[0] < _WITHIN:
-            what = f"step rates came too late to the board {_LAPSES} times in {_WITHIN:g} s"
-            raise SafetyStop(what, fix="close other programs, or see that the cable and its plugs are sound")
+    def _count_lapses(self, tick: Seen) -> None:
+        before = tick.lapses if self._lapses is None else self._lapses
+        self._lapses = tick.lapses
+        self._lapsed.extend([tick.time] * ((tick.lapses - before) & 0xFF))
+        if len(self._lapsed) == _LAPSES and tick.time - self._lapsed[0] < _WITHIN:
+            problem = f"step rates came too late to the board {_LAPSES} times in {_WITHIN:g} s"
+            raise SafetyStop(problem, fix="close other programs, or see that the cable and its plugs are sound")
 
     def _angle(self, theta: float) -> None:
         limit = self._limits.angle_deg

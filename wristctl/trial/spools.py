@@ -30,7 +30,7 @@ from wristctl.wrist.tendons import lengths, moment_arms
 
 
 def on_plus_side(plane: str) -> NDArray[np.bool_]:
-    """Which axes wind a tendon of the + side of this bending plane (ulnar or flexion), (4,)."""
+    """Mask (4,) of the axes that wind a tendon of the + side of this bending plane (ulnar or flexion)."""
     return np.isin(ACTIVE, tendons_of(plane)[:2])
 
 
@@ -42,7 +42,7 @@ class Spools:
     """Tendon moved by one microstep [m]."""
     pulley_radius: float
     stiffness: float
-    """Of one tendon [N/m]."""
+    """Stiffness of one tendon [N/m]."""
     speed: float
     """Largest step rate [1/s]."""
     acceleration: float
@@ -93,7 +93,7 @@ class Paths:
         self._found = np.zeros(4)
 
     def taut(self, theta: float) -> tuple[Array, Array]:
-        """By how much each tendon is reeled in where it is just taut at theta [m], and its change by theta [m/rad]."""
+        """Reeled-in lengths of tendons that are just taut at theta [m], and their change by theta [m/rad]."""
         _paths(self._model, theta, self._found)
         reeled_plus, reeled_minus, arm_plus, arm_minus = self._found
         return np.where(self._plus, reeled_plus, reeled_minus), np.where(self._plus, arm_plus, arm_minus)
@@ -117,19 +117,19 @@ def _targets(tension: Any, stiffness: float, taut: Any, reeled: Any) -> None:
 @kernel
 def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates: Any) -> None:
     speed, acceleration = motor
-    gaps, known, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
+    gaps, speeds, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
     change = acceleration * period
     for axis in range(len(gap)):
         closing = reeling(gaps[axis], acceleration + zero_like(gaps[axis]), period)
-        wanted = clip(known[axis] + where(gaps[axis] < 0.0, -closing, closing), -speed, speed)
+        wanted = clip(speeds[axis] + where(gaps[axis] < 0.0, -closing, closing), -speed, speed)
         out[axis] = clip(wanted, last[axis] - change, last[axis] + change)
 
 
 @kernel
-def _paths(model: Any, theta: float, found: Any) -> None:
-    known, row = load_segments(rows_of(model)), rows_of(found)
-    angle = theta + zero_like(known.length)
-    plus, minus = lengths(angle, known)
-    row[0] = known.length - plus
-    row[1] = known.length - minus
-    row[2], row[3] = moment_arms(angle, known)
+def _paths(model: Any, theta: float, paths: Any) -> None:
+    believed, row = load_segments(rows_of(model)), rows_of(paths)
+    angle = theta + zero_like(believed.length)
+    plus, minus = lengths(angle, believed)
+    row[0] = believed.length - plus
+    row[1] = believed.length - minus
+    row[2], row[3] = moment_arms(angle, believed)

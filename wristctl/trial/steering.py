@@ -22,12 +22,12 @@ from wristctl.simulation.stationary_filter import Belief, observer_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
+# Ticks that a frame may be late.
 REMEMBERED = 256
-"""Ticks that a frame may be late."""
 
 
 class Answer(NamedTuple):
-    """What the law wants and what the tendons are told: torques [N m], tensions of one tendon of each side [N]."""
+    """Answer of the law: torques wanted and commanded [N m], tensions of one tendon of each side [N]."""
 
     torque_wanted: float
     torque: float
@@ -94,8 +94,8 @@ class Steering:
 
 
 @kernel
-def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float, found: Any) -> None:
-    believed, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(found)
+def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float, result: Any) -> None:
+    believed, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(result)
     course, tick, preview = to_follow
     for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
         control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
@@ -126,7 +126,7 @@ def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minu
 
 
 class HostFaults:
-    """Those of the bench's faults that happen in the control loop; times count from the trial's motion."""
+    """Faults of the bench that happen in the control loop; times count from the trial's motion."""
 
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = Faults(faults)

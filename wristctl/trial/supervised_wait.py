@@ -13,22 +13,22 @@ from wristctl.trial.safety import Monitor, SafetyStop
 from wristctl.trial.spools import Paths
 from wristctl.trial.tracking import Tracking
 
+# A moment of waiting: comes back soon, to be called again, and raises what ends the wait.
 Meanwhile = Callable[[], None]
-"""A moment of waiting: comes back soon, to be called again, and raises what ends the wait."""
 
+# Seconds between two looks at a board that waits, and signs of life to it.
 _PULSE = 0.02
-"""Seconds between two looks at a board that waits, and signs of life to it."""
+# Seconds between two looks at a wrist that stands.
 _LOOK = 0.05
-"""Seconds between two looks at a wrist that stands."""
+# Seconds within which the marker must be read.
 _READING = 2.0
-"""Seconds within which the marker must be read."""
 
 
 class Reading(NamedTuple):
     """The marker of a wrist that stands."""
 
     theta: float
-    """Its angle [rad]."""
+    """Angle of the marker [rad]."""
     size: float
     """Over the base's; nan where it is not measured."""
 
@@ -44,7 +44,7 @@ class Patience:
         self._board, self._judge = board, judge
         self._stood = board.read()
         self.pace = CameraPace()
-        """Of the pictures looked at here."""
+        """Pace of the pictures looked at here."""
 
     def pulse(self, longest: float = _PULSE) -> None:
         """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
@@ -66,19 +66,19 @@ class Patience:
 
     def reading(self, tracking: Tracking, frames: int) -> Reading:
         """Medians of the next usable frames. Raises SafetyStop where none come."""
-        found: list[tuple[float, float]] = []
+        readings: list[tuple[float, float]] = []
         tracking.look()
         began = self._board.transport.now()
-        while len(found) < frames:
+        while len(readings) < frames:
             self.pulse()
-            for seen in tracking.look():
-                self.pace.add(seen)
-                if seen.time >= began and math.isfinite(seen.theta):
-                    found.append((seen.theta, seen.size))
+            for sighting in tracking.look():
+                self.pace.add(sighting)
+                if sighting.time >= began and math.isfinite(sighting.theta):
+                    readings.append((sighting.theta, sighting.size))
             if self._board.transport.now() - began > _READING:
                 why, fix = self.pace.missing(self._board.transport.now(), _READING)
                 raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
-        theta, size = np.median(found, axis=0)
+        theta, size = np.median(readings, axis=0)
         return Reading(float(theta), float(size))
 
     def _see(self, status: Status) -> None:
@@ -90,8 +90,8 @@ class Patience:
             raise SafetyStop(f"the board is {status.state.name}, not {stood.state.name}", fix="home again")
         if status.state == State.ENABLED and status.position != stood.position:
             steps = [now - before for now, before in zip(status.position, stood.position, strict=True)]
-            what = f"the motors moved by {steps} steps while they were to stand"
-            raise SafetyStop(what, fix="report it, with the log: this is a bug")
+            problem = f"the motors moved by {steps} steps while they were to stand"
+            raise SafetyStop(problem, fix="report it, with the log: this is a bug")
 
 
 class InSight:
@@ -115,7 +115,7 @@ class InSight:
         if now - self._seen > self._monitor.stale:
             return
         reeled = self._signs * np.array(status.position, float)
-        for seen in looked:
-            if math.isfinite(seen.theta):
-                self._seen = seen.time
-                self._monitor.standing(seen.theta, reeled, self._paths.taut(seen.theta)[0])
+        for sighting in looked:
+            if math.isfinite(sighting.theta):
+                self._seen = sighting.time
+                self._monitor.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])

@@ -1,4 +1,4 @@
-"""What trials stand on: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
+"""Testbeds of trials: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -19,10 +19,10 @@ from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
 
+# Tells the operator what to do, and returns once it is done; has moments pass meanwhile, and raises what they raise.
+#
+# Raises UserError where the operator declines.
 Ask = Callable[[str, Meanwhile], None]
-"""Tells the operator what to do, and returns once it is done; has moments pass meanwhile, and raises what they raise.
-
-Raises UserError where the operator declines."""
 
 
 BEFORE_MOTION = (
@@ -69,7 +69,7 @@ class EmulatedTestbed:
         self._tracking: Tracking | None = None
 
     def confirm(self, meanwhile: Meanwhile) -> None:
-        """It is agreed to after a while."""
+        """Wait for a while, then agree."""
         self._person(meanwhile)
 
     def tracking(self) -> Tracking:
@@ -82,7 +82,7 @@ class EmulatedTestbed:
         return self._tracking
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """It is turned after a while."""
+        """Wait for a while, then turn the wrist."""
         self._person(meanwhile)
         self._bench.face(direction)
 
@@ -91,7 +91,7 @@ class EmulatedTestbed:
         self._bench.begin(start, disturbances, noise)
 
     def truth(self, since: float) -> Array:
-        """What the emulated wrist did since then."""
+        """True motion of the emulated wrist since then."""
         truth = self._bench.truth(since)
         return np.column_stack([truth.time - since, truth.theta, truth.angle, truth.pull])
 
@@ -143,8 +143,8 @@ class RealTestbed:
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
         """Ask the operator to turn the wrist."""
-        what = f"Set the wrist up so that it bends toward {direction} in the camera's picture, both markers in view."
-        self._ask(what, meanwhile)
+        request = f"Set the wrist up so that it bends toward {direction} in the camera's picture, both markers in view."
+        self._ask(request, meanwhile)
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """Nobody disturbs a real wrist but a person."""

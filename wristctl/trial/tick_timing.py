@@ -11,20 +11,20 @@ from wristctl.config.hw_run import Safety
 from wristctl.trial.camera_pace import CameraPace
 from wristctl.trial.safety import SafetyStop
 
+# Seconds that are judged together.
 _WINDOW = 0.5
-"""Seconds that are judged together."""
+# Ticks from one look at them to the next.
 _EVERY = 4
-"""Ticks from one look at them to the next."""
+# Share of a period that the board's answer may take without being blamed.
 _SOUND = 0.6
-"""Share of a period that the board's answer may take without being blamed."""
 
 SCHEDULING, LINK, WORK = "the computer woke the loop late", "the board's answers took long", "the loop's own work did"
+# Who makes ticks late, and what to do about it.
 FIX = {
     SCHEDULING: "close other programs, or give the loop priority: hw-run --priority",
     LINK: "the USB adapter's latency timer or a hub: wristctl hw check --rig; or a longer control_period",
     WORK: "a longer control_period, or a faster computer",
 }
-"""Who makes ticks late, and what to do about it."""
 
 
 class _Tick(NamedTuple):
@@ -35,11 +35,11 @@ class _Tick(NamedTuple):
 
 @dataclass
 class TickTiming:
-    """Of every tick of a run, and of the camera's pictures beside them."""
+    """Timing of a run's ticks and of the camera's pictures beside them."""
 
     period: float
     late: list[float] = field(default_factory=list)
-    """Of each tick [s]."""
+    """Lateness of the ticks [s]."""
     overruns: int = 0
     """Ticks that were skipped because one before took too long."""
     culprits: Counter[str] = field(default_factory=Counter)
@@ -74,16 +74,16 @@ class TickTiming:
         if self._due < self._most or len(self.late) % _EVERY:
             return
         skipped = self._due - len(self._recent)
-        trip = float(np.median([each.round_trip for each in self._recent]))
+        trip = float(np.median([tick.round_trip for tick in self._recent]))
         if trip > limits.round_trip * self.period:
-            what = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * self.period:g} ms"
-            raise SafetyStop(what, fix=FIX[LINK])
+            problem = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * self.period:g} ms"
+            raise SafetyStop(problem, fix=FIX[LINK])
         share = skipped / self._due
         if share > limits.skipped:
-            blamed = Counter(each.culprit for each in self._recent if each.skipped)
+            blamed = Counter(tick.culprit for tick in self._recent if tick.skipped)
             who = blamed.most_common(1)[0][0]
-            what = f"{100 * share:.0f} % of the last half second's ticks were skipped: {who}"
-            raise SafetyStop(what, fix=FIX[who])
+            problem = f"{100 * share:.0f} % of the last half second's ticks were skipped: {who}"
+            raise SafetyStop(problem, fix=FIX[who])
 
     def said(self) -> str:
         """In words."""

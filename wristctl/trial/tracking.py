@@ -15,13 +15,13 @@ from wristctl.loop_priority import beside_the_loop
 from wristctl.vision.camera import Camera, Frame
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
 
+# Seconds for which a picture is known again: longer than any ring of buffers lasts.
 _REMEMBERED = 1.0
-"""Seconds for which a picture is known again: longer than any ring of buffers lasts."""
+# Pixels within which corners are the same. Noise moves those of a wrist at rest by ten times as much, all eight of
+# them, each in both directions, in every picture; a repeated one gives them to rounding.
 _SAME = 1e-3
-"""Pixels within which corners are the same. Noise moves those of a wrist at rest by ten times as much, all eight of
-them, each in both directions, in every picture; a repeated one gives them to rounding."""
+# Seconds by which a time stamp may be ahead of the clock: both are rounded.
 _CLOCKS = 1e-3
-"""Seconds by which a time stamp may be ahead of the clock: both are rounded."""
 
 
 class _Known(NamedTuple):
@@ -41,18 +41,18 @@ class CameraTruth:
         self._known: deque[_Known] = deque()
         self._time, self._number = -math.inf, -1
 
-    def judge(self, frame: Frame, seen: Sighting) -> Sighting:
-        """The same sighting, or one of verdict `stamp` or `frozen`; it says when the frame came."""
-        while self._known and seen.came - self._known[0].came > _REMEMBERED:
+    def judge(self, frame: Frame, sighting: Sighting) -> Sighting:
+        """Judge a sighting: unchanged, or of verdict `stamp` or `frozen`; it says when the frame came."""
+        while self._known and sighting.came - self._known[0].came > _REMEMBERED:
             self._known.popleft()
-        shown = _Known(seen.came, zlib.crc32(frame.image.tobytes()), seen.corners)
-        repeated = any(_alike(each, shown) for each in self._known)
+        shown = _Known(sighting.came, zlib.crc32(frame.image.tobytes()), sighting.corners)
+        repeated = any(_alike(earlier, shown) for earlier in self._known)
         self._known.append(shown)
-        stamped = self._time < frame.time <= seen.came + _CLOCKS and self._number < frame.number
-        self._time, self._number = max(self._time, min(frame.time, seen.came)), max(self._number, frame.number)
+        stamped = self._time < frame.time <= sighting.came + _CLOCKS and self._number < frame.number
+        self._time, self._number = max(self._time, min(frame.time, sighting.came)), max(self._number, frame.number)
         if repeated:
-            return seen._replace(theta=math.nan, verdict=SightingVerdict.FROZEN)
-        return seen if stamped else seen._replace(theta=math.nan, verdict=SightingVerdict.STAMP)
+            return sighting._replace(theta=math.nan, verdict=SightingVerdict.FROZEN)
+        return sighting if stamped else sighting._replace(theta=math.nan, verdict=SightingVerdict.STAMP)
 
 
 def _alike(before: _Known, now: _Known) -> bool:
@@ -64,8 +64,8 @@ def _alike(before: _Known, now: _Known) -> bool:
     return bool((moved[1] < _SAME).all() and not (moved[0] >= _SAME).any())
 
 
+# Takes a frame and what was seen in it, to keep it.
 Kept = Callable[[Frame, Sighting], None]
-"""Takes a frame and what was seen in it, to keep it."""
 
 
 class Tracking(Protocol):
@@ -75,7 +75,7 @@ class Tracking(Protocol):
     """Marker angle of the straight wrist [rad], taken off every angle."""
 
     def look(self) -> list[Sighting]:
-        """What was seen since the last look, oldest first; never waits for a frame."""
+        """Sightings since the last look, oldest first; never waits for a frame."""
 
     def close(self) -> None:
         """Look no more; the camera stays open."""
@@ -99,11 +99,11 @@ class InlineTracking:
         if frame is None:
             return []
         came = self._now()
-        seen = self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
-        self.frame, seen = frame, seen._replace(theta=seen.theta - self.zero)
+        sighting = self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
+        self.frame, sighting = frame, sighting._replace(theta=sighting.theta - self.zero)
         if self._keep is not None:
-            self._keep(frame, seen)
-        return [seen]
+            self._keep(frame, sighting)
+        return [sighting]
 
     def close(self) -> None:
         """Nothing goes on between looks."""
@@ -127,13 +127,13 @@ class ThreadedTracking:
         self._thread.start()
 
     def look(self) -> list[Sighting]:
-        """What was seen since the last look. Raises what ended the thread."""
+        """Sightings since the last look. Raises the error that ended the thread."""
         if self._error is not None:
             raise self._error
-        found = []
+        sightings = []
         while self._seen:
-            found.append(self._seen.popleft())
-        return [each._replace(theta=each.theta - self.zero) for each in found]
+            sightings.append(self._seen.popleft())
+        return [sighting._replace(theta=sighting.theta - self.zero) for sighting in sightings]
 
     def close(self) -> None:
         """Stop looking."""
@@ -144,10 +144,10 @@ class ThreadedTracking:
         try:
             beside_the_loop()
             while not self._stop.is_set():
-                if found := self._inner.look():
-                    self._seen.extend(found)
+                if sightings := self._inner.look():
+                    self._seen.extend(sightings)
                     if self._keep is not None and self._inner.frame is not None:
-                        self._keep(self._inner.frame, found[0]._replace(theta=found[0].theta - self.zero))
+                        self._keep(self._inner.frame, sightings[0]._replace(theta=sightings[0].theta - self.zero))
                 else:
                     time.sleep(1e-3)
         except BaseException as error:  # handed to the loop, which stops the motors

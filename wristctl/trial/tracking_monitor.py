@@ -24,19 +24,19 @@ from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import ACTIVE, away_of
 from wristctl.wrist.segments import load_segments, segments
 
+# Steps in the time looked at from which a motor has turned.
 _TURNED = 40.0
-"""Steps in the time looked at from which a motor has turned."""
+# Bend in that time from which the wrist was meant to move.
 _MEANT = math.radians(2.0)
-"""Bend in that time from which the wrist was meant to move."""
+# Turnings back, in the time looked at for them, from which a loop swings: a motion there and back has one.
 _SWINGS = 3
-"""Turnings back, in the time looked at for them, from which a loop swings: a motion there and back has one."""
 _LOOP_SWINGS = "the loop swings: friction in the sheaths, a camera later than is believed, or gains too high for them"
+# Change from one frame to the next that no motion at rest makes.
 _JUMP = math.radians(2.0)
-"""Change from one frame to the next that no motion at rest makes."""
 
 
 class Evidence(NamedTuple):
-    """What the last moments have shown; SI units."""
+    """Evidence of the last moments; SI units."""
 
     turned: Array
     """Steps by which each spool was told to reel in, (4,)."""
@@ -45,50 +45,50 @@ class Evidence(NamedTuple):
     """Away from the camera."""
     bent: float
     meant: float
-    """By how much the wrist has bent, and should have by its spools."""
+    """Bend of the wrist that its spools should have made; `bent` is the measured one."""
     jump: float
     """Largest change of the marker's angle from one frame to the next, off what the spools make."""
     bends: float
     """Bend across that is beyond the limit."""
     reversals: int = 0
-    """How often a spool has turned back."""
+    """Number of times that a spool has turned back."""
 
 
 def reversals(positions: Array) -> int:
-    """How often any spool (n, 4) [steps] has turned back by so much that it has turned."""
+    """Largest number of times that a spool of (n, 4) [steps] has turned back, by enough to count as turned."""
     return max(_turned_back(course) for course in positions.T.tolist())
 
 
 def _turned_back(course: Sequence[float]) -> int:
-    found, sense, low, high = 0, 0, course[0], course[0]
-    for at in course:
-        low, high = min(low, at), max(high, at)
-        if sense >= 0 and high - at >= _TURNED:
-            found, sense, low = found + sense, -1, at
-        elif sense <= 0 and at - low >= _TURNED:
-            found, sense, high = found - sense, 1, at
-    return found
+    turns, sense, low, high = 0, 0, course[0], course[0]
+    for position in course:
+        low, high = min(low, position), max(high, position)
+        if sense >= 0 and high - position >= _TURNED:
+            turns, sense, low = turns + sense, -1, position
+        elif sense <= 0 and position - low >= _TURNED:
+            turns, sense, high = turns - sense, 1, position
+    return turns
 
 
-def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
+def likely_causes(evidence: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
     """Causes in words.
 
     A load toward one side means that a tendon of the other pulls less than its spool says, or one of the same side
     more. Of each pair the bend across tells which: it is away from a camera for a tendon that pulls too much on the
     far side, or too little on the near one.
     """
-    swings = [_LOOP_SWINGS] if seen.reversals >= _SWINGS else []
-    if abs(seen.across) > 0.5 * seen.bends and seen.jump <= _JUMP:
-        return [*swings, *_of_one_tendon(seen, plus, away)]
-    causes, meant = swings, abs(seen.meant) > _MEANT
-    if seen.jump > _JUMP:
+    swings = [_LOOP_SWINGS] if evidence.reversals >= _SWINGS else []
+    if abs(evidence.across) > 0.5 * evidence.bends and evidence.jump <= _JUMP:
+        return [*swings, *_of_one_tendon(evidence, plus, away)]
+    causes, meant = swings, abs(evidence.meant) > _MEANT
+    if evidence.jump > _JUMP:
         causes += ["the tip's marker has slipped on its disc", "the camera shows or dates pictures wrongly"]
-    share = seen.bent / seen.meant if meant else math.nan
+    share = evidence.bent / evidence.meant if meant else math.nan
     if abs(share) < 0.15:
         causes.append("the motors have no supply")
     if share < 0.15:
         causes.append("both motors of a side turn the wrong way, are stuck, or are exchanged with the other side's")
-    turning = bool((abs(seen.turned) > _TURNED).any())
+    turning = bool((abs(evidence.turned) > _TURNED).any())
     if meant and share >= 0.15:
         much = "more" if share > 1.0 else "less"
         causes.append(f"the wrist bends by {much} than its spools say: wrong pulley or microsteps (DIP switches)")
@@ -96,32 +96,32 @@ def likely_causes(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> 
         causes.append("motors exchanged, detached or slipped tendons on a side, or a stalled motor")
     else:
         causes.append("a side's tendons slipped or came off, or the motors' supply was lost")
-    if seen.jump <= _JUMP:
+    if evidence.jump <= _JUMP:
         causes += ["the camera shows old pictures", "the tip's marker has slipped on its disc"]
     return [*dict.fromkeys(causes), "something holds or pushes the wrist"]
 
 
-def _of_one_tendon(seen: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
-    far, toward_plus = seen.across > 0.0, seen.load > 0.0
+def _of_one_tendon(evidence: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
+    far, toward_plus = evidence.across > 0.0, evidence.load > 0.0
     much = next(k for k in range(4) if plus[k] == toward_plus and (away[k] > 0) == far)
     little = next(k for k in range(4) if plus[k] != toward_plus and (away[k] > 0) != far)
     named = {axis: f"axis {axis} (tendon {ACTIVE[axis]})" for axis in (much, little)}
     causes = []
-    if seen.turned[much] < -_TURNED:
+    if evidence.turned[much] < -_TURNED:
         causes.append(f"{named[much]} turns the wrong way, or its direction is stuck")
-    if seen.turned[little] > _TURNED:
+    if evidence.turned[little] > _TURNED:
         causes.append(f"{named[little]} turns the wrong way")
-    if abs(seen.turned[much]) > _TURNED or abs(seen.turned[little]) > _TURNED:
+    if abs(evidence.turned[much]) > _TURNED or abs(evidence.turned[little]) > _TURNED:
         causes.append("motors exchanged")
     causes.append(f"the tendon of {named[little]} is off its pulley")
     causes.append(f"it has slipped on it, or that of {named[much]} has")
-    if abs(seen.turned[little]) > _TURNED:
+    if abs(evidence.turned[little]) > _TURNED:
         causes.append(f"{named[little]} has stalled or has no power")
     return [*causes, "something pushes the wrist across its plane"]
 
 
+# Ticks.
 _REMEMBERED = 256
-"""Ticks."""
 
 
 class BlindModel:
@@ -135,7 +135,7 @@ class BlindModel:
         self, wrist: WristParameters, actuator: Actuator, softest: float, sensor: Sensor, period: float
     ) -> None:
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
-        self._drives = [drive_of(each) for each in (actuator, soft)]
+        self._drives = [drive_of(parameters) for parameters in (actuator, soft)]
         self._observers = [observer_of(Belief(sensor, actuator, wrist, period), 1, 0.0) for _ in self._drives]
         self._model, self._period, self._tick = segments(wrist, 1), period, 0
         self._angles = np.zeros((_REMEMBERED, 2))
@@ -148,7 +148,7 @@ class BlindModel:
             self._angles[self._tick % _REMEMBERED, k] = observer.now[0]
 
     def angles(self, time: float) -> Array:
-        """Both angles (2,) [rad] `time` seconds after tick 0, as far as they are remembered."""
+        """Predicted angles (2,) [rad] `time` seconds after tick 0, as far as they are remembered."""
         tick = min(max(math.floor(time / self._period), self._tick - _REMEMBERED + 1), self._tick)
         share = min(max(time / self._period - tick, 0.0), 1.0)
         before, after = self._angles[tick % _REMEMBERED], self._angles[min(tick + 1, self._tick) % _REMEMBERED]
@@ -163,16 +163,16 @@ def _predict(observer: Any, drive: Any, model: Any, plus: float, minus: float, h
     predict(observer, drive, believed, 0, plus + zero, minus + zero, h)
 
 
+# Seconds by which causes are judged, and whether the loop swings.
 _HISTORY, _SWINGING = 0.2, 1.0
-"""Seconds by which causes are judged, and whether the loop swings."""
+# Seconds between two frames from which the wrist may have gone anywhere.
 _SUCCESSIVE = 0.06
-"""Seconds between two frames from which the wrist may have gone anywhere."""
+# Frames at rest at zero by whose median the bend across is none.
 _REFERENCE_FRAMES = 5
-"""Frames at rest at zero by whose median the bend across is none."""
 
 
 class Followed(NamedTuple):
-    """What is compared at one tick; SI units, nan where it is not known."""
+    """Values compared at one tick; SI units, nan where unknown."""
 
     time: float
     captured: float
@@ -180,7 +180,7 @@ class Followed(NamedTuple):
     seen: float
     """Marker angle of that frame."""
     predicted: Array
-    """What the spools should have made of it: with tendons as believed and as soft as may be, (2,)."""
+    """Angles that the spools should have made, with tendons as believed and as soft as may be, (2,)."""
     load: float
     away: float
     """Bend away from the camera, by the size of the tip's marker."""
@@ -220,13 +220,13 @@ class Following:
         """Go on to the next tick, with the sides reeled in by so much [m] until then."""
         self._blind.predict(reeled_plus, reeled_minus)
 
-    def saw(self, seen: Sighting, captured: float) -> tuple[float, float]:
+    def saw(self, sighting: Sighting, captured: float) -> tuple[float, float]:
         """Take in a usable frame, taken `captured` seconds after tick 0; the angle that tendons as believed should
         have had then, and its rate."""
-        away = -self._nearer * math.log(seen.size)  # a marker at a bend b is b L/2 further off
+        away = -self._nearer * math.log(sighting.size)  # a marker at a bend b is b L/2 further off
         predicted = self._blind.angles(captured)
-        self._frame = Followed(0.0, seen.time, seen.theta, predicted, 0.0, self._across(away), np.zeros(0))
-        before, after = (self._blind.angles(captured + each)[0] for each in (-self._period / 2.0, self._period / 2.0))
+        self._frame = Followed(0.0, sighting.time, sighting.theta, predicted, 0.0, self._across(away), np.zeros(0))
+        before, after = (self._blind.angles(captured + half)[0] for half in (-self._period / 2.0, self._period / 2.0))
         return float(predicted[0]), float(after - before) / self._period
 
     def see(self, time: float, load: float, position: Array) -> None:
@@ -241,13 +241,13 @@ class Following:
         limits = self._limits
         apart = now.seen - float(np.clip(now.seen, now.predicted.min(), now.predicted.max()))
         jump = _jump(*list(self._past)[-2:]) if len(self._past) > 1 else 0.0
-        known = Greatest(*(0.0 if math.isnan(each) else abs(each) for each in (apart, jump, load, now.away)))
-        self.greatest = Greatest(*map(max, self.greatest, known))
-        if known.jump > math.radians(limits.jump_deg):
-            raise self._stop("jump", known.jump, math.radians(limits.jump_deg))
-        self._judge("across", known.across, math.radians(limits.across_deg), now)
-        self._judge("load", known.load, limits.load, now)
-        self._judge("apart", known.apart, math.radians(limits.follow_deg), now)
+        sizes = Greatest(*(0.0 if math.isnan(value) else abs(value) for value in (apart, jump, load, now.away)))
+        self.greatest = Greatest(*map(max, self.greatest, sizes))
+        if sizes.jump > math.radians(limits.jump_deg):
+            raise self._stop("jump", sizes.jump, math.radians(limits.jump_deg))
+        self._judge("across", sizes.across, math.radians(limits.across_deg), now)
+        self._judge("load", sizes.load, limits.load, now)
+        self._judge("apart", sizes.apart, math.radians(limits.follow_deg), now)
 
     def _across(self, away: float) -> float:
         if math.isfinite(away) and len(self._straight) < _REFERENCE_FRAMES:
@@ -256,24 +256,24 @@ class Following:
             return math.nan
         return away - float(np.median(self._straight))
 
-    def _judge(self, what: str, value: float, limit: float, now: Followed) -> None:
+    def _judge(self, quantity: str, value: float, limit: float, now: Followed) -> None:
         if value <= limit:
-            self._beyond.pop(what, None)
+            self._beyond.pop(quantity, None)
             return
-        if now.time - self._beyond.setdefault(what, now.time) < self._limits.odd_for * limit / value:
+        if now.time - self._beyond.setdefault(quantity, now.time) < self._limits.odd_for * limit / value:
             return
-        raise self._stop(what, value, limit)
+        raise self._stop(quantity, value, limit)
 
-    def _stop(self, what: str, value: float, limit: float) -> SafetyStop:
-        return SafetyStop(f"{self._told(what, value, limit)}; likely {', or '.join(self._causes()[:4])}", fix=_FIX)
+    def _stop(self, quantity: str, value: float, limit: float) -> SafetyStop:
+        return SafetyStop(f"{self._told(quantity, value, limit)}; likely {', or '.join(self._causes()[:4])}", fix=_FIX)
 
-    def _told(self, what: str, value: float, limit: float) -> str:
-        if what == "load":
+    def _told(self, quantity: str, value: float, limit: float) -> str:
+        if quantity == "load":
             return f"the wrist does not follow its motors: a load of {value:.2f} N m, beyond {limit:g} N m"
-        angle, most = (f"{math.degrees(each):.1f} deg" for each in (value, limit))
-        if what == "jump":
+        angle, most = (f"{math.degrees(bend):.1f} deg" for bend in (value, limit))
+        if quantity == "jump":
             return f"the marker's angle jumps by {angle} from one frame to the next, beyond {most}"
-        if what == "apart":
+        if quantity == "apart":
             return f"the wrist does not follow its motors: it is {angle} from where they should have it, beyond {most}"
         return f"the wrist bends {angle} across its plane, beyond {most}"
 
@@ -297,7 +297,7 @@ _FIX = "cut the motors' supply, slacken the tendons by hand, and look; docs/hard
 
 
 def _jump(one: Followed, two: Followed) -> float:
-    """By how much a second frame came off the motion that the spools should have made since the first."""
+    """Jump of a second frame off the motion that the spools should have made since the first."""
     if not 0.0 < two.captured - one.captured <= _SUCCESSIVE:
         return 0.0
     return float(np.abs(two.seen - one.seen - (two.predicted - one.predicted)).min())

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Seconds before the push over which the load is taken as quiet.
 _BEFORE = 0.5
-"""Seconds before the push over which the load is taken as quiet."""
 
 
 class Trial(NamedTuple):
@@ -43,11 +43,11 @@ class Trial(NamedTuple):
     push: float
     """Largest force against the bend [N], 0 without a push."""
     row: int
-    """Of the settings' rows of controllers."""
+    """Index into the settings' rows of controllers."""
 
     @property
     def scenario(self) -> str:
-        """What its noise goes by: direction and push, whichever row and however often."""
+        """Name that the trial's noise goes by: direction and push, without row and repetition."""
         return f"{self.direction}, push {self.push:g} N"
 
     @property
@@ -73,9 +73,9 @@ def trials_of(settings: HwRunSettings, rng: np.random.Generator) -> list[Trial]:
     planes = list(dict.fromkeys(DIRECTIONS[direction].plane for direction, *_ in every))
     ordered = []
     for plane in rng.permutation(planes):
-        members = [each for each in every if DIRECTIONS[each[0]].plane == plane]
+        members = [combination for combination in every if DIRECTIONS[combination[0]].plane == plane]
         ordered += [members[k] for k in rng.permutation(len(members))]
-    return [Trial(number, *each) for number, each in enumerate(ordered)]
+    return [Trial(number, *combination) for number, combination in enumerate(ordered)]
 
 
 class PushSeen(NamedTuple):
@@ -121,12 +121,12 @@ def motion_of(
     Raises UserError for one out of reach.
     """
     reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()
-    found = motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
-    if not np.isfinite(found.angles.rows).all():
+    course = motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
+    if not np.isfinite(course.angles.rows).all():
         raise UserError(
             "the reference has samples that are no number", "reference", "a course that is finite everywhere"
         )
-    return found
+    return course
 
 
 def back(theta: float, duration: float, rest: float, period: float) -> Motion:
@@ -146,13 +146,13 @@ def at_rest(duration: float, period: float) -> Motion:
     return back(0.0, duration, 0.0, period)
 
 
+# The metrics of the paper's tables; also told of the true angle, where it is known.
 JUDGED = ("rmse", "settling", "steady_state")
-"""The metrics of the paper's tables; also told of the true angle, where it is known."""
 
+# Seconds by which a person may push too early.
 _EARLY = 0.5
-"""Seconds by which a person may push too early."""
+# Load torque [N m] that counts as a push.
 _LEAST_PUSH = 0.01
-"""Load torque [N m] that counts as a push."""
 
 
 def evaluated(
@@ -165,9 +165,9 @@ def evaluated(
     """
     time, theta, error = (course[name].to_numpy(float) for name in ("time", "theta", "error"))
     names = [*summed(), *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
-    found = dict.fromkeys(names, math.nan)
+    metrics = dict.fromkeys(names, math.nan)
     if not len(time) or time[-1] < followed.horizon - 1.5 * period:
-        return found
+        return metrics
     grid, goals = followed.time, followed.goals
     tensions = course[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
     plus = on_plus_side(trial.plane)
@@ -179,19 +179,19 @@ def evaluated(
         flags = np.interp(grid, time, saturated.astype(float)) > 0.5
         return metrics_of(period, angle, followed.theta_ref, tension, goals, flags)
 
-    found |= judged(np.interp(grid, time, theta))
+    metrics |= judged(np.interp(grid, time, theta))
     if trial.push:
-        seen = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - _EARLY), _LEAST_PUSH)
-        if seen is not None:
-            found["push_torque"] = seen.torque
-            found["recovery"] = recovery(time, error, goals.move, seen.end)
+        pushed = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - _EARLY), _LEAST_PUSH)
+        if pushed is not None:
+            metrics["push_torque"] = pushed.torque
+            metrics["recovery"] = recovery(time, error, goals.move, pushed.end)
     if truth is not None and len(truth):
         angle = np.interp(grid, truth["time"], truth["theta"])
-        found |= {f"true_{name}": value for name, value in judged(angle).items() if name in JUDGED}
+        metrics |= {f"true_{name}": value for name, value in judged(angle).items() if name in JUDGED}
         if trial.push:
             ended = push.start + push.duration
-            found["true_recovery"] = recovery(grid, angle - followed.theta_ref, goals.move, ended)
-    return found
+            metrics["true_recovery"] = recovery(grid, angle - followed.theta_ref, goals.move, ended)
+    return metrics
 
 
 def twin(

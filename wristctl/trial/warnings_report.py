@@ -1,4 +1,4 @@
-"""What was odd in a trial that went on all the same: beyond what a sound rig shows, within the limits."""
+"""Oddities of a trial within the limits, but beyond those of a sound rig."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,12 +11,12 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.tracking_monitor import Greatest
 
 _LEAST_FRAMES = 20
+# Standard errors.
 _SURE = 3.0
-"""Standard errors."""
 
 
 class MarkerLag:
-    """Of the usable frames of a motion, with what the spools should have made of the wrist when each was taken."""
+    """Lag of the marker in a motion's usable frames behind the angle that the spools should have made."""
 
     def __init__(self) -> None:
         self._frames: list[tuple[float, float, float]] = []
@@ -34,23 +34,23 @@ class MarkerLag:
         if len(theta) < _LEAST_FRAMES:
             return -math.inf
         terms = np.stack([np.ones_like(theta), predicted, -rate], axis=1)
-        found, _, rank, _ = np.linalg.lstsq(terms, theta)
-        _, scale, late = found
+        coefficients, _, rank, _ = np.linalg.lstsq(terms, theta)
+        _, scale, late = coefficients
         if rank < terms.shape[1] or scale <= 0.0:
             return -math.inf
-        left = theta - terms @ found
+        left = theta - terms @ coefficients
         variance = float(left @ left) / (len(theta) - terms.shape[1]) * np.linalg.inv(terms.T @ terms)[2, 2]
         return float((late - _SURE * math.sqrt(variance)) / scale)
 
 
+# Share of a limit from which a value is worth a word, above what sound rigs of the default settings show.
 _SHARE, _FOLLOWING = 0.6, {"apart": 0.35, "jump": 0.5, "across": 0.8}
-"""Of a limit from which a value is worth a word, above what sound rigs of the default settings show."""
+# Shares beyond what is believed that are: of frames without an angle, of commands sent again, of ticks skipped.
 _UNSEEN, _RESENT, _SKIPPED = 0.1, 0.002, 0.01
-"""Shares beyond what is believed that are: of frames without an angle, of commands sent again, of ticks skipped."""
+# Seconds; no stepper's tendons as believed lag by 3 ms.
 _LAG = 0.015
-"""Seconds; no stepper's tendons as believed lag by 3 ms."""
+# Limits as shares: of the marker's side, and of the control period.
 _MOVED, _LONG = 0.03, 0.85
-"""Of the marker's side, and of the control period."""
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Oddities:
     """Longest time since the capture of a usable angle [s]."""
     late: float = 0.0
     span: float = 0.0
-    """How long it went on [s]."""
+    """Duration of the trial [s]."""
     ticks: int = 0
     skipped: int = 0
     usable: int = 0
@@ -71,12 +71,12 @@ class Oddities:
     resent: int = 0
     """Commands that had to be sent again."""
     reasons: dict[str, int] = field(default_factory=dict)
-    """How often each verdict but ok came."""
+    """Counts of the verdicts but ok."""
     round_trips: list[float] = field(default_factory=list)
     """From each tick's command to its answer [s]."""
     lag: MarkerLag = field(default_factory=MarkerLag)
     moved: float = 0.0
-    """How far the base's marker was from where it was first, in its sides."""
+    """Distance of the base's marker from its first place, in its sides."""
     _base: Array | None = None
 
     def base(self, corners: Array) -> None:
@@ -99,35 +99,39 @@ class Oddities:
             self.reasons[row["verdict"]] = self.reasons.get(row["verdict"], 0) + 1
 
     def words(self) -> str:
-        """What was odd, in one line."""
+        """Describe the oddities in one line."""
         limits, sensor = self.settings.safety, self.settings.sensor
         degrees = {"apart": limits.follow_deg, "jump": limits.jump_deg, "across": limits.across_deg}
-        told = {"apart": "off its motors", "jump": "of jump between frames", "across": "across the plane"}
-        found = [
-            f"{value:.1f} deg {told[name]} (limit {limit:g})"
+        meanings = {"apart": "off its motors", "jump": "of jump between frames", "across": "across the plane"}
+        oddities = [
+            f"{value:.1f} deg {meanings[name]} (limit {limit:g})"
             for name, limit in degrees.items()
             if (value := math.degrees(getattr(self.greatest, name))) > _FOLLOWING[name] * limit
         ]
         if self.greatest.load > _SHARE * limits.load:
-            found.append(f"a load of {self.greatest.load:.1f} N m (limit {limits.load:g})")
+            oddities.append(f"a load of {self.greatest.load:.1f} N m (limit {limits.load:g})")
         if self.gap > _SHARE * limits.stale:
-            found.append(f"no usable marker angle for {1e3 * self.gap:.0f} ms (limit {1e3 * limits.stale:g})")
+            oddities.append(f"no usable marker angle for {1e3 * self.gap:.0f} ms (limit {1e3 * limits.stale:g})")
         rate, believed = self.usable / max(self.span, 1e-9), sensor.frame_rate * (1.0 - sensor.dropped)
         if self.span > 0.5 and rate < (1.0 - _UNSEEN) * believed:
-            why = max(self.reasons, key=lambda each: self.reasons[each], default="")
-            what = f"{rate:.0f} usable angles per second instead of {believed:.0f}"
-            found.append(f"{what} ({why})" if why else what)
+            why = max(self.reasons, key=lambda verdict: self.reasons[verdict], default="")
+            problem = f"{rate:.0f} usable angles per second instead of {believed:.0f}"
+            oddities.append(f"{problem} ({why})" if why else problem)
         if self.late > _SHARE * limits.late:
-            found.append(f"a tick {1e3 * self.late:.0f} ms late (limit {1e3 * limits.late:g})")
+            oddities.append(f"a tick {1e3 * self.late:.0f} ms late (limit {1e3 * limits.late:g})")
         if self.skipped > _SKIPPED * self.ticks:
-            found.append(f"{self.skipped} of {self.ticks + self.skipped} ticks skipped")
+            oddities.append(f"{self.skipped} of {self.ticks + self.skipped} ticks skipped")
         if self.moved > _MOVED:
-            found.append(f"the base's marker moved by {100.0 * self.moved:.0f} % of its side: camera or clamp is loose")
+            oddities.append(
+                f"the base's marker moved by {100.0 * self.moved:.0f} % of its side: camera or clamp is loose"
+            )
         if self.round_trips and (taken := float(np.median(self.round_trips))) > _LONG * self.settings.control_period:
-            found.append(f"the board's answers took {1e3 * taken:.1f} ms, of {1e3 * self.settings.control_period:g} ms")
+            oddities.append(
+                f"the board's answers took {1e3 * taken:.1f} ms, of {1e3 * self.settings.control_period:g} ms"
+            )
         if (lag := self.lag.least()) > _LAG:
-            what = f"the marker comes {1e3 * lag:.0f} ms or more after its motors"
-            found.append(f"{what}: pictures older than their stamps say, soft tendons or friction")
+            problem = f"the marker comes {1e3 * lag:.0f} ms or more after its motors"
+            oddities.append(f"{problem}: pictures older than their stamps say, soft tendons or friction")
         if self.resent > _RESENT * self.ticks:
-            found.append(f"{self.resent} commands sent again: see the cable")
-        return "; ".join(found)
+            oddities.append(f"{self.resent} commands sent again: see the cable")
+        return "; ".join(oddities)

@@ -1,4 +1,4 @@
-"""What a camera is to the loop, and recordings as cameras: a video file, a folder of pictures."""
+"""Camera as the loop's source of frames, and recordings as cameras: a video file, a folder of pictures."""
 
 import re
 from collections.abc import Iterator
@@ -15,8 +15,8 @@ from wristctl.errors import UserError
 Image = NDArray[np.uint8]
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm")
+# Frames per second where nothing says it.
 _RATE = 30.0
-"""Frames per second where nothing says it."""
 
 
 class Frame(NamedTuple):
@@ -31,7 +31,7 @@ class Frame(NamedTuple):
 
 
 class Camera(Protocol):
-    """Where frames come from. Newest wins: a frame that was not asked for in time is never seen."""
+    """Source of frames. Newest wins: a frame that was not asked for in time is never seen."""
 
     name: str
 

@@ -17,10 +17,10 @@ from wristctl.vision.view import View
 DICTIONARY = cv2.aruco.DICT_5X5_50
 LEAST_VIEWS = 8
 _LEAST_CORNERS = 8
+# Rows and columns of the picture's parts by which coverage is counted.
 _CELLS = (6, 8)
-"""Rows and columns of the picture's parts by which coverage is counted."""
+# A view is new where the corners it shares with each one taken before lie this share of the width away, on average.
 _NEW = 0.06
-"""A view is new where the corners it shares with each one taken before lie this share of the width away, on average."""
 _PLACES = (("upper left", "top", "upper right"), ("left", "middle", "right"), ("lower left", "bottom", "lower right"))
 
 
@@ -97,22 +97,22 @@ class Album:
         """Whether the frame's view was kept. Raises UserError where pictures differ in size."""
         size = frame.image.shape[1], frame.image.shape[0]
         if self.size is not None and self.size != size:
-            what = f"pictures of {size[0]} x {size[1]} and of {self.size[0]} x {self.size[1]}"
-            raise UserError(what, name, "calibrate with pictures of one size, that of the later recordings")
+            problem = f"pictures of {size[0]} x {size[1]} and of {self.size[0]} x {self.size[1]}"
+            raise UserError(problem, name, "calibrate with pictures of one size, that of the later recordings")
         self.size, self.pictures = size, self.pictures + 1
-        found = self._finder.find(frame.image, name)
-        if found is None:
+        board = self._finder.find(frame.image, name)
+        if board is None:
             return False
-        self.last, self.last_picture = found, frame.image
-        new = all(_apart(found, each) > _NEW * size[0] for each in self.views)
+        self.last, self.last_picture = board, frame.image
+        new = all(_apart(board, view) > _NEW * size[0] for view in self.views)
         if self._most is None or (len(self.views) < self._most and new):
-            self.views.append(found)
+            self.views.append(board)
             return True
         return False
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Which parts of the picture (rows, columns) hold corners."""
+        """Mask (rows, columns) of the picture's parts that hold corners."""
         return _seen(self.views, self.size or (1, 1))
 
 
@@ -124,14 +124,14 @@ def _apart(a: BoardView, b: BoardView) -> float:
 def _seen(views: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.bool_]:
     corners = np.concatenate([view.corners for view in views]) if views else np.empty((0, 2))
     x, y = (np.clip(corners[:, k] / size[k] * _CELLS[1 - k], 0, _CELLS[1 - k] - 1).astype(int) for k in (0, 1))
-    seen = np.zeros(_CELLS, bool)
-    seen[y, x] = True
-    return seen
+    covered = np.zeros(_CELLS, bool)
+    covered[y, x] = True
+    return covered
 
 
-def least_seen(seen: NDArray[np.bool_]) -> str:
+def least_seen(covered: NDArray[np.bool_]) -> str:
     """The ninth of the picture with the fewest corners, in words."""
-    thirds = [np.array_split(row, 3, axis=1) for row in np.array_split(seen, 3, axis=0)]
+    thirds = [np.array_split(row, 3, axis=1) for row in np.array_split(covered, 3, axis=0)]
     shares = np.array([[part.mean() for part in row] for row in thirds])
     row, column = np.unravel_index(int(shares.argmin()), shares.shape)
     return _PLACES[row][column]
@@ -147,30 +147,30 @@ def calibrate(
     """
     _refuse_few(views, size, settings)
     flat = [np.column_stack([view.places, np.zeros(len(view.places))]).astype(np.float32) for view in views]
-    seen = [view.corners.astype(np.float32) for view in views]
+    pixels = [view.corners.astype(np.float32) for view in views]
     start, nothing = np.eye(3), np.zeros(5)
     error, matrix, distortion, turns, moves, deviation, _, errors = cv2.calibrateCameraExtended(
-        flat, seen, size, start, nothing, flags=cv2.CALIB_FIX_K3
+        flat, pixels, size, start, nothing, flags=cv2.CALIB_FIX_K3
     )
     residuals = [
-        each - cv2.projectPoints(board, turn, move, matrix, distortion)[0].reshape(-1, 2)
-        for each, board, turn, move in zip(seen, flat, turns, moves, strict=True)
+        corners - cv2.projectPoints(board, turn, move, matrix, distortion)[0].reshape(-1, 2)
+        for corners, board, turn, move in zip(pixels, flat, turns, moves, strict=True)
     ]
     tilts = np.array([math.acos(min(1.0, abs(float(cv2.Rodrigues(turn)[0][2, 2])))) for turn in turns])
     if math.degrees(tilts.max()) < settings.tilt_deg:
-        what = f"no view is tilted by {settings.tilt_deg:g} deg: the focal length cannot be told from the distance"
-        raise _refused(what, "turn the board 20 to 40 deg to the camera in most views, in different directions")
+        problem = f"no view is tilted by {settings.tilt_deg:g} deg: the focal length cannot be told from the distance"
+        raise _refused(problem, "turn the board 20 to 40 deg to the camera in most views, in different directions")
     if error > settings.error:
         worst = views[int(np.argmax(errors))].name
-        what = f"reprojection error {error:.2f} px (worst: view {worst}), more than {settings.error:g} px"
-        raise _refused(what, "use a flat board, sharp pictures, and the board's own squares: --set board.square=...")
+        problem = f"reprojection error {error:.2f} px (worst: view {worst}), more than {settings.error:g} px"
+        raise _refused(problem, "use a flat board, sharp pictures, and the board's own squares: --set board.square=...")
     lens = View(np.asarray(matrix, float), np.asarray(distortion, float).ravel()[:4], size=size)
     homography, off = _plane(lens, plane) if plane is not None else (np.eye(3), math.nan)
     return CameraCalibration(
         view=View(lens.camera_matrix, lens.distortion, homography, size),
         error=float(error),
         errors=np.asarray(errors, float).ravel(),
-        residuals=[np.asarray(each, float) for each in residuals],
+        residuals=[np.asarray(residual, float) for residual in residuals],
         deviation=np.asarray(deviation, float).ravel()[:8],
         tilts=tilts,
         coverage=float(_seen(views, size).mean()),
@@ -185,23 +185,23 @@ def plane_tilt(view: View) -> float:
     return math.acos(min(1.0, abs(float(normal[2])) / float(np.linalg.norm(normal))))
 
 
-def _plane(lens: View, seen: BoardView) -> tuple[Array, float]:
+def _plane(lens: View, board: BoardView) -> tuple[Array, float]:
     """The homography from undistorted pixels to the plane that the board lies in, and its RMS error [m]."""
-    straight = lens.undistort(seen.corners)
-    found = np.asarray(cv2.findHomography(straight, seen.places)[0], float)
-    off = View(plane=found).rectify(straight) - seen.places
-    return found, float(np.sqrt((off**2).sum(axis=1).mean()))
+    straight = lens.undistort(board.corners)
+    homography = np.asarray(cv2.findHomography(straight, board.places)[0], float)
+    off = View(plane=homography).rectify(straight) - board.places
+    return homography, float(np.sqrt((off**2).sum(axis=1).mean()))
 
 
 def _refuse_few(views: Sequence[BoardView], size: tuple[int, int], settings: CalibrateCameraSettings) -> None:
     if len(views) < LEAST_VIEWS:
-        what = f"{len(views)} different views of the board, {LEAST_VIEWS} are needed"
-        raise _refused(what, "show the whole board sharp and well lit, each time in another place and tilt")
-    seen = _seen(views, size)
-    if seen.mean() < settings.coverage:
-        what = f"the board was seen in {seen.mean():.0%} of the picture, {settings.coverage:.0%} are needed"
-        raise _refused(what, f"show it nearer, and toward the edges: least was seen at the {least_seen(seen)}")
+        problem = f"{len(views)} different views of the board, {LEAST_VIEWS} are needed"
+        raise _refused(problem, "show the whole board sharp and well lit, each time in another place and tilt")
+    covered = _seen(views, size)
+    if covered.mean() < settings.coverage:
+        problem = f"the board was seen in {covered.mean():.0%} of the picture, {settings.coverage:.0%} are needed"
+        raise _refused(problem, f"show it nearer, and toward the edges: least was seen at the {least_seen(covered)}")
 
 
-def _refused(what: str, fix: str) -> UserError:
-    return UserError(what, "calibration", fix, exit_code=3)
+def _refused(problem: str, fix: str) -> UserError:
+    return UserError(problem, "calibration", fix, exit_code=3)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.vision.camera import Image
 
+# Rounds of refining: a round looks along the lines of the last one; a rough corner may be off by 2 px.
 _ROUNDS = 2
-"""Each looks along the lines of the one before; a rough corner may be off by 2 px."""
+# Distance of samples across a side [px]; places along a side at which it is looked for, at most.
 _FINE, _PLACES = 0.5, 32
-"""Distance of samples across a side [px]; places along a side at which it is looked for, at most."""
 
 
 def outlined(image: NDArray[Any], corners: Array, cells: int) -> Array:
@@ -21,54 +21,54 @@ def outlined(image: NDArray[Any], corners: Array, cells: int) -> Array:
     White is expected beyond the square, and looked for up to half a cell to either side of its rough outline; half a
     cell at either end of a side is left out, since corners are rounded by blur.
     """
-    at = corners[:, 0] + 1j * corners[:, 1]
+    vertices = corners[:, 0] + 1j * corners[:, 1]
     for _ in range(_ROUNDS):
-        at = _meeting(*_lines(image, at, 0.5 / cells))
-    return np.stack([at.real, at.imag], axis=1)
+        vertices = _meeting(*_lines(image, vertices, 0.5 / cells))
+    return np.stack([vertices.real, vertices.imag], axis=1)
 
 
-def _lines(image: NDArray[Any], at: NDArray[np.complex128], margin: float) -> tuple[Any, Any]:
-    """A point on, and the direction of, each side (4,) of the square of corners `at`.
+def _lines(image: NDArray[Any], vertices: NDArray[np.complex128], margin: float) -> tuple[Any, Any]:
+    """A point on, and the direction of, each side (4,) of the square of corners `vertices`.
 
     Across each of many places along a side, the edge is the centre of the rise to white, wherever it lies between
     pixels; a place counts by how much rise there is.
     """
-    side = np.roll(at, -1) - at
+    side = np.roll(vertices, -1) - vertices
     length = float(np.abs(side).mean())
     out, reach = -1j * side / np.abs(side), margin * length
     along = np.linspace(margin, 1.0 - margin, min(_PLACES, max(8, round(length))))
     across = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / _FINE)) + 1)
-    places = (at[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
+    places = (vertices[:, None] + side[:, None] * along)[..., None] + across * out[:, None, None]
     flat = places.reshape(-1, len(across)).astype(np.complex64)
     grey = cv2.remap(image, flat.real, flat.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     rise = np.diff(grey.reshape(places.shape).astype(float), axis=2).clip(0.0)
     weight = rise.sum(axis=2) + 1e-9
     edge = rise @ (0.5 * (across[1:] + across[:-1])) / weight
-    middle, off = (np.average(np.broadcast_to(each, edge.shape), 1, weight)[:, None] for each in (along, edge))
+    middle, off = (np.average(np.broadcast_to(values, edge.shape), 1, weight)[:, None] for values in (along, edge))
     from_middle = along - middle
     slope = (weight * from_middle * (edge - off)).sum(axis=1) / (weight * from_middle**2).sum(axis=1)
-    return at + side * middle[:, 0] + out * off[:, 0], side + out * slope
+    return vertices + side * middle[:, 0] + out * off[:, 0], side + out * slope
 
 
 def _meeting(point: NDArray[np.complex128], along: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Where each line meets the one before."""
+    """Intersections of consecutive lines."""
     before, ahead = np.roll(point, 1), np.roll(along, 1)
     share = ((point - before).conj() * along).imag / (ahead.conj() * along).imag
     met: NDArray[np.complex128] = before + share * ahead
     return met
 
 
+# Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print.
 Found = dict[int, list[Array]]
-"""Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print."""
 
+# Cells along a marker's side, with the black border; one more on either side stays white.
 CELLS = 6
-"""Cells along a marker's side, with the black border; one more on either side stays white."""
 DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+# Least and largest threshold window [px] of the usual search and of a fine one.
 _WINDOWS = (15, 15), (5, 15)
-"""Least and largest threshold window [px] of the usual search and of a fine one."""
 _NEXT = [1, 2, 3, 0]
+# Side of the part searched around the last place, in sides of the marker.
 _NEAR_SIDES = 3.0
-"""Side of the part searched around the last place, in sides of the marker."""
 
 
 def print_of(number: int) -> Image:
@@ -96,7 +96,7 @@ def askew(corners: Array) -> float:
     """Largest error [rad] of an angle in a plane where a square looks like this: corners (4, 2), by its affine part."""
     z = corners[:, 0] + 1j * corners[:, 1]
     upright = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
-    turned, mirrored = (abs(complex(np.vdot(each, z - z.mean()))) for each in (upright, upright.conj()))
+    turned, mirrored = (abs(complex(np.vdot(shape, z - z.mean()))) for shape in (upright, upright.conj()))
     return float(np.arcsin(min(1.0, mirrored / turned)))
 
 
@@ -130,34 +130,34 @@ class Detector:
 
 def _parameters(least_perimeter: float, windows: tuple[int, int]) -> cv2.aruco.DetectorParameters:
     """With a perimeter of this share of the picture's longer side, and least and largest threshold window [px]."""
-    made = cv2.aruco.DetectorParameters()
-    made.adaptiveThreshWinSizeMin, made.adaptiveThreshWinSizeMax = windows
-    made.minMarkerPerimeterRate = least_perimeter
-    return made
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.adaptiveThreshWinSizeMin, parameters.adaptiveThreshWinSizeMax = windows
+    parameters.minMarkerPerimeterRate = least_perimeter
+    return parameters
 
 
 def _detect(detector: cv2.aruco.ArucoDetector, image: Image, left: int, top: int, blur: bool = True) -> Found:
     blurred = cv2.GaussianBlur(image, (3, 3), 0) if blur else image
     corners, ids, _ = detector.detectMarkers(blurred)
-    found: Found = {}
+    markers: Found = {}
     offset = np.array([left, top], float)
-    for each, number in zip(corners, () if ids is None else ids.ravel(), strict=True):
-        exact = outlined(blurred, each.reshape(4, 2).astype(np.float64), CELLS)
-        found.setdefault(int(number), []).append(exact + offset)
-    return found
+    for rough, number in zip(corners, () if ids is None else ids.ravel(), strict=True):
+        exact = outlined(blurred, rough.reshape(4, 2).astype(np.float64), CELLS)
+        markers.setdefault(int(number), []).append(exact + offset)
+    return markers
 
 
+# Places along a side at which its outline is looked at; distance of samples across it [px].
 _EDGE_PLACES, _EDGE_FINE = 24, 0.25
-"""Places along a side at which its outline is looked at; distance of samples across it [px]."""
 
 
 class PictureQuality(NamedTuple):
-    """Of one marker in one picture."""
+    """Sharpness and contrast of one marker in one picture."""
 
     side: float
-    """Of the black square [px]."""
+    """Side of the black square [px]."""
     blur: float
-    """Of its outline: standard deviation of a normal blur [px]."""
+    """Blur of the outline: standard deviation of a normal blur [px]."""
     black: float
     """Grey of its border, of 255."""
     white: float
@@ -165,25 +165,25 @@ class PictureQuality(NamedTuple):
 
 
 def quality_of(image: Image, corners: Array) -> PictureQuality:
-    """Of the marker with these corners (4, 2) [px]."""
+    """Measure the quality of the marker with these corners (4, 2) [px]."""
     side = float(np.hypot(*edges(corners).T).mean())
     reach = 0.5 * side / CELLS
     across = np.arange(-reach, reach + _EDGE_FINE, _EDGE_FINE)
-    at = corners[:, 0] + 1j * corners[:, 1]
-    along = np.roll(at, -1) - at
+    vertices = corners[:, 0] + 1j * corners[:, 1]
+    along = np.roll(vertices, -1) - vertices
     out = -1j * along / np.abs(along)
-    places = at[:, None] + along[:, None] * np.linspace(0.15, 0.85, _EDGE_PLACES)
+    places = vertices[:, None] + along[:, None] * np.linspace(0.15, 0.85, _EDGE_PLACES)
     points = (places[..., None] + across * out[:, None, None]).reshape(-1, len(across)).astype(np.complex64)
     grey = cv2.remap(image, points.real, points.imag, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     profile = grey.reshape(4, _EDGE_PLACES, -1).astype(float).mean(axis=1)
-    return PictureQuality(side, float(np.median([_width(each) for each in profile])),
+    return PictureQuality(side, float(np.median([_width(rise) for rise in profile])),
                           float(np.median(profile[:, :3])), float(np.median(profile[:, -3:])))  # fmt: skip
 
 
 def _width(profile: Array) -> float:
     """Standard deviation [px] of a rise, about its middle."""
     rise = np.diff(profile).clip(0.0)
-    at = _EDGE_FINE * np.arange(len(rise))
+    distance = _EDGE_FINE * np.arange(len(rise))
     total = rise.sum() + 1e-9
-    middle = float(rise @ at) / total
-    return float(np.sqrt(rise @ (at - middle) ** 2 / total))
+    middle = float(rise @ distance) / total
+    return float(np.sqrt(rise @ (distance - middle) ** 2 / total))

@@ -17,10 +17,10 @@ from wristctl.vision.camera import CameraError, Frame, grey_of, without_warnings
 
 log = logging.getLogger(__name__)
 
+# V4L2's exposure_auto: by hand; by aperture priority, which is the webcams' automatic one.
 _MANUAL, _PRIORITY = 1.0, 3.0
-"""V4L2's exposure_auto: by hand; by aperture priority, which is the webcams' automatic one."""
+# V4L2_CID_POWER_LINE_FREQUENCY, VIDIOC_S_CTRL and VIDIOC_G_CTRL of linux/videodev2.h: OpenCV has no name for it.
 _POWER_LINE, _SET, _GET = 0x00980918, 0xC008561C, 0xC008561B
-"""V4L2_CID_POWER_LINE_FREQUENCY, VIDIOC_S_CTRL and VIDIOC_G_CTRL of linux/videodev2.h: OpenCV has no name for it."""
 _CONTROL = struct.Struct("Ii")
 _MENU = {"off": 0, "50 Hz": 1, "60 Hz": 2}
 
@@ -36,14 +36,14 @@ class Asked(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """What a device has not done."""
+    """Setting that a device has refused."""
 
     said: str
     explicit: bool
 
 
 class Properties(Protocol):
-    """Where properties are read: cv2.VideoCapture."""
+    """Source of a device's properties: cv2.VideoCapture."""
 
     def get(self, name: int, /) -> float:
         """The present value."""
@@ -58,12 +58,12 @@ def asked_for(device: Device) -> list[Asked]:
         ("height", cv2.CAP_PROP_FRAME_HEIGHT, device.height),
         ("frame_rate", cv2.CAP_PROP_FPS, device.frame_rate),
     ]
-    found = [Asked(setting, name, float(value)) for setting, name, value in wanted if value is not None]
+    requests = [Asked(setting, name, float(value)) for setting, name, value in wanted if value is not None]
     by_hand = not device.automatic
-    found.append(Asked("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL if by_hand else _PRIORITY, False))
-    found += [
-        Asked(f"automatic {what}", name, float(device.automatic), False)
-        for what, name in (("focus", cv2.CAP_PROP_AUTOFOCUS), ("white balance", cv2.CAP_PROP_AUTO_WB))
+    requests.append(Asked("automatic exposure", cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL if by_hand else _PRIORITY, False))
+    requests += [
+        Asked(f"automatic {control}", name, float(device.automatic), False)
+        for control, name in (("focus", cv2.CAP_PROP_AUTOFOCUS), ("white balance", cv2.CAP_PROP_AUTO_WB))
     ]
     values = [
         ("exposure", cv2.CAP_PROP_EXPOSURE, device.exposure),
@@ -71,20 +71,20 @@ def asked_for(device: Device) -> list[Asked]:
         ("focus", cv2.CAP_PROP_FOCUS, device.focus),
         ("white_balance", cv2.CAP_PROP_WB_TEMPERATURE, device.white_balance),
     ]
-    return found + [Asked(setting, name, float(value)) for setting, name, value in values if value is not None]
+    return requests + [Asked(setting, name, float(value)) for setting, name, value in values if value is not None]
 
 
 def refused(wanted: list[Asked], capture: Properties, source: str, device: Device) -> list[Refusal]:
-    """What the device has not done of this, and of its power line's frequency, which is asked for here."""
-    found = []
-    for each in wanted:
-        now = capture.get(each.name)
-        if abs(now - each.value) > 0.01 * abs(each.value) + 1e-6:
-            said = f"{each.setting} {_shown(each.name, each.value)} (it is {_shown(each.name, now)})"
-            found.append(Refusal(said, each.explicit))
+    """Settings that the device has refused, its power line's frequency included, which is requested here."""
+    refusals = []
+    for request in wanted:
+        now = capture.get(request.name)
+        if abs(now - request.value) > 0.01 * abs(request.value) + 1e-6:
+            report = f"{request.setting} {_shown(request.name, request.value)} (it is {_shown(request.name, now)})"
+            refusals.append(Refusal(report, request.explicit))
     if (lamps := device.power_line) is not None and (set_to := _power_line(source, _MENU[lamps])) != lamps:
-        found.append(Refusal(f"power_line {lamps} (it is {set_to or 'unknown'})", True))
-    return found
+        refusals.append(Refusal(f"power_line {lamps} (it is {set_to or 'unknown'})", True))
+    return refusals
 
 
 def _shown(name: int, value: float) -> str:
@@ -106,10 +106,10 @@ def _power_line(source: str, menu: int) -> str | None:
     return None
 
 
+# Seconds that a device may take to its first frame.
 _FIRST_FRAME = 3.0
-"""Seconds that a device may take to its first frame."""
+# Seconds by which the first frame's stamp may be past where it is of our clock.
 _FRESH = 1.0
-"""Seconds by which the first frame's stamp may be past where it is of our clock."""
 
 
 class DeviceCamera:
@@ -131,8 +131,8 @@ class DeviceCamera:
             self._capture.release()
             fix = "check the cable, its number (ls /dev/video*), that no other program uses it, that you may read it"
             served = "start what serves it: wristctl hw emulate --wrist"
-            what = "no such camera, or it cannot be opened"
-            raise CameraError(what, source, served if "://" in source else f"{fix} (group video)")
+            problem = "no such camera, or it cannot be opened"
+            raise CameraError(problem, source, served if "://" in source else f"{fix} (group video)")
         try:
             self._set(settings)
         except CameraError:
@@ -167,15 +167,15 @@ class DeviceCamera:
     def _set(self, settings: Device) -> None:
         """Ask the device, and see by what it then says whether it has done so. Raises CameraError."""
         wanted = asked_for(settings)
-        for each in wanted:
-            self._capture.set(each.name, each.value)
+        for request in wanted:
+            self._capture.set(request.name, request.value)
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-        found = refused(wanted, self._capture, self.name, settings)
-        if told := [each.said for each in found if each.explicit]:
+        refusals = refused(wanted, self._capture, self.name, settings)
+        if explicit := [refusal.said for refusal in refusals if refusal.explicit]:
             fix = "leave it out, or ask for what it can do: v4l2-ctl --list-ctrls-menus --list-formats-ext"
-            raise CameraError(f"the camera refuses {', '.join(told)}", self.name, fix)
-        if found and "://" not in self.name:
-            kept = ", ".join(each.said for each in found)
+            raise CameraError(f"the camera refuses {', '.join(explicit)}", self.name, fix)
+        if refusals and "://" not in self.name:
+            kept = ", ".join(refusal.said for refusal in refusals)
             log.warning("%s keeps its own control: %s; light that changes will change its pictures", self.name, kept)
 
     def _read(self) -> None:

@@ -14,8 +14,8 @@ from wristctl.vision.view import View
 
 _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
+# Seconds between two searches of the whole picture for a second marker of the same id.
 _LOOK_ROUND = 0.15
-"""Seconds between two searches of the whole picture for a second marker of the same id."""
 
 
 class SightingVerdict(StrEnum):
@@ -48,25 +48,25 @@ MEANING = {
 
 
 class Sighting(NamedTuple):
-    """What one frame tells."""
+    """Result of one frame: the angle, or the verdict why there is none."""
 
     time: float
-    """Of the frame [s]"""
+    """Time of the frame [s]"""
     number: int
-    """Of the frame"""
+    """Number of the frame"""
     theta: float
     """Bending angle [rad], nan unless the verdict is ok"""
     verdict: SightingVerdict
     corners: Array
     """(2, 4, 2) [px] of the base's and the tip's marker, nan where it is not seen"""
     size: float = math.nan
-    """Of the tip's marker over the base's, by the edges that a bend across the plane does not foreshorten"""
+    """Size of the tip's marker over the base's, by the edges that a bend across the plane does not foreshorten"""
     came: float = math.nan
     """When the frame was there to be looked at [s]; nan in recordings"""
     tip_x: float = math.nan
-    """Of the tip's marker from the first disc, along the base's marker [m]; nan unless the verdict is ok"""
+    """Distance of the tip's marker from the first disc, along the base's marker [m]; nan unless the verdict is ok"""
     tip_y: float = math.nan
-    """The same across, toward theta > 0 [m]"""
+    """Distance of the tip's marker across the base's, toward theta > 0 [m]"""
 
 
 class _Base(NamedTuple):
@@ -98,57 +98,57 @@ class Tracker:
     def see(self, frame: Frame) -> Sighting:
         """The angle in a frame; frames come in the order of time. Raises UserError for pictures of another size."""
         self._view.check_size(frame.image.shape[1], frame.image.shape[0], "camera")
-        found = self._find(frame)
-        bases, tips = (found.get(number, []) for number in (self._markers.base, self._markers.tip))
+        markers = self._find(frame)
+        bases, tips = (markers.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)
         size, tip = math.nan, (math.nan, math.nan)
         if verdict is SightingVerdict.OK and self._base is not None:
             self._used = frame.time, theta
             rectified = self._view.rectify(tips[0])
             size, tip = _width(rectified) / _width(self._base.corners), self._place(self._base.corners, rectified)
-        shown = np.stack([each[0] if each else _UNSEEN for each in (bases, tips)])
+        shown = np.stack([corners[0] if corners else _UNSEEN for corners in (bases, tips)])
         return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip)
 
     def _find(self, frame: Frame) -> dict[int, list[Array]]:
         wanted = (self._markers.base, self._markers.tip)
-        found = {}
+        markers = {}
         for number, corners in self._last_seen.items():
             near = self._detector.around(frame.image, corners)
             if number in near:
-                found[number] = near[number]
-        if len(found) < 2 or frame.time >= self._look_round:
+                markers[number] = near[number]
+        if len(markers) < 2 or frame.time >= self._look_round:
             self._look_round = frame.time + _LOOK_ROUND
             everywhere = self._everywhere(frame.image, wanted)
-            twice = {number: each for number, each in everywhere.items() if len(each) > 1}
-            found = {**found, **twice} if len(found) == 2 else everywhere
+            twice = {number: places for number, places in everywhere.items() if len(places) > 1}
+            markers = {**markers, **twice} if len(markers) == 2 else everywhere
             if twice:
                 self._look_round = frame.time
-        self._last_seen = {number: each[0] for number, each in found.items()}
-        return found
+        self._last_seen = {number: places[0] for number, places in markers.items()}
+        return markers
 
     def _everywhere(self, image: Image, wanted: tuple[int, int]) -> dict[int, list[Array]]:
-        found = self._detector.everywhere(image)
-        self._small = self._small and not found.keys() >= set(wanted)
+        markers = self._detector.everywhere(image)
+        self._small = self._small and not markers.keys() >= set(wanted)
         if self._small:
-            found = self._detector.everywhere(image, fine=True) | found
-        return {number: self._followed(number, each) for number, each in found.items() if number in wanted}
+            markers = self._detector.everywhere(image, fine=True) | markers
+        return {number: self._followed(number, places) for number, places in markers.items() if number in wanted}
 
-    def _followed(self, number: int, seen: list[Array]) -> list[Array]:
-        """Those of this id, the one nearest to its last place first."""
+    def _followed(self, number: int, places: list[Array]) -> list[Array]:
+        """Markers of one id, sorted by their distance from its last place."""
         last = self._last_seen.get(number)
-        return seen if last is None else sorted(seen, key=lambda each: float(np.abs(each - last).max()))
+        return places if last is None else sorted(places, key=lambda corners: float(np.abs(corners - last).max()))
 
     def _judge(self, time: float, bases: list[Array], tips: list[Array]) -> tuple[SightingVerdict, float]:
         if len(bases) > 1 or len(tips) > 1:
             return SightingVerdict.TWICE, math.nan
-        base, tip = ([self._view.rectify(each) for each in corners] for corners in (bases, tips))
-        base = [each for each in base if self._is_square(each)]
+        base, tip = ([self._view.rectify(marker) for marker in corners] for corners in (bases, tips))
+        base = [marker for marker in base if self._is_square(marker)]
         if tip and not self._is_square(tip[0]):
             return SightingVerdict.SHAPE, math.nan
         if self._base is not None and time - self._base.seen > self._gates.base_memory:
             self._base = None
         moved = base and self._has_moved(base[0])
-        if tip and (known := [self._base.corners] if self._base else base) and not _ahead(known[0], tip[0]):
+        if tip and (references := [self._base.corners] if self._base else base) and not _ahead(references[0], tip[0]):
             return SightingVerdict.SWAPPED, math.nan
         if moved:
             return SightingVerdict.BASE_MOVED, math.nan

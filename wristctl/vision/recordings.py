@@ -15,11 +15,11 @@ from wristctl.vision.detector import askew
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.vision.view import View
 
+# Columns of the table beside a video, one row a frame: unit and meaning.
 COLUMNS = {
     "number": ("", "of the frame, as the camera counts"),
     "clock": ("s", "when it was taken: the middle of its exposure, on the run's one clock"),
 }
-"""Of the table beside the video, a row for each of its frames: unit and meaning."""
 
 
 class Video:
@@ -63,27 +63,27 @@ class RawVideo:
 
 
 _SPREAD, _REFUSED = 6, 3
+# Okabe and Ito's blue, green and vermillion, as OpenCV orders colours.
 _BASE, _TIP, _BAD, _PAPER = (178, 114, 0), (115, 158, 0), (0, 94, 213), (255, 255, 255)
-"""Okabe and Ito's blue, green and vermillion, as OpenCV orders colours."""
 
 
 def annotate(image: Image, sighting: Sighting) -> NDArray[np.uint8]:
     """A colour picture (height, width, 3, blue first): the markers' corners, the angle or why there is none."""
-    made: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    picture: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     usable = sighting.verdict is SightingVerdict.OK
     for corners, colour in zip(sighting.corners, (_BASE, _TIP if usable else _BAD), strict=True):
         if np.isfinite(corners).all():
-            cv2.polylines(made, [np.rint(8 * corners).astype(np.int32)], True, colour, 2, cv2.LINE_AA, 3)
-            cv2.circle(made, np.rint(corners[0]).astype(int).tolist(), 4, colour, -1, cv2.LINE_AA)
-    said = f"{math.degrees(sighting.theta):+.2f} deg" if usable else str(sighting.verdict)
-    text = f"{sighting.time:.3f} s   {said}"
+            cv2.polylines(picture, [np.rint(8 * corners).astype(np.int32)], True, colour, 2, cv2.LINE_AA, 3)
+            cv2.circle(picture, np.rint(corners[0]).astype(int).tolist(), 4, colour, -1, cv2.LINE_AA)
+    label = f"{math.degrees(sighting.theta):+.2f} deg" if usable else str(sighting.verdict)
+    text = f"{sighting.time:.3f} s   {label}"
     size = max(0.4, image.shape[1] / 1100)
     (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
     pad = height // 2
-    cv2.rectangle(made, (0, 0), (width + 2 * pad, height + below + 2 * pad), _PAPER, -1)
+    cv2.rectangle(picture, (0, 0), (width + 2 * pad, height + below + 2 * pad), _PAPER, -1)
     place = (pad, height + pad)
-    cv2.putText(made, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0) if usable else _BAD, 1, cv2.LINE_AA)
-    return np.asarray(made, np.uint8)
+    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0) if usable else _BAD, 1, cv2.LINE_AA)
+    return np.asarray(picture, np.uint8)
 
 
 class Picked:
@@ -106,8 +106,8 @@ class Picked:
 
     def pictures(self) -> list[NDArray[np.uint8]]:
         """In the order of the recording."""
-        known = dict(self._spread) | dict(list(self._refused.values())[:_REFUSED])
-        return [known[number] for number in sorted(known)]
+        pictures = dict(self._spread) | dict(list(self._refused.values())[:_REFUSED])
+        return [pictures[number] for number in sorted(pictures)]
 
 
 class AnnotatedVideo:
@@ -132,14 +132,14 @@ def angle_noise(angles: Array) -> float:
     times that variance (1 + 4 + 1).
     """
     jerks = np.diff(angles, 2)
-    found = jerks[np.isfinite(jerks)]
-    return float(np.sqrt(np.mean(found**2) / 6.0)) if len(found) else math.nan
+    finite = jerks[np.isfinite(jerks)]
+    return float(np.sqrt(np.mean(finite**2) / 6.0)) if len(finite) else math.nan
 
 
 def base_askew(view: View, sightings: Sequence[Sighting]) -> float:
-    """How far off an angle may be [rad], by how square the base's marker looks on average in the calibrated view.
+    """Systematic error of an angle [rad], from the mean shape of the base's marker in the calibrated view.
 
     Of the sightings with an angle, of which there must be one.
     """
-    seen = np.array([each.corners[0] for each in sightings if math.isfinite(each.theta)])
-    return askew(view.rectify(np.nanmean(seen, axis=0)))
+    corners = np.array([sighting.corners[0] for sighting in sightings if math.isfinite(sighting.theta)])
+    return askew(view.rectify(np.nanmean(corners, axis=0)))

@@ -20,8 +20,8 @@ from wristctl.vision.detector import print_of
 from wristctl.vision.scene_parts import BASE_AT, Stroke, bent_across, clamp, fingers, last_disc, moving, with_last_disc
 from wristctl.vision.view import Pinhole, View
 
+# Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners.
 _CELL, _FINE, _BITS = 16, 6, 4
-"""Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners."""
 _WALL, _EDGE = 122, 48
 _LEVELS = 2**16
 
@@ -36,16 +36,16 @@ class Scene:
         self._settings, self._wrist, self._markers = settings, wrist, markers or Markers()
         self.camera = Pinhole(settings, self._markers.positive)
         numbers = self._markers.base, self._markers.tip
-        self._prints = [self._printed(each) for each in numbers]
+        self._prints = [self._printed(number) for number in numbers]
         self._film = Film(settings)
         self._across = 0.0
         still = np.full((settings.height, settings.width), _WALL, np.uint8)
         self._draw(still, *self._projected([clamp()]))
-        self._still = [self._with_marker(still.copy(), each, complex(BASE_AT), 1.0) for each in self._prints]
+        self._still = [self._with_marker(still.copy(), tag, complex(BASE_AT), 1.0) for tag in self._prints]
 
     @property
     def view(self) -> View:
-        """What a perfect calibration of this camera finds."""
+        """View of a perfect calibration of this camera."""
         return self.camera.view
 
     def render(
@@ -60,7 +60,7 @@ class Scene:
         self._across = across
         instants = np.atleast_2d(theta)
         total = np.zeros(self._still[0].shape, np.float32)
-        drawings = self._projected([moving(self._backbone, each, self._wrist) for each in instants], True)
+        drawings = self._projected([moving(self._backbone, instant, self._wrist) for instant in instants], True)
         for angles, drawing in zip(instants, drawings, strict=True):
             image = self._still[swapped].copy()
             self._draw(image, drawing)
@@ -79,7 +79,7 @@ class Scene:
     def _projected(
         self, drawings: Sequence[Sequence[Stroke]], moving: bool = False
     ) -> list[list[tuple[Stroke, Array]]]:
-        """Each stroke with its pixels, bent across where it moves; all are projected at once."""
+        """Project strokes to pixels, bent across where they move; all are projected at once."""
         strokes = [stroke for drawing in drawings for stroke in drawing]
         points = np.concatenate([stroke.points for stroke in strokes])
         pixels = self.camera.project(bent_across(points, self._across if moving else 0.0, self._wrist.length))
@@ -151,16 +151,16 @@ class Film:
 
 def _fixed(pixels: NDArray[Any]) -> NDArray[np.int32]:
     """Pixels as OpenCV draws fractions of them."""
-    whole: NDArray[np.int32] = np.rint(pixels * 2**_BITS).astype(np.int32)
-    return whole
+    fixed_point: NDArray[np.int32] = np.rint(pixels * 2**_BITS).astype(np.int32)
+    return fixed_point
 
 
+# Pixels of a square of the print, samples along a pixel's side, grey of what is behind.
 _SQUARE, _BOARD_FINE, _BOARD_WALL = 96, 2, 122
-"""Pixels of a square of the print, samples along a pixel's side, grey of what is behind."""
+# Ranges [deg] in which the board is held.
 _TILT, _ROLL = (15.0, 40.0), (-25.0, 25.0)
-"""Ranges [deg] in which the board is held."""
+# Range of distances: the board's longer side over the picture's height at that distance, inverted.
 _NEAR, _FAR = 0.9, 1.5
-"""Range of distances: the board's longer side over the picture's height at that distance, inverted."""
 
 
 def board_shots(settings: SceneSettings, board: CharucoBoard, views: int, rng: np.random.Generator) -> Iterator[Frame]:
@@ -184,13 +184,13 @@ def _printed(board: CharucoBoard, contrast: float) -> Image:
 
 
 def _seen(print_: Image, rays: Array, turn: Array, move: Array, extent: Array) -> NDArray[np.uint8]:
-    """What the rays (h, w, 2) meet: a board with axes `turn` (3, 3), its middle at `move` (3,) [m]."""
+    """Picture of a board along the rays (h, w, 2): its axes are `turn` (3, 3), its middle is at `move` (3,) [m]."""
     onto = np.linalg.inv(np.column_stack([turn[:, 0], turn[:, 1], move]))
     met = rays @ onto[:, :2].T + onto[:, 2]
     place = (met[..., :2] / met[..., 2:] + 0.5 * extent) * (print_.shape[1] / extent[0]) - 0.5
     x, y = (np.ascontiguousarray(place[..., k], np.float32) for k in (0, 1))
-    seen = cv2.remap(print_, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_BOARD_WALL)
-    return seen.astype(np.uint8, copy=False)
+    picture = cv2.remap(print_, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_BOARD_WALL)
+    return picture.astype(np.uint8, copy=False)
 
 
 def _held(camera: Pinhole, number: int, views: int, extent: Array, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -200,7 +200,7 @@ def _held(camera: Pinhole, number: int, views: int, extent: Array, rng: np.rando
     far = 0.36 * math.sqrt((number + 0.5) / (views - 1))
     pixel = np.array([(0.5 + far * math.cos(golden)) * width, (0.5 + far * math.sin(golden)) * height, 1.0])
     distance = rng.uniform(_NEAR, _FAR) * extent.max() * camera.matrix[0, 0] / height
-    tilt, toward, roll = np.radians([rng.uniform(*each) for each in (_TILT, (0.0, 360.0), _ROLL)])
+    tilt, toward, roll = np.radians([rng.uniform(*bounds) for bounds in (_TILT, (0.0, 360.0), _ROLL)])
     quarter = math.pi / 2 if number % 2 else 0.0
     axis = tilt * np.array([math.cos(toward), math.sin(toward), 0.0])
     turn = np.asarray(cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, roll + quarter]))[0], float)

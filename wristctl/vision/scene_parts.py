@@ -1,4 +1,4 @@
-"""What a camera before the wrist sees, as outlines and lines in space: clamp, discs, springs, tendons, hand."""
+"""Parts of the scene before a camera, as outlines and lines in space: clamp, discs, springs, tendons, hand."""
 
 import cmath
 import math
@@ -43,12 +43,12 @@ def hand(size: float, edge_on: bool) -> list[Planar]:
     return [size * capsule(complex(*start), complex(*end), radius) for start, end, radius in parts]
 
 
+# Radius of the discs over that of the circle of tendons; their thickness [m].
 RIM, THICK = 1.25, 0.0035
-"""Radius of the discs over that of the circle of tendons; their thickness [m]."""
+# Grey of a disc's upper face, to which the light comes.
 FACE = 196
-"""Grey of a disc's upper face, to which the light comes."""
+# Middle of the base's marker, which is on the clamp, along x [m].
 BASE_AT = -0.022
-"""Middle of the base's marker, which is on the clamp, along x [m]."""
 _CLAMP_FOOT, _CLAMP_HALF, _CLAMP_DEPTH = -0.050, 0.036, 0.024
 _FINGERS = ((0.004 + 0.004j, 0.016 + 0.18j), (-0.010 + 0.002j, -0.008 + 0.18j))
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 36)
@@ -64,7 +64,7 @@ class Stroke(NamedTuple):
     """A line; a filled outline; what holds all the points, filled and edged; an outline filled if it turns clockwise
     from x to depth for the camera"""
     thickness: int = 1
-    """Of a line [px]"""
+    """Thickness of a line [px]"""
 
 
 def clamp() -> list[Stroke]:
@@ -129,8 +129,8 @@ def with_last_disc(points: Array, bend: float, length: float, disc: tuple[comple
     centre, theta = np.array([disc[0].real, disc[0].imag, 0.0]), cmath.phase(disc[1])
     turned = _turned(theta, bend) @ _turned(theta, 0.0).T
     moved = centre + length * (_arc_end(theta, bend) - _arc_end(theta, 0.0))
-    found: Array = moved + (points - centre) @ turned.T
-    return found
+    turned_points: Array = moved + (points - centre) @ turned.T
+    return turned_points
 
 
 def _turned(theta: float, bend: float) -> Array:
@@ -139,10 +139,10 @@ def _turned(theta: float, bend: float) -> Array:
 
 
 def _arc_end(theta: float, bend: float) -> Array:
-    """Where an arc of length 1 ends, that begins along x and bends toward y and depth."""
-    whole = math.hypot(theta, bend)
-    aside = 0.5 * np.sinc(0.5 * whole / np.pi) ** 2
-    return np.array([np.sinc(whole / np.pi), aside * theta, aside * bend])
+    """End of an arc of length 1 that begins along x and bends toward y and depth."""
+    angle = math.hypot(theta, bend)
+    aside = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    return np.array([np.sinc(angle / np.pi), aside * theta, aside * bend])
 
 
 def fingers(tip: complex, along: complex, depth: float) -> list[Stroke]:

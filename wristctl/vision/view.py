@@ -1,4 +1,4 @@
-"""How a camera sees the bending plane: lens, distortion, and the homography that sets the plane square."""
+"""View of the bending plane: lens, distortion, and the homography that sets the plane square."""
 
 from __future__ import annotations
 
@@ -54,14 +54,14 @@ class View:
     def undistort(self, points: Array) -> Array:
         """Pixels (k, 2) as a lens without distortion would give them."""
         lens = self.camera_matrix, self.distortion
-        found = cv2.undistortPoints(points.reshape(-1, 1, 2), *lens, P=self.camera_matrix)
-        return found.reshape(-1, 2).astype(np.float64)
+        pixels = cv2.undistortPoints(points.reshape(-1, 1, 2), *lens, P=self.camera_matrix)
+        return pixels.reshape(-1, 2).astype(np.float64)
 
     def check_size(self, width: int, height: int, where: str) -> None:
         """Raises UserError where pictures have another size than those it was calibrated with."""
         if self.size is not None and self.size != (width, height):
-            what = f"pictures of {width} x {height}, but the calibration is of {self.size[0]} x {self.size[1]}"
-            raise UserError(what, where, "calibrate the camera at this size: wristctl hw calibrate camera", 4)
+            problem = f"pictures of {width} x {height}, but the calibration is of {self.size[0]} x {self.size[1]}"
+            raise UserError(problem, where, "calibrate the camera at this size: wristctl hw calibrate camera", 4)
 
     def save(self, file: Path, **more: Any) -> None:
         """Write it as JSON, with what else is known of the calibration."""
@@ -78,11 +78,11 @@ class View:
     def load(cls, file: Path) -> Self:
         """Read what `save` wrote. Raises UserError."""
         try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-            if found["schema"] != SCHEMA:
-                raise ValueError(found["schema"])
-            matrix, distortion, plane = (np.array(found[name], float) for name in _ARRAYS)
-            width, height = found["size"]
+            arrays = json.loads(file.read_text(encoding="utf-8"))
+            if arrays["schema"] != SCHEMA:
+                raise ValueError(arrays["schema"])
+            matrix, distortion, plane = (np.array(arrays[name], float) for name in _ARRAYS)
+            width, height = arrays["size"]
             return cls(matrix, distortion, plane, (int(width), int(height)))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UserError("not a camera calibration", str(file), "wristctl hw calibrate camera") from error
@@ -104,22 +104,22 @@ class Pinhole:
         self.side = 1.0 if positive == "right" else -1.0
         # Rows: the camera's right, down and forward axes in the world.
         square = np.array([[0.0, self.side, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        tilt, pan, roll = (math.radians(each) for each in (settings.tilt_deg, settings.pan_deg, settings.roll_deg))
+        tilt, pan, roll = (math.radians(deg) for deg in (settings.tilt_deg, settings.pan_deg, settings.roll_deg))
         turned = _turn(2, roll) @ _turn(0, tilt) @ _turn(1, self.side * pan)
         self.rotation = turned @ square
         self.translation = np.array([0.0, 0.0, settings.distance]) - self.rotation @ [settings.height_above, 0.0, 0.0]
 
     def project(self, points: Array) -> Array:
         """World points (..., 3) [m] to pixels (..., 2)."""
-        seen = points @ self.rotation.T + self.translation
-        u, v = seen[..., 0] / seen[..., 2], seen[..., 1] / seen[..., 2]
+        in_camera = points @ self.rotation.T + self.translation
+        u, v = in_camera[..., 0] / in_camera[..., 2], in_camera[..., 1] / in_camera[..., 2]
         stretch = 1.0 + self.distortion[0] * (u * u + v * v)
         (fx, _, cx), (_, fy, cy), _ = self.matrix
         return np.stack([fx * stretch * u + cx, fy * stretch * v + cy], axis=-1)
 
     @property
     def view(self) -> View:
-        """What a perfect calibration of this camera finds."""
+        """View of a perfect calibration of this camera."""
         onto = np.stack([self.side * self.rotation[:, 1], -self.rotation[:, 0], self.translation], axis=1)
         return View(self.matrix, self.distortion, np.linalg.inv(self.matrix @ onto), self.size)
 
@@ -127,10 +127,10 @@ class Pinhole:
         """Directions (height * fine, width * fine, 2), where depth is 1, of `fine` x `fine` points of each pixel."""
         x, y = ((np.arange(count * fine) + 0.5) / fine - 0.5 for count in self.size)
         pixels = np.stack(np.meshgrid(x, y), axis=-1)
-        found = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
-        return found.reshape(pixels.shape).astype(np.float64)
+        undistorted = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
+        return undistorted.reshape(pixels.shape).astype(np.float64)
 
 
 def _turn(axis: int, angle: float) -> Array:
-    made: Array = cv2.Rodrigues(angle * np.eye(3)[axis])[0]
-    return made
+    rotation: Array = cv2.Rodrigues(angle * np.eye(3)[axis])[0]
+    return rotation

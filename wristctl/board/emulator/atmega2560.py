@@ -14,8 +14,8 @@ from wristctl.board.emulator.program import decode, read_hex, self_program
 from wristctl.board.emulator.registers import GLOBAL_INTERRUPT, SREG, read, write
 
 FIRMWARE = Path(__file__).parents[1] / "firmware" / "wrist.hex"
+# Byte address at which a Mega's boot loader begins.
 BOOT_SECTION = 0x3E000
-"""Byte address at which a Mega's boot loader begins."""
 
 ESTOP_INPUT = ("G", 0)  # D41
 ALARM_INPUTS = tuple(("L", bit) for bit in range(4))  # D49 to D46
@@ -95,7 +95,7 @@ class Atmega2560:
         chip.line_head += len(data)
 
     def read(self) -> bytes:
-        """What the transmitter has sent since the last call."""
+        """Read the transmitter's bytes since the last call."""
         sent = bytes(self._sent)
         self._sent.clear()
         return sent
@@ -115,10 +115,10 @@ class Atmega2560:
         self._keep_edges()
         rows = np.concatenate(self._edges)
         self._edges.clear()
-        found = np.zeros(len(rows), EDGE)
+        events = np.zeros(len(rows), EDGE)
         for column, name in enumerate(("cycle", "port", "value")):
-            found[name] = rows[:, column]
-        return found
+            events[name] = rows[:, column]
+        return events
 
     def jump(self, address: int) -> int:
         """Put the main program at a byte address, once it has interrupts on; the byte address where it was."""
@@ -149,8 +149,8 @@ class Atmega2560:
         """Nothing to give back: here so that every emulator ends alike."""
 
     def _halted(self, why: int) -> Halted:
-        what = "not an instruction" if why == state.ILLEGAL else "a device mode that is not emulated"
-        return Halted(f"{what}, near byte address {2 * self._chip.pc - 2:#x}")
+        problem = "not an instruction" if why == state.ILLEGAL else "a device mode that is not emulated"
+        return Halted(f"{problem}, near byte address {2 * self._chip.pc - 2:#x}")
 
     def _keep_edges(self) -> None:
         self._edges.append(self._chip.edges[: self._chip.edge_count].copy())
@@ -171,7 +171,7 @@ class VirtualTransport:
         self.chip.write(data)
 
     def read(self, timeout: float) -> bytes:
-        """What the chip has sent; runs it for up to `timeout` s until there is something."""
+        """Read the chip's bytes; runs it for up to `timeout` s until there are some."""
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
         while not (data := self.chip.read()) and self.chip.cycles < end:
             self.chip.run(end - self.chip.cycles, until_sent=True)

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 FREQUENCY = 16_000_000  # Hz, of the Mega 2560 board
 FLASH_BYTES = 0x40000
 FLASH_WORDS = FLASH_BYTES // 2
+# Behind the 64 KiB of data space lie the numbers 0 to 255: an immediate operand is read like a register.
 CONSTANTS = 0x10000
-"""Behind the 64 KiB of data space lie the numbers 0 to 255: an immediate operand is read like a register."""
 
 NEVER = 1 << 62
+# Places in `Chip.due`, behind four for each of the six timers.
 RX_BYTE, TX_BYTE, WATCHDOG = 24, 25, 26
-"""Places in `Chip.due`, behind four for each of the six timers."""
 
+# Bits of `Chip.check`: look for interrupts; but not before one more instruction; sleeping.
 LOOK, DELAY, ASLEEP = 1, 2, 4
-"""Bits of `Chip.check`: look for interrupts; but not before one more instruction; sleeping."""
 
+# Values of `Chip.halt`: why `execute.run` came back early.
 RUNNING, BUFFER_FULL, FLASH_CHANGED, BYTE_SENT, ILLEGAL, NOT_EMULATED = range(6)
-"""Values of `Chip.halt`: why `execute.run` came back early."""
 
 
 class Chip(Protocol):

@@ -13,6 +13,11 @@ Op = IntEnum(
     start=0,
 )
 
+# Operation, bits, and what else its operands need: a pointer register (X, Y, Z) or the word behind it (w).
+#
+# Letters: d, r registers; D, R register pairs; P pair from r24 on; K constant; q displacement; k signed distance in
+# words; h high bits of an address; A I/O address; b bit of a byte; s bit of SREG. LDI, CPI and so on are the operations
+# of MOV, CP with a constant; LPM without operands is LPM to r0; BREAK does nothing without a debugger.
 PATTERNS = """
 NOP       0000 0000 0000 0000
 MOVW      0000 0001 DDDD RRRR
@@ -105,10 +110,4 @@ BLD       1111 100d dddd 0bbb
 BST       1111 101d dddd 0bbb
 SBRC      1111 110r rrrr 0bbb
 SBRS      1111 111r rrrr 0bbb
-"""
-"""Operation, bits, and what else its operands need: a pointer register (X, Y, Z) or the word behind it (w).
-
-Letters: d, r registers; D, R register pairs; P pair from r24 on; K constant; q displacement; k signed distance in
-words; h high bits of an address; A I/O address; b bit of a byte; s bit of SREG. LDI, CPI and so on are the
-operations of MOV, CP with a constant; LPM without operands is LPM to r0; BREAK does nothing without a debugger.
 """

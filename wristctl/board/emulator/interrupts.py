@@ -1,4 +1,4 @@
-"""Which interrupt is next, in the order of the vectors (data sheet, table 14-1)."""
+"""Choice of the next interrupt, in the order of the vectors (data sheet, table 14-1)."""
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from wristctl.board.emulator.usart import RXC, TXC, UCSRA, UCSRB, UDRE, byte_arr
 from wristctl.lanes.compiled import compiled, kernel
 
 _TIMSK = 0x6E
+# Vector of the first compare unit of each timer; its other units and its overflow follow.
 _COMPARE_A = (21, 17, 13, 32, 42, 47)
-"""Vector of the first compare unit of each timer; its other units and its overflow follow."""
 
 _WATCHDOG_VECTOR = 12
 
@@ -59,8 +59,8 @@ def take_interrupt(chip: Chip) -> int:
     return 0
 
 
+# Causes of a reset as MCUSR shows them, beside WDRF.
 POWER_ON, EXTERNAL = 0x01, 0x02
-"""Causes of a reset as MCUSR shows them, beside WDRF."""
 
 
 @kernel

@@ -60,22 +60,22 @@ def watchdog_expired(chip: Chip) -> bool:
 
 @compiled
 def watchdog_served(chip: Chip) -> None:
-    """Its interrupt begins: the flag clears, and with WDE set the next time-out resets."""
+    """Begin the watchdog's interrupt: the flag clears, and with WDE set the next time-out resets."""
     chip.memory[WDTCSR] &= ~WDIF
     if chip.memory[WDTCSR] & WDE:
         chip.memory[WDTCSR] &= ~WDIE
 
 
 LETTERS = "ABCDEFGHJKL"
+# Address of PINx; DDRx and PORTx follow it.
 PIN = tuple(0x20 + 3 * p if p < 7 else 0x100 + 3 * (p - 7) for p in range(11))
-"""Address of PINx; DDRx and PORTx follow it."""
 
 _PIN, _LETTER = np.array(PIN), np.array([ord(letter) for letter in LETTERS])
 
 
 @kernel
 def levels(chip: Chip, port: int) -> int:
-    """What reading PINx gives: outputs their latch, inputs what drives them, else their pull-up."""
+    """Levels that PINx reads: an output's latch, an input's driver, else its pull-up."""
     pin = _PIN[port]
     outputs, latch = chip.memory[pin + 1], chip.memory[pin + 2]
     driven, level = chip.inputs[port, 0], chip.inputs[port, 1]
@@ -102,8 +102,8 @@ def write_port(chip: Chip, port: int, address: int, value: int) -> None:
 
 EECR, EEDR, EEARL, EEARH = 0x3F, 0x40, 0x41, 0x42
 EEMPE, EEPE, EERE = 0x04, 0x02, 0x01
+# Cycles.
 _WRITING = 54_400
-"""Cycles."""
 
 
 @compiled

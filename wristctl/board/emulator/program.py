@@ -11,8 +11,8 @@ from wristctl.board.emulator.registers import RAMPZ, SPMCSR
 from wristctl.errors import UserError
 
 _POINTER = {"X": 26, "Y": 28, "Z": 30}
+# Order of an instruction's operands by their letters.
 _RANK = "dDPrRAsKqbkhw"
-"""Of an instruction's operands, the one whose letter comes first here is its first."""
 
 Words = NDArray[np.int64]
 
@@ -28,21 +28,21 @@ def decode(flash: NDArray[np.uint8], program: NDArray[np.int32], first: int = 0,
         name, pattern, extra = line[:10].strip(), line[10:29].replace(" ", ""), line[30:]
         fixed = int("".join("01"[bit in "01"] for bit in pattern), 2)
         value = int("".join("01"[bit == "1"] for bit in pattern), 2)
-        at = np.flatnonzero((words & fixed) == value)
-        if at.size:
+        places = np.flatnonzero((words & fixed) == value)
+        if places.size:
             letters = sorted(
                 {*pattern, *extra.replace("X", "").replace("Y", "").replace("Z", "")} - {*"01"},
                 key=_RANK.find,
             )
-            operands = [_operand(letter, pattern, words[at], behind[at]) for letter in letters if letter != "h"]
+            operands = [_operand(letter, pattern, words[places], behind[places]) for letter in letters if letter != "h"]
             if extra in _POINTER:
-                displacement = operands[1] if len(operands) == 2 else np.zeros_like(at)
+                displacement = operands[1] if len(operands) == 2 else np.zeros_like(places)
                 operands = [operands[0], _POINTER[extra] + (displacement << 5)]
             if "h" in letters:
-                operands = [(_bits("h", pattern, words[at]) << 16 | behind[at]) % FLASH_WORDS]
-            rows[at, 0] = Op[name]
+                operands = [(_bits("h", pattern, words[places]) << 16 | behind[places]) % FLASH_WORDS]
+            rows[places, 0] = Op[name]
             for column, operand in enumerate(operands):
-                rows[at, 1 + column] = operand
+                rows[places, 1 + column] = operand
 
 
 def _operand(letter: str, pattern: str, words: Words, behind: Words) -> Words:
@@ -72,8 +72,8 @@ def _operand(letter: str, pattern: str, words: Words, behind: Words) -> Words:
 def _bits(letter: str, pattern: str, words: Words) -> Words:
     """The bits of `words` where `pattern` has `letter`, moved together."""
     value = np.zeros_like(words)
-    for place, each in enumerate(pattern):
-        if each == letter:
+    for place, symbol in enumerate(pattern):
+        if symbol == letter:
             value = (value << 1) | ((words >> (15 - place)) & 1)
     return value
 

@@ -44,7 +44,7 @@ _DEVICE = np.array(_device_table())
 
 @kernel
 def read(chip: Chip, address: int) -> int:
-    """What a load from this address gives."""
+    """Read the value of a load from this address."""
     if IO_FIRST <= address <= IO_LAST:
         device, which = _DEVICE[address, 0], _DEVICE[address, 1]
         if device == _TIMER:
@@ -60,7 +60,7 @@ def read(chip: Chip, address: int) -> int:
 
 @kernel
 def write(chip: Chip, address: int, value: int) -> None:
-    """What a store to this address does."""
+    """Store a value at this address, with the effects of its register."""
     memory = chip.memory
     if not IO_FIRST <= address <= IO_LAST:
         memory[address] = value

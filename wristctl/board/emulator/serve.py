@@ -23,10 +23,10 @@ from wristctl.loop_priority import no_long_pauses
 log = logging.getLogger(__name__)
 
 _QUANTUM, _IDLE_QUANTUM = 0.00025, 0.02
+# Bytes taken from clients in one go; bytes that wait for the chip before clients have to.
 _AT_ONCE, _ON_THE_WAY = 4096, 1024
-"""Bytes taken from clients in one go; bytes that wait for the chip before clients have to."""
+# Seconds that the chip may lag behind real time before that time is given up.
 _FURTHEST_BEHIND = 0.1
-"""Seconds that the chip may lag behind real time before that time is given up."""
 
 
 class Line(Protocol):
@@ -38,7 +38,7 @@ class Line(Protocol):
         """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
 
     def receive(self) -> bytes:
-        """What clients have sent."""
+        """Receive the clients' bytes."""
 
     def send(self, data: bytes) -> None:
         """Give bytes to every client; what a client does not read is lost to it."""
@@ -67,14 +67,14 @@ class PtyLine:
     def wait(self, timeout: float) -> bool:
         """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
         select.select([self._master], [], [], timeout)  # to the microsecond; a poll waits for whole milliseconds
-        found = self._poll.poll(0)
-        if found and found[0][1] & select.POLLHUP:
+        events = self._poll.poll(0)
+        if events and events[0][1] & select.POLLHUP:
             time.sleep(timeout)
             return False
         return True
 
     def receive(self) -> bytes:
-        """What the client has sent."""
+        """Receive the client's bytes."""
         with contextlib.suppress(OSError):
             return os.read(self._master, _AT_ONCE)
         return b""
@@ -112,7 +112,7 @@ class TcpLine:
         return bool(self._clients)
 
     def receive(self) -> bytes:
-        """What the clients have sent."""
+        """Receive the bytes of all clients."""
         received = b""
         for client in list(self._clients):
             if len(received) >= _AT_ONCE:
@@ -137,8 +137,8 @@ class TcpLine:
 
     def close(self) -> None:
         """Close all connections."""
-        for each in (self._server, *self._clients):
-            each.close()
+        for connection in (self._server, *self._clients):
+            connection.close()
 
 
 def serve(
@@ -161,10 +161,10 @@ def _serve(
     chip: Atmega2560, line: Line, running: Callable[[], bool], watch: Callable[[NDArray[np.void], float], None]
 ) -> None:
     start = time.monotonic() - chip.cycles / FREQUENCY
-    there = False
+    connected = False
     while running():
-        before, there = there, line.wait(_QUANTUM if there else _IDLE_QUANTUM)
-        if there and not before:
+        before, connected = connected, line.wait(_QUANTUM if connected else _IDLE_QUANTUM)
+        if connected and not before:
             chip.reset()
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
@@ -173,9 +173,9 @@ def _serve(
         except Halted as crash:
             log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
             chip.reset()
-        if there and chip.bytes_coming < _ON_THE_WAY:
+        if connected and chip.bytes_coming < _ON_THE_WAY:
             chip.write(line.receive())  # now that its clock is at the time at which they came
-        elif there:
+        elif connected:
             time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
         if data := chip.read():
             line.send(data)

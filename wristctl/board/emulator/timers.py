@@ -9,10 +9,11 @@ import numpy as np
 from wristctl.board.emulator.chip import LOOK, NEVER, NOT_EMULATED, Chip
 from wristctl.lanes.compiled import compiled
 
+# Columns of `Chip.timers`: cycles a count (0: stopped), highest count, count at cycle ORIGIN, 16-bit buffer.
 PRESCALE, TOP, BASE, ORIGIN, TEMP = range(5)
-"""Columns of `Chip.timers`: cycles a count (0: stopped), highest count, count at cycle ORIGIN, 16-bit buffer."""
 
 TCCRA, TCCRB, TCNT, OCRA, UNITS, LIMIT, TIFR = range(7)
+# Addresses, number of compare units and greatest count of each timer.
 TIMERS = np.array(
     [
         [0x44, 0x45, 0x46, 0x47, 2, 0xFF, 0x35],
@@ -23,10 +24,9 @@ TIMERS = np.array(
         [0x120, 0x121, 0x124, 0x128, 3, 0xFFFF, 0x3A],
     ]
 )
-"""Addresses, number of compare units and greatest count of each timer."""
 
+# Place of the overflow in a timer's four of `Chip.due`, behind its compare units.
 OVERFLOW = 3
-"""Place of the overflow in a timer's four of `Chip.due`, behind its compare units."""
 
 _PRESCALES = np.array([[0, 1, 8, 64, 256, 1024, 0, 0], [0, 1, 8, 32, 64, 128, 256, 1024]])
 
