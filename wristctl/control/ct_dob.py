@@ -14,12 +14,12 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     from the wrist is no load: nothing winds up.
     """
     frequency, damping_ratio = gains.w, gains.zeta
-    found = disturbance(now, wrist, gains.wo, memory, 0)
+    unmodelled = disturbance(now, wrist, gains.wo, memory, 0)
     inertia, load = one_segment(wrist, now.theta, now.rate)
     error, error_rate = now.theta - now.theta_ref, now.rate - now.rate_ref
     wanted = now.acceleration_ref - frequency * (2.0 * damping_ratio * error_rate + frequency * error)
-    torque = inertia * wanted + load - found
-    remember(now, wrist, found, torque, memory, 0)
+    torque = inertia * wanted + load - unmodelled
+    remember(now, wrist, unmodelled, torque, memory, 0)
     return torque
 
 

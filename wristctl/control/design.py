@@ -24,19 +24,19 @@ class LawDesign:
     make: Callable[[Mapping[str, float]], Controller]
     """A controller of this name, from every setting by name."""
 
-    def values(self, given: Mapping[str, float]) -> dict[str, float]:
+    def values(self, settings: Mapping[str, float]) -> dict[str, float]:
         """Every setting: as given, or as by default."""
-        return {name: float(given.get(name, each.default)) for name, each in self.section.items()}
+        return {name: float(settings.get(name, parameter.default)) for name, parameter in self.section.items()}
 
-    def made(self, given: Mapping[str, float]) -> Controller:
+    def made(self, settings: Mapping[str, float]) -> Controller:
         """The controller for these settings, the others as by default. Raises UserError for what is none of them."""
-        for key in given:
+        for key in settings:
             if key not in self.section:
                 raise UserError(
                     f"unknown setting '{key}' of {self.name}", f"laws.{self.name}", meant(key, self.section)
                 )
         with contained(f"making {self.name} of these settings", f"laws.{self.name}"):
-            controller = self.make(self.values(given))
+            controller = self.make(self.values(settings))
         if not isinstance(controller, Controller) or controller.name.removesuffix(PLAIN) != self.name:
             raise UserError(f"{self.name} makes no controller of that name", f"laws.{self.name}", "mend what makes it")
         return replace(controller, settings=self.section)

@@ -11,7 +11,7 @@ _RATE = NOW.index("rate")
 
 
 def differenced(controller: Controller) -> Controller:
-    """The same controller, its rate the angle's change over the last period over that period (none at the start).
+    """Copy of a controller whose rate is the angle's change over the last period over that period (none at the start).
 
     It remembers one angle more, and begins straight.
     """

@@ -1,7 +1,7 @@
 """A disturbance observer that laws may carry: the load torque by which the wrist's momentum differs from the model's.
 
 Ohnishi, Shibata and Murakami, IEEE/ASME Trans. Mechatronics 1 (1996) 54, on the momentum M rate (De Luca and Mattone,
-ICRA 2003), so that no acceleration is measured. It needs three values of memory, from `at` on.
+ICRA 2003), so that no acceleration is measured. It needs three values of memory, from `first` on.
 """
 
 from typing import Any
@@ -11,12 +11,12 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, expm1_of_negative
 from wristctl.lanes.lane import where, zero_like
 
+# Memory that it needs: the load that it has found, the momentum that it expects, and whether it has begun.
 VALUES = 3
-"""Memory that it needs: the load that it has found, the momentum that it expects, and whether it has begun."""
 
 
 @compiled
-def disturbance(now: Any, wrist: Any, bandwidth: Any, memory: Any, at: int) -> Any:
+def disturbance(now: Any, wrist: Any, bandwidth: Any, memory: Any, first: int) -> Any:
     """The load torque [N m] that acts on the one-segment wrist beside the law's, low-passed at `bandwidth` [rad/s].
 
     What the momentum has gained over a period beyond the model's is the error of the load held until now; a share
@@ -24,12 +24,12 @@ def disturbance(now: Any, wrist: Any, bandwidth: Any, memory: Any, at: int) -> A
     period's load.
     """
     inertia, _, _ = one_segment_terms(wrist, now.theta)
-    gained = where(memory[at + 2] > 0.0, inertia * now.rate - memory[at + 1], 0.0)
-    return memory[at] - expm1_of_negative(-bandwidth * now.period) * gained / now.period
+    gained = where(memory[first + 2] > 0.0, inertia * now.rate - memory[first + 1], 0.0)
+    return memory[first] - expm1_of_negative(-bandwidth * now.period) * gained / now.period
 
 
 @compiled
-def remember(now: Any, wrist: Any, load: Any, torque: Any, memory: Any, at: int) -> None:
+def remember(now: Any, wrist: Any, load: Any, torque: Any, memory: Any, first: int) -> None:
     """Keep the load found and the momentum that the model expects a period from now under `torque` and that load.
 
     The tendons reach no more torque than `now` says.
@@ -37,6 +37,6 @@ def remember(now: Any, wrist: Any, load: Any, torque: Any, memory: Any, at: int)
     inertia, curving, gravity = one_segment_terms(wrist, now.theta)
     resisting = gravity + wrist.damping * now.rate + wrist.stiffness * now.theta - curving * now.rate * now.rate
     delivered = clip(torque, now.torque_low, now.torque_high)
-    memory[at] = load
-    memory[at + 1] = inertia * now.rate + now.period * (delivered + load - resisting)
-    memory[at + 2] = 1.0 + zero_like(load)
+    memory[first] = load
+    memory[first + 1] = inertia * now.rate + now.period * (delivered + load - resisting)
+    memory[first + 2] = 1.0 + zero_like(load)

@@ -1,4 +1,4 @@
-"""What a controller is: a law, its gains with units and search boxes, and presets.
+"""Controllers: a law, its gains with units and search boxes, and presets.
 
 A law is a function of lanes, written once: `law(now, wrist, gains, memory) -> torque`. It runs in rollouts, in
 batches for tuning and on hardware. `now` has the fields of NOW, and `ahead` reads the reference to come where the
@@ -29,10 +29,11 @@ from wristctl.lanes.rows import rows_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
 
+# Signals of a law: measured angle and rate, the reference with two derivatives, the torques that the tendons can
+# reach now [N m], the control period [s], and the load torque [N m] that the observer behind a camera makes out
+# (nothing where sensors are ideal). The reference of the periods to come follows, as many as the controller's
+# `preview`.
 NOW = ("theta", "rate", "theta_ref", "rate_ref", "acceleration_ref", "torque_low", "torque_high", "period", "load")
-"""What a law sees: measured angle and rate, the reference with two derivatives, the torques that the tendons can
-reach now [N m], the control period [s], and the load torque [N m] that the observer behind a camera makes out (nothing
-where sensors are ideal). The reference of the periods to come follows, as many as the controller's `preview`."""
 
 REFERENCE = ("theta_ref", "rate_ref", "acceleration_ref")
 
@@ -41,12 +42,12 @@ wrist_of = rows_named(Segments._fields)
 
 Law = Callable[[Any, Any, Any, Any], Any]
 
+# Origin of presets for the rig.
 BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
-"""Of presets for the rig, where they are from."""
 
 
 def signals_of(preview: int) -> int:
-    """How many values a law sees that looks so many periods ahead."""
+    """Number of signals of a law that looks so many periods ahead."""
     return len(NOW) + len(REFERENCE) * preview
 
 
@@ -80,7 +81,7 @@ class Conditions(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """Of a sliding law, what its switching term reads: sigma = a e + b de/dt + c int(e), 0 on the surface.
+    """Sliding surface that a law's switching term reads: sigma = a e + b de/dt + c int(e), 0 on the surface.
 
     `weights` gives a, b and c by the law's gains, `layer` the |sigma| within which the term is about a line.
     """
@@ -111,14 +112,14 @@ class Controller:
     memory: int = 0
     preview: int = 0
     notes: Mapping[str, str] = field(default_factory=dict)
-    """What a reader should know about a preset."""
+    """Remarks that a reader should know about a preset."""
     conditions: Mapping[str, Conditions] = field(default_factory=dict)
-    """Of the presets that are made for motors, tendons and a camera too; the others are for tensions as commanded."""
+    """Conditions of presets that are for motors, tendons and a camera too; the others are for tensions as commanded."""
     surface: Surface | None = None
-    """Of the sliding laws, for where their rate is that of the error."""
+    """Surface of the sliding laws, for where their rate is that of the error."""
     plain: bool = False
     settings: Mapping[str, Parameter] = field(default_factory=dict)
-    """What it was made from (`wristctl.control.design`): its own section of a study."""
+    """Settings that it was made from (`wristctl.control.design`): its own section of a study."""
 
     def __post_init__(self) -> None:
         """ValueError for a preset that does not give every gain and no other, for conditions of none, and for a name
@@ -129,8 +130,8 @@ class Controller:
             object.__setattr__(self, "name", f"{self.name}{PLAIN}")
         if unknown := set(self.conditions) - set(self.presets):
             raise ValueError(f"{self.name} has conditions for {', '.join(unknown)}, and no such preset")
-        for preset, given in self.presets.items():
-            if not isinstance(given, Mapping) or set(given) != set(self.gains):
+        for preset, preset_gains in self.presets.items():
+            if not isinstance(preset_gains, Mapping) or set(preset_gains) != set(self.gains):
                 raise ValueError(f"preset {preset} of {self.name} must give {', '.join(self.gains)} by name")
 
     def values(self, gains: Mapping[str, float]) -> tuple[float, ...]:
@@ -153,26 +154,27 @@ class _NativeLaw(types.WrapperAddressProtocol):
 
     def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
         self._lanes = lanes
-        frozen, others = frozen_values(law)
+        frozen, imported = frozen_values(law)
         self._code: Any = CFunc(law, normalize_signature(_signature(lanes, names)), locals={}, options={})
-        keep(self._code, law, *others, frozen=frozen)
+        keep(self._code, law, *imported, frozen=frozen)
         try:
             self._code.compile()
         except NumbaError as error:
             raise _refused(law, error) from error
 
     def __wrapper_address__(self) -> int:
-        """Where the code is."""
+        """Address of the code."""
         return int(self._code.address)
 
     def signature(self) -> Any:
-        """What kernels call."""
+        """Signature that kernels call."""
         return _signature(self._lanes)
 
     def check(self) -> None:
         """Nothing can have gone wrong in native code."""
 
 
+# Patterns in numba's messages, and their meaning.
 _TOLD = (
     (r"(?:bool|truth)\((?:Mask|Lane)Type",
      "it branches on a value, which differs from rollout to rollout: use where(condition, yes, no)"),
@@ -180,21 +182,20 @@ _TOLD = (
     (r"No implementation of function Function\((.*?)\) found", "it calls {0}, which compiled code does not have"),
     (r"No conversion from none to LaneType", "it returns no torque"),
 )  # fmt: skip
-"""What numba says, and what it means."""
 
 
 def _refused(law: Law, error: NumbaError) -> UserError:
-    """What a law does that compiled code cannot, in a line, at its own line."""
+    """Explain in a line, at the law's own line, what a law does that compiled code cannot."""
     text, file = re.sub(r"\x1b\[[0-9;]*m", "", str(error)), law.__code__.co_filename
-    lines = [each.strip() for each in text.splitlines() if each.strip()]
-    told = [each for each in lines if not each.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
-    why = told[0] if told else type(error).__name__
-    known = [(found, words) for pattern, words in _TOLD if (found := re.search(pattern, text))]
-    if known:
-        found, words = known[0]
-        why = words.format(*found.groups())
-    at = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
-    line = at[-1] if at else law.__code__.co_firstlineno
+    lines = [message.strip() for message in text.splitlines() if message.strip()]
+    reasons = [message for message in lines if not message.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
+    why = reasons[0] if reasons else type(error).__name__
+    explanations = [(match, words) for pattern, words in _TOLD if (match := re.search(pattern, text))]
+    if explanations:
+        match, words = explanations[0]
+        why = words.format(*match.groups())
+    numbers = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
+    line = numbers[-1] if numbers else law.__code__.co_firstlineno
     fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
     return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
 

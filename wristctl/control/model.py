@@ -1,4 +1,4 @@
-"""What model-based laws know: the wrist as one segment (E6 with n = 1).
+"""One-segment model of the wrist that model-based laws know (E6 with n = 1).
 
 It is the model of `wrist.arcs` and `wrist.dynamics` written a second time, short enough for a law; tests hold one
 against the other.

@@ -16,8 +16,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.rows import beyond, lanes_like, part
 
+# Control periods that are planned.
 HORIZON = 20
-"""Control periods that are planned."""
 TURNS = 25
 _STEPS = (0,) * HORIZON
 _RELAXED, _LEAST_DAMPING = 1.6, 2.0**-0.5
@@ -47,8 +47,8 @@ def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) ->
     # the Riccati sweep: P of the cost to go (p11, p12, p22), the gains, and 1/(effort + B'PB)
     p11, p12, p22 = 2.0 * zeta * w2 * w, w2, 2.0 * zeta * w
     end11, end12, end22 = p11, p12, p22
-    for at in range(HORIZON):
-        k = HORIZON - 1 - at
+    for step in range(HORIZON):
+        k = HORIZON - 1 - step
         b1, b2 = h * (0.5 * h * p11 + p12), h * (0.5 * h * p12 + p22)
         inverse = 1.0 / (effort + h * (0.5 * h * b1 + b2))
         c1, c2 = b1, h * b1 + b2
@@ -65,8 +65,8 @@ def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) ->
     for _ in range(turns):
         angle_ref, rate_ref, _ = ahead(now, HORIZON)
         g1, g2 = end11 * angle_ref + end12 * rate_ref, end12 * angle_ref + end22 * rate_ref
-        for at in range(HORIZON):
-            k = HORIZON - 1 - at
+        for step in range(HORIZON):
+            k = HORIZON - 1 - step
             pull = h * (wished[k] + price * (plans[k] - multipliers[k])) + h * (0.5 * h * g1 + g2)
             shift[k] = share[k] * pull
             g1, g2 = g1 - by_start[k] * pull, h * g1 + g2 - by_speed[k] * pull
@@ -89,15 +89,15 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
 
     The box of v is what tendons reach at the present angle, for the whole horizon.
     """
-    found = disturbance(now, wrist, gains.wo, memory, 0)
+    unmodelled = disturbance(now, wrist, gains.wo, memory, 0)
     inertia, load = one_segment(wrist, now.theta, now.rate)
-    box = (now.torque_low - load + found) / inertia, (now.torque_high - load + found) / inertia
+    box = (now.torque_low - load + unmodelled) / inertia, (now.torque_high - load + unmodelled) / inertia
     kept = beyond(memory, VALUES)
     for k in range(HORIZON - 1):
         kept[k] = kept[k + 1]
         kept[HORIZON + k] = kept[HORIZON + k + 1]
-    torque = inertia * plan(now, (now.theta, now.rate), (gains.w, gains.zeta), box, kept, TURNS) + load - found
-    remember(now, wrist, found, torque, memory, 0)
+    torque = inertia * plan(now, (now.theta, now.rate), (gains.w, gains.zeta), box, kept, TURNS) + load - unmodelled
+    remember(now, wrist, unmodelled, torque, memory, 0)
     return torque
 
 

@@ -8,12 +8,12 @@ from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where, zero_like
 
 LOWEST = (-0.8, -0.9, -0.8, -1.0, -1.0)
+# Bounds of the adapted parameters, as deviations from the model: inertia, damping, stiffness and gravity relative to
+# the model's (so inertia, damping and stiffness stay positive, gravity keeps its sign), and a constant load [N m].
 HIGHEST = (3.0, 5.0, 2.0, 2.0, 1.0)
-"""Bounds of the adapted parameters, as deviations from the model: inertia, damping, stiffness and gravity relative to
-the model's (so inertia, damping and stiffness stay positive, gravity keeps its sign), and a constant load [N m]."""
 
+# Places in memory of the reference model's state and the first adapted parameter.
 STARTED, MODEL_ANGLE, MODEL_RATE, PARAMETERS = 0, 1, 2, 3
-"""Where memory holds the reference model's state and the first adapted parameter."""
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:

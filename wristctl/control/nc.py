@@ -9,12 +9,12 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import tanh
 from wristctl.lanes.lane import where, zero_like
 
+# Hidden units; the first layer is random and fixed (functional link), only the second learns.
 UNITS = 12
-"""Hidden units; the first layer is random and fixed (functional link), only the second learns."""
 
 INPUTS = 5
+# Typical size of angle, rate, reference angle, rate and acceleration [rad, s].
 _SCALES = np.array([0.5, 2.0, 0.5, 2.0, 10.0])
-"""Typical size of angle, rate, reference angle, rate and acceleration [rad, s]."""
 
 
 def _first_layer() -> tuple[tuple[float, ...], tuple[float, ...]]:

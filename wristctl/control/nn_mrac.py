@@ -16,11 +16,11 @@ from wristctl.lanes.functions import clip, tanh
 from wristctl.lanes.lane import where, zero_like
 
 UNITS, INPUTS = 8, 4
+# Typical size of the wanted angle, the model's angle, the difference and its rate [rad, s].
 _SCALES = np.array([0.5, 0.5, 0.1, 1.0])
-"""Typical size of the wanted angle, the model's angle, the difference and its rate [rad, s]."""
 _PER_UNIT = INPUTS + 2
+# Place in memory of whether it has begun, the reference model's angle and its rate, behind all weights.
 _MODEL = UNITS * _PER_UNIT + 1
-"""Where memory holds whether it has begun, the reference model's angle and its rate, behind all weights."""
 
 
 def _initial() -> tuple[float, ...]:
@@ -49,25 +49,25 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     reach = where(reach < 1e3, reach, 1.0 + zero)
     output = memory[UNITS * _PER_UNIT]
     for j in range(UNITS):
-        own = _PER_UNIT * j
-        total = _FIRST[(INPUTS + 1) * j + INPUTS] + memory[own + INPUTS]
+        first = _PER_UNIT * j
+        total = _FIRST[(INPUTS + 1) * j + INPUTS] + memory[first + INPUTS]
         for k in range(INPUTS):
-            total = total + (_FIRST[(INPUTS + 1) * j + k] + memory[own + k]) * inputs[k]
-        output = output + memory[own + INPUTS + 1] * tanh(total)
+            total = total + (_FIRST[(INPUTS + 1) * j + k] + memory[first + k]) * inputs[k]
+        output = output + memory[first + INPUTS + 1] * tanh(total)
     torque = reach * output - gains.Kd * error_rate
     within = (torque <= now.torque_high) & (torque >= now.torque_low)
     step = where(within, -h * gains.eta * (error + error_rate / w), zero)
     for j in range(UNITS):
-        own = _PER_UNIT * j
-        total = _FIRST[(INPUTS + 1) * j + INPUTS] + memory[own + INPUTS]
+        first = _PER_UNIT * j
+        total = _FIRST[(INPUTS + 1) * j + INPUTS] + memory[first + INPUTS]
         for k in range(INPUTS):
-            total = total + (_FIRST[(INPUTS + 1) * j + k] + memory[own + k]) * inputs[k]
+            total = total + (_FIRST[(INPUTS + 1) * j + k] + memory[first + k]) * inputs[k]
         unit = tanh(total)
-        inner = step * memory[own + INPUTS + 1] * (1.0 - unit * unit)
-        memory[own + INPUTS + 1] = clip(memory[own + INPUTS + 1] + step * unit, -10.0 + zero, 10.0 + zero)
-        memory[own + INPUTS] = clip(memory[own + INPUTS] + inner, -10.0 + zero, 10.0 + zero)
+        inner = step * memory[first + INPUTS + 1] * (1.0 - unit * unit)
+        memory[first + INPUTS + 1] = clip(memory[first + INPUTS + 1] + step * unit, -10.0 + zero, 10.0 + zero)
+        memory[first + INPUTS] = clip(memory[first + INPUTS] + inner, -10.0 + zero, 10.0 + zero)
         for k in range(INPUTS):
-            memory[own + k] = clip(memory[own + k] + inner * inputs[k], -10.0 + zero, 10.0 + zero)
+            memory[first + k] = clip(memory[first + k] + inner * inputs[k], -10.0 + zero, 10.0 + zero)
     last = UNITS * _PER_UNIT
     memory[last] = clip(memory[last] + step, -10.0 + zero, 10.0 + zero)
 

@@ -16,11 +16,11 @@ GAINS = pid_ff.GAINS | {"wo": Gain("rad/s", "bandwidth of the disturbance observ
 @compiled
 def rung(now: Any, wrist: Any, gains: Any, memory: Any, more: Any) -> Any:
     """The law's torque less `more` [N m], what the rung above adds."""
-    found = disturbance(now, wrist, gains.wo, memory, 1)
+    load = disturbance(now, wrist, gains.wo, memory, 1)
     integral = integrated(now, memory[0])
-    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - found - more
+    torque = fed_forward_pd(now, wrist, gains) - gains.Ki * integral - load - more
     memory[0] = held(now, torque, memory[0], integral)
-    remember(now, wrist, found, torque, memory, 1)
+    remember(now, wrist, load, torque, memory, 1)
     return torque
 
 

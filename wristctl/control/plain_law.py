@@ -15,10 +15,10 @@ from wristctl.errors import UserError
 from wristctl.plugins.places import contained
 
 __all__ = ["PlainLaw"]
+# Imported for what it does: numba learns there what an object with an address is.
 _TEACHES_NUMBA = function_type
-"""Imported for what it does: numba learns there what an object with an address is."""
+# Function that kernels call of a rollout alone: four pointers to doubles, and a lane of width one, which is a double.
 _CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 4)
-"""What kernels call of a rollout alone: four pointers to doubles, and a lane of width one, which is a double."""
 _REFERENCE = 3
 
 
@@ -44,11 +44,11 @@ class PlainLaw(types.WrapperAddressProtocol):
         self._callback = _CALLBACK(self._call)
 
     def __wrapper_address__(self) -> int:
-        """Where compiled code enters Python."""
+        """Address at which compiled code enters Python."""
         return int(ctypes.cast(self._callback, ctypes.c_void_p).value or 0)
 
     def signature(self) -> Any:
-        """What kernels call."""
+        """Signature that kernels call."""
         return self._kind
 
     def check(self) -> None:
@@ -63,20 +63,20 @@ class PlainLaw(types.WrapperAddressProtocol):
             return math.nan
         try:
             signals = _doubles(now, self._signals)
-            seen = self._now(signals)
-            known, own = self._wrist(*_doubles(wrist, len(self._wrist._fields))), self._gains
+            current = self._now(signals)
+            believed, gains_type = self._wrist(*_doubles(wrist, len(self._wrist._fields))), self._gains
             kept = np.ctypeslib.as_array((ctypes.c_double * max(1, self._memory)).from_address(memory))[: self._memory]
-            torque = self._law(seen, known, own(*_doubles(gains, len(own._fields))), kept)
-            return self._finite(torque, seen)
+            torque = self._law(current, believed, gains_type(*_doubles(gains, len(gains_type._fields))), kept)
+            return self._finite(torque, current)
         except BaseException as error:  # nothing may be raised through compiled code
             self._error = error
             return math.nan
 
-    def _finite(self, torque: Any, seen: Any) -> float:
+    def _finite(self, torque: Any, now: Any) -> float:
         value = float(torque)
         if not math.isfinite(value):
-            what = f"{self._name} returned {value} at theta = {seen.theta:.4g} rad, rate = {seen.rate:.4g} rad/s"
-            raise UserError(what, self._where, "return a finite torque [N m] whatever it sees")
+            problem = f"{self._name} returned {value} at theta = {now.theta:.4g} rad, rate = {now.rate:.4g} rad/s"
+            raise UserError(problem, self._where, "return a finite torque [N m] whatever it sees")
         return value
 
 
@@ -91,7 +91,7 @@ def _named(fields: tuple[str, ...]) -> Any:
 
 @cache
 def _seen(fields: tuple[str, ...]) -> Any:
-    """What a law sees, by its fields, and after them the reference to come."""
+    """Type of the signals that a law sees, by its fields, and after them the reference to come."""
 
     class Now(namedtuple("Now", fields)):  # type: ignore[misc]
         _to_come: Sequence[float] = ()

@@ -13,8 +13,8 @@ from wristctl.records.files import write_text
 
 CONTROLLERS: Choices[Controller] = _TABLE
 
+# Gains by controller and name, as a tune run finds them.
 TunedGains = Mapping[str, Mapping[str, float]]
-"""Gains by controller and name, as a tune run finds them."""
 
 
 def controller(name: str) -> Controller:
@@ -46,8 +46,8 @@ def gains_of(
             raise UserError(f"unknown gain '{name}' of {chosen.name}", f"gains.{name}", meant(name, chosen.gains))
     below = [name for name, value in gains.items() if value < 0.0 <= chosen.gains[name].low]
     if below:
-        what = f"{gains[below[0]]:g} for {below[0]} of {chosen.name}, which pushes the wrong way"
-        raise UserError(what, f"gains.{below[0]}", "a gain is not negative")
+        problem = f"{gains[below[0]]:g} for {below[0]} of {chosen.name}, which pushes the wrong way"
+        raise UserError(problem, f"gains.{below[0]}", "a gain is not negative")
     missing = [name for name in chosen.gains if name not in gains]
     if missing:
         raise UserError(f"missing gain {', '.join(missing)} of {chosen.name}", "gains", "give every gain by name")
@@ -66,6 +66,6 @@ def read_gains(path: Path) -> Gains:
     """Read a file of tuned gains; UserError if it is none."""
     try:
         gains = json.loads(path.read_bytes())
-        return {str(name): {str(k): float(v) for k, v in each.items()} for name, each in gains.items()}
+        return {str(name): {str(k): float(v) for k, v in values.items()} for name, values in gains.items()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
         raise UserError("not a file of tuned gains", str(path), ("name a run of `", Call("tune"), "`")) from error

@@ -18,8 +18,8 @@ from wristctl.lanes.rows import rows_of
 from wristctl.wrist.segments import segments
 
 _STATES = 32
+# Values on both sides of what a law may read or write.
 _GUARD = 256
-"""Values on both sides of what a law may read or write."""
 _PARTS = ("what it sees", "the wrist", "its gains", "its memory")
 _READ_BEYOND = {
     "its memory": "reads more memory than the {0.memory} values it declares",
@@ -28,7 +28,7 @@ _READ_BEYOND = {
 
 
 class TriedStates(NamedTuple):
-    """What a law saw (S, signals), the gains that it had (S, g), and its torques (S,)."""
+    """States at which a law was tried: signals (S, signals), gains (S, g), and its torques (S,)."""
 
     signals: Array
     gains: Array
@@ -43,8 +43,8 @@ def law_of(entry: Any, where: str, settings: Mapping[str, Mapping[str, float]]) 
     if isinstance(entry, LawDesign):
         return entry.made(settings.get(entry.name, {}))
     if not isinstance(entry, Controller):
-        what = f"{where.rpartition(':')[2]} is a {type(entry).__name__}, and no Controller"
-        raise UserError(what, where, "name the Controller of that file: `wristctl new controller NAME` writes one")
+        problem = f"{where.rpartition(':')[2]} is a {type(entry).__name__}, and no Controller"
+        raise UserError(problem, where, "name the Controller of that file: `wristctl new controller NAME` writes one")
     if settings.get(entry.name.removesuffix(PLAIN)):
         raise UserError(f"{entry.name} has no settings", f"laws.{entry.name}", "leave them out, or make it a LawDesign")
     return entry
@@ -62,18 +62,20 @@ def call_law(controller: Controller, signals: Array, gains: Array, wide: bool = 
     Each state stands for so many ticks; `wide` calls it for blocks of lanes. Raises what a plain law raises.
     """
     count = len(signals)
-    groups = [np.arange(count)] if wide else [np.array([each]) for each in range(count)]
-    found, law = np.empty(count), controller.compiled(count if wide else 1)
-    for own in groups:
-        wrists = np.tile(segments(WristParameters(), 1), (len(own), 1))
-        kept, out = np.zeros((len(own), controller.memory + 1)), np.zeros((len(own), 1))
-        rows = (signals[own], wrists, np.pad(gains[own], ((0, 0), (0, 1))), kept, out)
-        seen, known, given, memory, answers = (to_blocks(each) for each in rows)
-        for block in range(len(seen)):
-            _call(law, seen[block], known[block], given[block], memory[block], answers[block], times)
-        found[own] = to_rows(answers, len(own))[:, 0]
+    groups = [np.arange(count)] if wide else [np.array([state]) for state in range(count)]
+    torques, law = np.empty(count), controller.compiled(count if wide else 1)
+    for group in groups:
+        wrists = np.tile(segments(WristParameters(), 1), (len(group), 1))
+        kept, out = np.zeros((len(group), controller.memory + 1)), np.zeros((len(group), 1))
+        rows = (signals[group], wrists, np.pad(gains[group], ((0, 0), (0, 1))), kept, out)
+        signal_blocks, wrist_blocks, gain_blocks, memory, answers = (to_blocks(row) for row in rows)
+        for block in range(len(signal_blocks)):
+            _call(
+                law, signal_blocks[block], wrist_blocks[block], gain_blocks[block], memory[block], answers[block], times
+            )
+        torques[group] = to_rows(answers, len(group))[:, 0]
     law.check()
-    return found
+    return torques
 
 
 def vet(controller: Controller, where: str) -> TriedStates:
@@ -84,49 +86,51 @@ def vet(controller: Controller, where: str) -> TriedStates:
     """
     rng, torques = np.random.default_rng(0), []
     law, wrist = controller.compiled(), segments(WristParameters(), 1)
-    rows = [controller.values(each) for each in controller.presets.values()]
+    rows = [controller.values(preset) for preset in controller.presets.values()]
     rows = rows or [tuple(np.sqrt(gain.low * gain.high) for gain in controller.gains.values())]
-    gains = np.array([[*rows[each % len(rows)]] for each in range(_STATES)]).reshape(_STATES, -1)
+    gains = np.array([[*rows[state % len(rows)]] for state in range(_STATES)]).reshape(_STATES, -1)
     signals = np.array([_state(rng, controller.preview) for _ in range(_STATES)])
-    for seen, own in zip(signals, gains, strict=True):
-        first, left = _guarded(controller, law, (seen, wrist, own), "", where)
+    for state, state_gains in zip(signals, gains, strict=True):
+        first, left = _guarded(controller, law, (state, wrist, state_gains), "", where)
         for beside, fault in ({} if controller.plain else _READ_BEYOND).items():  # Python checks, and may remember
-            again, also = _guarded(controller, law, (seen, wrist, own), beside, where)
+            again, also = _guarded(controller, law, (state, wrist, state_gains), beside, where)
             if not (_same(first, again) and _same(left, also)):
                 fix = "declare them: memory=... and preview=... of its Controller"
                 raise UserError(f"{controller.name} {fault.format(controller)}", where, fix)
         if not np.isfinite(first):
-            at = dict(zip(NOW, seen, strict=False))
-            what = f"{controller.name} returned {first} at theta = {at['theta']:.3g} rad, rate = {at['rate']:.3g} rad/s"
-            raise UserError(what, where, "return a finite torque [N m] at every state and preset")
+            now = dict(zip(NOW, state, strict=False))
+            problem = (
+                f"{controller.name} returned {first} at theta = {now['theta']:.3g} rad, rate = {now['rate']:.3g} rad/s"
+            )
+            raise UserError(problem, where, "return a finite torque [N m] at every state and preset")
         torques.append(first)
-    if not controller.plain and (made := _allocated(law, (signals[0], wrist, gains[0]), controller.memory)):
-        what = f"{controller.name} allocates memory, {made} times a call"
-        raise UserError(what, where, "lanes, tuples and memory[k] in place of arrays: docs/lanes.md")
+    if not controller.plain and (allocations := _allocated(law, (signals[0], wrist, gains[0]), controller.memory)):
+        problem = f"{controller.name} allocates memory, {allocations} times a call"
+        raise UserError(problem, where, "lanes, tuples and memory[k] in place of arrays: docs/lanes.md")
     return TriedStates(signals, gains, np.array(torques))
 
 
 def _state(rng: np.random.Generator, preview: int) -> Array:
-    """What a law may see: angles within 50 deg, tendons that can pull either way, a control period of 1 ms."""
-    seen = np.zeros(signals_of(preview))
+    """Random signals of a law: angles within 50 deg, tendons that can pull either way, a control period of 1 ms."""
+    signals = np.zeros(signals_of(preview))
     largest = {"theta": 0.9, "rate": 5.0, "theta_ref": 0.9, "rate_ref": 5.0, "acceleration_ref": 50.0, "load": 0.3}
     for name, most in largest.items():
-        seen[NOW.index(name)] = rng.uniform(-most, most)
-    seen[NOW.index("torque_low")], seen[NOW.index("torque_high")] = -rng.uniform(0.2, 2.0), rng.uniform(0.2, 2.0)
-    seen[NOW.index("period")] = 1e-3
-    seen[len(NOW) :] = rng.uniform(-0.9, 0.9, len(seen) - len(NOW))
-    return seen
+        signals[NOW.index(name)] = rng.uniform(-most, most)
+    signals[NOW.index("torque_low")], signals[NOW.index("torque_high")] = -rng.uniform(0.2, 2.0), rng.uniform(0.2, 2.0)
+    signals[NOW.index("period")] = 1e-3
+    signals[len(NOW) :] = rng.uniform(-0.9, 0.9, len(signals) - len(NOW))
+    return signals
 
 
 def _guarded(
-    controller: Controller, law: Any, given: tuple[Array, Array, Array], unknown: str, where: str
+    controller: Controller, law: Any, arguments: tuple[Array, Array, Array], unknown: str, where: str
 ) -> tuple[float, Array]:
     """The torque, and what it leaves in its memory; nan stands on both sides of what is `unknown`, else zeros."""
-    sizes = [len(each) for each in given] + [controller.memory]
+    sizes = [len(argument) for argument in arguments] + [controller.memory]
     beside = [np.nan if name == unknown else 0.0 for name in _PARTS]
     blocks = [np.full(size + 2 * _GUARD, value) for size, value in zip(sizes, beside, strict=True)]
-    for block, each in zip(blocks, (*given, np.zeros(controller.memory)), strict=True):
-        block[_GUARD : _GUARD + len(each)] = each
+    for block, argument in zip(blocks, (*arguments, np.zeros(controller.memory)), strict=True):
+        block[_GUARD : _GUARD + len(argument)] = argument
     before = [block.copy() for block in blocks]
     now, wrist, gains, memory = (b[_GUARD : _GUARD + size] for b, size in zip(blocks, sizes, strict=True))
     out = np.zeros(1)
@@ -134,25 +138,25 @@ def _guarded(
     law.check()
     for name, block, old in zip(_PARTS[:3], blocks, before, strict=False):
         if not _same(block, old):
-            what = f"{controller.name} changes {name}, which it is only shown"
-            raise UserError(what, where, "write to memory[k] alone, and declare how many: memory=...")
+            problem = f"{controller.name} changes {name}, which it is only shown"
+            raise UserError(problem, where, "write to memory[k] alone, and declare how many: memory=...")
     outside = np.ones(len(blocks[3]), bool)
     outside[_GUARD : _GUARD + controller.memory] = False
     if not _same(blocks[3][outside], before[3][outside]):
-        what = f"{controller.name} writes more memory than the {controller.memory} values it declares"
-        raise UserError(what, where, "declare them: memory=... of its Controller")
+        problem = f"{controller.name} writes more memory than the {controller.memory} values it declares"
+        raise UserError(problem, where, "declare them: memory=... of its Controller")
     return float(out[0]), memory.copy()
 
 
-def _allocated(law: Any, given: tuple[Array, Array, Array], memory: int) -> int:
-    """How often a call takes memory from the system."""
+def _allocated(law: Any, arguments: tuple[Array, Array, Array], memory: int) -> int:
+    """Number of times that a call takes memory from the system."""
     counted = _nrt_python.memsys_stats_enabled()
     kept, out = np.zeros(memory + 1), np.zeros(1)
     _nrt_python.memsys_enable_stats()
     try:
         counts = [rtsys.get_allocation_stats().alloc]
         for times in (1, 2):  # handing arrays over takes memory too, and as much each time
-            _call(law, *given, kept, out, times)
+            _call(law, *arguments, kept, out, times)
             counts.append(rtsys.get_allocation_stats().alloc)
         return int(counts[2] - 2 * counts[1] + counts[0])
     finally:

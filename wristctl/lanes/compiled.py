@@ -34,47 +34,47 @@ def frozen_values(function: Callable[..., Any]) -> tuple[bytes, tuple[Path, ...]
 
     It reaches globals by the names in its code, attributes of modules too, and what its closure holds.
     """
-    digest, files, seen = hashlib.sha256(), set[Path](), set[int]()
+    digest, files, visited = hashlib.sha256(), set[Path](), set[int]()
     waiting: list[Any] = [function]
     while waiting:
         value = waiting.pop()
-        own = getattr(value, "py_func", getattr(value, "_defn", value))
-        if not isinstance(own, FunctionType):
+        unwrapped = getattr(value, "py_func", getattr(value, "_defn", value))
+        if not isinstance(unwrapped, FunctionType):
             digest.update(_told(value))
-        elif id(own) not in seen:
-            seen.add(id(own))
-            file = Path(own.__code__.co_filename)
+        elif id(unwrapped) not in visited:
+            visited.add(id(unwrapped))
+            file = Path(unwrapped.__code__.co_filename)
             if file.is_relative_to(_PACKAGE):
                 files.add(file)
                 continue
-            digest.update(own.__qualname__.encode())
-            for code in _codes(own.__code__):
+            digest.update(unwrapped.__qualname__.encode())
+            for code in _codes(unwrapped.__code__):
                 digest.update(code.co_code + repr((code.co_names, code.co_varnames, _plain(code.co_consts))).encode())
-                waiting += _reached(own, code)
-            waiting += [cell.cell_contents for cell in own.__closure__ or ()]
-            waiting += [*(own.__defaults__ or ()), *(own.__kwdefaults__ or {}).values()]
+                waiting += _reached(unwrapped, code)
+            waiting += [cell.cell_contents for cell in unwrapped.__closure__ or ()]
+            waiting += [*(unwrapped.__defaults__ or ()), *(unwrapped.__kwdefaults__ or {}).values()]
     return digest.digest(), tuple(sorted(files))
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
     """A function's code, and that of the functions within it."""
     yield code
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _codes(each)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
 
 
 def _plain(constants: tuple[Any, ...]) -> list[Any]:
-    return [each for each in constants if not isinstance(each, CodeType)]
+    return [constant for constant in constants if not isinstance(constant, CodeType)]
 
 
 def _reached(function: FunctionType, code: CodeType) -> Iterator[Any]:
-    """What the names in a code stand for: globals, and attributes of the modules among them."""
-    found = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
-    for name in sorted(found):
-        value = found[name]
+    """Values that the names in a code stand for: globals, and attributes of the modules among them."""
+    named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+    for name in sorted(named):
+        value = named[name]
         if isinstance(value, ModuleType):
-            yield from (getattr(value, each) for each in sorted(code.co_names) if hasattr(value, each))
+            yield from (getattr(value, attribute) for attribute in sorted(code.co_names) if hasattr(value, attribute))
         else:
             yield value
 
@@ -91,8 +91,8 @@ def _told(value: Any) -> bytes:
         return repr(value).encode()
 
 
+# Environment variable that names another folder.
 NAMED = "WRISTCTL_KERNELS"
-"""Environment variable that names another folder."""
 _SHARED = ("nfs", "nfs4", "lustre", "gpfs", "beegfs", "cifs", "smb3", "ceph", "afs", "panfs", "glusterfs", "fuse.sshfs")
 _MOUNTS = Path("/proc/self/mounts")
 
@@ -121,44 +121,44 @@ def _unescaped(point: str) -> str:
 
 
 def _of_this_machine() -> Path:
-    """What lies there is run: so it is the user's own."""
+    """Folder of this machine's own file system, which the user alone may write: its files are run."""
     folder = Path(tempfile.gettempdir()) / f"wristctl-kernels-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    known = folder.lstat()
-    if known.st_uid != os.getuid() or known.st_mode & 0o022 or folder.is_symlink():
+    status = folder.lstat()
+    if status.st_uid != os.getuid() or status.st_mode & 0o022 or folder.is_symlink():
         raise PermissionError(f"{folder} is not this user's alone")
     return folder
 
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+# The numba that the tests ran with. What lanes are built on (docs/lanes.md) may be another thing in the next one.
 TRIED = "0.68"
-"""The numba that the tests ran with. What lanes are built on (docs/lanes.md) may be another thing in the next one."""
 
 _KEPT_DAYS = 30.0
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
+# Options of functions that compiled code alone calls: a way in from Python would be compiled and never used.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Of what compiled code alone calls: a way in from Python would be compiled for each of them, and never used."""
 _IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)", re.MULTILINE)
+# Packages that compiled code takes nothing from, neither a function nor a number.
 _CONSTANT_FREE = tuple(f"wristctl.{room}" for room in ("config", "errors", "plugins", "records", "study_files"))
-"""Packages that compiled code takes nothing from, neither a function nor a number."""
 
 if not numba.__version__.startswith(f"{TRIED}."):
-    told = f"numba {numba.__version__}: wristctl was tried with {TRIED} only; pip install 'numba=={TRIED}.*'"
-    warnings.warn(told, stacklevel=2)
+    warning = f"numba {numba.__version__}: wristctl was tried with {TRIED} only; pip install 'numba=={TRIED}.*'"
+    warnings.warn(warning, stacklevel=2)
 
 
 @cache
 def _read(file: Path) -> tuple[bytes, tuple[Path, ...]]:
     """The content of a source file, and the files beside or in this package that it imports at its top."""
     content = file.read_bytes()
-    found = []
-    for module in sorted({each.decode() for each in _IMPORT.findall(content)}):
+    imported = []
+    for module in sorted({name.decode() for name in _IMPORT.findall(content)}):
         inside = module.startswith("wristctl.") and not module.startswith(_CONSTANT_FREE)
         stem = (_PACKAGE.parent if inside else file.parent).joinpath(*module.split("."))
         if inside or not module.startswith("wristctl"):
-            found += [each for each in (stem.with_suffix(".py"), stem / "__init__.py") if each.is_file()]
-    return content, tuple(found)
+            imported += [path for path in (stem.with_suffix(".py"), stem / "__init__.py") if path.is_file()]
+    return content, tuple(imported)
 
 
 def _named(source: Path) -> str:
@@ -171,15 +171,15 @@ def sources(file: Path) -> list[Path]:
     """The file and every file that it rests on, sorted: those that it imports and those that they import."""
     reached, waiting = {file}, [file]
     while waiting:
-        for each in _read(waiting.pop())[1]:
-            if each not in reached:
-                reached.add(each)
-                waiting.append(each)
+        for imported in _read(waiting.pop())[1]:
+            if imported not in reached:
+                reached.add(imported)
+                waiting.append(imported)
     return sorted(reached)
 
 
 @cache
-def cache_folder(file: Path, *others: Path, frozen: bytes = b"") -> Path | None:
+def cache_folder(file: Path, *extra_sources: Path, frozen: bytes = b"") -> Path | None:
     """Folder for what is compiled of these source files, or None where none can be written: then nothing is kept.
 
     `frozen` stands for what decides it beside them.
@@ -187,7 +187,7 @@ def cache_folder(file: Path, *others: Path, frozen: bytes = b"") -> Path | None:
     if not file.is_file():  # typed into a notebook
         return None
     digest = hashlib.sha256(repr((numba.__version__, frozen, _named(file))).encode())
-    for source in sorted({each for root in (file, *others) for each in sources(root)}, key=_named):
+    for source in sorted({path for root in (file, *extra_sources) for path in sources(root)}, key=_named):
         digest.update(repr((_named(source), _read(source)[0])).encode())
     try:
         folder = _kernels() / digest.hexdigest()[:16]
@@ -228,18 +228,18 @@ class _KeptFiles(CompileResultCacheImpl):
 
 
 class _Locator(UserProvidedCacheLocator):
-    """Where the files of a function are; their stamp is the hash of its source file."""
+    """Locator of a function's files; their stamp is the hash of its source file."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         code = function.__code__
         self._py_file, self._lineno, self._cache_path = code.co_filename, code.co_firstlineno, str(folder)
 
 
-def keep(made: Any, function: Callable[..., Any], *others: Path, frozen: bytes = b"") -> None:
+def keep(dispatcher: Any, function: Callable[..., Any], *extra_sources: Path, frozen: bytes = b"") -> None:
     """Have what numba makes of a function, a dispatcher or a C function, kept in the folder of its sources."""
-    folder = cache_folder(Path(function.__code__.co_filename), *others, frozen=frozen)
+    folder = cache_folder(Path(function.__code__.co_filename), *extra_sources, frozen=frozen)
     if folder is not None:
-        made._cache = _Kept(function, folder)
+        dispatcher._cache = _Kept(function, folder)
 
 
 class _Inner(CPUDispatcher):
@@ -250,9 +250,9 @@ class _Inner(CPUDispatcher):
 
 
 def _inner(function: F, **options: Any) -> F:
-    made = numba.njit(**_OPTIONS, **_INNER, **options)(function)
-    made.__class__ = _Inner
-    return cast(F, made)
+    dispatcher = numba.njit(**_OPTIONS, **_INNER, **options)(function)
+    dispatcher.__class__ = _Inner
+    return cast(F, dispatcher)
 
 
 def compiled(function: F) -> F:
@@ -268,8 +268,8 @@ def spelled_out(function: F) -> F:
     return _inner(function, inline="always")
 
 
+# Bodies of functions by the function that declares them and the NamedTuple class of the first argument.
 _BODIES: dict[tuple[Any, Any], Any] = {}
-"""Bodies of functions by the function that declares them and the NamedTuple class of the first argument."""
 
 
 def by_type(function: F) -> F:
@@ -297,11 +297,11 @@ def implements(declared: Any, *kinds: Any) -> Callable[[F], F]:
     return keep
 
 
-def kernel(function: F, *others: Path) -> F:
+def kernel(function: F, *extra_sources: Path) -> F:
     """Compile for Python, which calls it, and keep it in the cache.
 
-    `others` are source files beside the function's own that decide what it does, where it does not import them.
+    `extra_sources` are files beside the function's own that decide what it does, where it does not import them.
     """
-    made = numba.njit(**_OPTIONS)(function)
-    keep(made, function, *others)
-    return cast(F, made)
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    keep(dispatcher, function, *extra_sources)
+    return cast(F, dispatcher)

@@ -7,8 +7,8 @@ from typing import Any
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import exp2i, floor, polynomial, where
 
+# The series hold for x^2 up to this: a little more than pi^2.
 _REACH = 10
-"""The series hold for x^2 up to this: a little more than pi^2."""
 
 
 def _series(order: int, terms: int) -> tuple[float, ...]:
@@ -17,14 +17,17 @@ def _series(order: int, terms: int) -> tuple[float, ...]:
     Lanczos: as long as there are more, take off the multiple of Chebyshev's polynomial on 0 to _REACH that takes off
     the highest term. That spreads its error over the interval, where 15 terms of Taylor's would be needed.
     """
-    rest = [Fraction(1, math.prod(range(1, 2 * order + 2, 2)))]
+    coefficients = [Fraction(1, math.prod(range(1, 2 * order + 2, 2)))]
     for k in range(16):
-        rest.append(-_REACH * rest[-1] / (2 * (k + 1) * (2 * order + 2 * k + 3)))
-    while len(rest) > terms:
-        chebyshev = _shifted_chebyshev(len(rest) - 1)
-        share = rest[-1] / chebyshev[-1]
-        rest = [own - share * other for own, other in zip(rest, chebyshev, strict=True)][:-1]
-    return tuple(float(coefficient / _REACH**k) for k, coefficient in enumerate(rest))
+        coefficients.append(-_REACH * coefficients[-1] / (2 * (k + 1) * (2 * order + 2 * k + 3)))
+    while len(coefficients) > terms:
+        chebyshev = _shifted_chebyshev(len(coefficients) - 1)
+        share = coefficients[-1] / chebyshev[-1]
+        coefficients = [
+            coefficient - share * chebyshev_coefficient
+            for coefficient, chebyshev_coefficient in zip(coefficients, chebyshev, strict=True)
+        ][:-1]
+    return tuple(float(coefficient / _REACH**k) for k, coefficient in enumerate(coefficients))
 
 
 def _shifted_chebyshev(n: int) -> list[int]:
@@ -33,15 +36,15 @@ def _shifted_chebyshev(n: int) -> list[int]:
     return [value * n // (n + k) for k, value in enumerate(signed)]
 
 
+# To 1e-16 of their value at 0, as doubles.
 E2, E3 = _series(2, 10), _series(3, 11)
-"""To 1e-16 of their value at 0, as doubles."""
 
 
 _LOG2_E = 1.0 / math.log(2.0)
 _LN2_HIGH = 6.93147180369123816490e-01
 _LN2_LOW = 1.90821492927058770002e-10
+# (exp(r) - 1 - r)/r^2
 _exp_rest = polynomial(tuple(1.0 / math.factorial(k) for k in range(2, 14)))
-"""(exp(r) - 1 - r)/r^2"""
 
 
 @compiled

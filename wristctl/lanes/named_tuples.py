@@ -21,9 +21,9 @@ def tuple_of(kind: Any) -> Any:
     @intrinsic
     def read(typingctx: Any, rows: RowsType) -> Any:
         def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-            numbers = [ir.Constant(ir.IntType(64), at) for at in range(count)]
+            numbers = [ir.Constant(ir.IntType(64), number) for number in range(count)]
             return context.make_tuple(
-                builder, sig.return_type, [load_row(builder, rows, args[0], each) for each in numbers]
+                builder, sig.return_type, [load_row(builder, rows, args[0], number) for number in numbers]
             )
 
         return signature(numba.types.NamedUniTuple(rows.element, count, kind), rows), codegen
@@ -37,13 +37,13 @@ def replacing(*names: str) -> Any:
     @intrinsic
     def replaced(typingctx: Any, record: numba.types.BaseNamedTuple, values: numba.types.BaseTuple) -> Any:
         places = [record.fields.index(name) for name in names]
-        wanted = numba.types.Tuple(tuple(record.types[at] for at in places))
+        wanted = numba.types.Tuple(tuple(record.types[place] for place in places))
 
         def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
             changed, result = args
-            for number, at in enumerate(places):
+            for number, place in enumerate(places):
                 value = builder.extract_value(result, number)
-                changed = builder.insert_value(changed, value, at)
+                changed = builder.insert_value(changed, value, place)
             return changed
 
         return signature(record, record, wanted), codegen
@@ -63,12 +63,12 @@ def block_of(typingctx: Any, parts: Any, block: numba.types.Integer) -> Any:
     """
     if not isinstance(parts, numba.types.BaseNamedTuple):
         return None
-    kinds = [_block_type(each) for each in parts.types]
+    kinds = [_block_type(kind) for kind in parts.types]
     result = numba.types.NamedTuple(kinds, parts.instance_class)
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
-        whole, index = args
-        return _taken(context, builder, sig.args, whole, index)
+        record, index = args
+        return _taken(context, builder, sig.args, record, index)
 
     return signature(result, parts, block), codegen
 
@@ -77,18 +77,18 @@ def _block_type(kind: Any) -> Any:
     if isinstance(kind, numba.types.Array):
         return kind.copy(ndim=kind.ndim - 1) if kind.ndim > 1 else kind.dtype
     if isinstance(kind, numba.types.BaseNamedTuple):
-        return numba.types.NamedTuple([_block_type(each) for each in kind.types], kind.instance_class)
+        return numba.types.NamedTuple([_block_type(part) for part in kind.types], kind.instance_class)
     return kind
 
 
-def _taken(context: Any, builder: Any, kinds: Any, whole: Any, block: Any) -> Any:
+def _taken(context: Any, builder: Any, kinds: Any, record: Any, block: Any) -> Any:
     parts, index = kinds
-    found = []
-    for at, kind in enumerate(parts.types):
-        own = builder.extract_value(whole, at)
+    values = []
+    for number, kind in enumerate(parts.types):
+        value = builder.extract_value(record, number)
         if isinstance(kind, numba.types.Array):
-            own = context.compile_internal(builder, _own, signature(_block_type(kind), kind, index), [own, block])
+            value = context.compile_internal(builder, _own, signature(_block_type(kind), kind, index), [value, block])
         elif isinstance(kind, numba.types.BaseNamedTuple):
-            own = _taken(context, builder, (kind, index), own, block)
-        found.append(own)
-    return context.make_tuple(builder, _block_type(parts), found)
+            value = _taken(context, builder, (kind, index), value, block)
+        values.append(value)
+    return context.make_tuple(builder, _block_type(parts), values)

@@ -16,12 +16,12 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
 
+# Rollouts of one block: a register of AVX-512, two of AVX2. Sixteen are a quarter faster with one segment, where what
+# a step works on fits the registers, and a fifth slower with four, where it does not.
 LANES = 8
-"""Rollouts of one block: a register of AVX-512, two of AVX2. Sixteen are a quarter faster with one segment, where what
-a step works on fits the registers, and a fifth slower with four, where it does not."""
 
+# A rollout alone, and a block of rollouts.
 WIDTHS = (1, LANES)
-"""A rollout alone, and a block of rollouts."""
 
 
 class _Wide(types.Type):
@@ -121,11 +121,11 @@ def define(function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide
 def _teach(function: Any, arguments: tuple[_Wide, ...], result: _Wide, lowered: Callable[..., Any]) -> None:
     class Signature(AbstractTemplate):
         def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
-            if len(args) != len(arguments) or all(isinstance(given, types.Number) for given in args):
+            if len(args) != len(arguments) or all(isinstance(argument, types.Number) for argument in args):
                 return None
             fits = all(
-                given == wanted or (isinstance(wanted, LaneType) and isinstance(given, types.Number))
-                for given, wanted in zip(args, arguments, strict=True)
+                argument == wanted or (isinstance(wanted, LaneType) and isinstance(argument, types.Number))
+                for argument, wanted in zip(args, arguments, strict=True)
             )
             return signature(result, *arguments) if fits else None
 

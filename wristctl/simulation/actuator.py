@@ -54,19 +54,19 @@ class SpoolDrive(NamedTuple):
 
 Drive = IdealDrive | LaggedDrive | SpoolDrive
 
+# A Motor of lanes from rows of lanes, in compiled code.
 read_motor = tuple_of(Motor)
-"""A Motor of lanes from rows of lanes, in compiled code."""
 
 
 class Winding(NamedTuple):
-    """What the motors deliver is `scale` times what their host counts, and `offset` [m]."""
+    """Winding error: the motors deliver `scale` times the count of their host, and `offset` [m]."""
 
     scale: Any
     offset: Any
 
 
+# A Winding of lanes from rows of lanes, in compiled code.
 read_winding = tuple_of(Winding)
-"""A Winding of lanes from rows of lanes, in compiled code."""
 
 
 def motor_of(actuator: Actuator) -> Motor:
@@ -117,12 +117,12 @@ def _spools_in_lanes(drive: Any) -> Any:
 def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
     """The motor as its host counts: lengths and pulls are what it believes, only how fast it is, it is in truth."""
     step = believed.step_length
-    own = {"lag": actual.lag, "speed": step * actual.step_rate, "acceleration": step * actual.step_acceleration}
-    return motor_of(believed)._replace(**own)
+    limits = {"lag": actual.lag, "speed": step * actual.step_rate, "acceleration": step * actual.step_acceleration}
+    return motor_of(believed)._replace(**limits)
 
 
 def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float = 0.0) -> Winding:
-    """What a count means: both sides were homed at this pull [N] on the straight wrist, where the counts are right.
+    """Meaning of a count: both sides were homed at this pull [N] on the straight wrist, where the counts are right.
 
     `creep` is the share of the tendons' stiffness that had relaxed by then.
     """
@@ -176,13 +176,13 @@ def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
 
 @compiled
 def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
-    """What a spool has to reel in [m] for a pull [N]: its tendons' stretch, and by how much their path is shorter."""
+    """Length that a spool has to reel in [m] for a pull [N]: its tendons' stretch, and the shortening of their path."""
     return pull / stiffness + length - path
 
 
 @by_type
 def actuate(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    """What the host counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
+    """Host's counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
 
     `believed` is the controller's wrist as Segments.
     """

@@ -28,12 +28,12 @@ from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTen
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 Indices = NDArray[np.int64]
+# The coordinates (q,) at which a plant begins, at rest.
 Start = Callable[[WristParameters], Array]
-"""The coordinates (q,) at which a plant begins, at rest."""
 
 
 class Batch(NamedTuple):
-    """What `run_blocks` is given, and how many blocks and samples there are."""
+    """Arguments of `run_blocks`, with the numbers of blocks and samples."""
 
     setup: Setup
     course: LoopCourse
@@ -53,7 +53,7 @@ class Batch(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Which of the motions, worlds and streams each rollout has, (count,) each."""
+    """Motion, world and stream of each rollout, (count,) each."""
 
     motion: Indices
     world: Indices
@@ -72,10 +72,10 @@ def batch(
 ) -> Batch:
     """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing."""
     filmed, (worlds, body) = worlds, _bodies(worlds)
-    world = body[lanes.world]
+    world_index = body[lanes.world]
     references = np.empty((len(motions), 3, len(motions[0].time)))
-    for each, own in zip(references, motions, strict=True):
-        own.angles.into(each)
+    for target, followed_motion in zip(references, motions, strict=True):
+        followed_motion.angles.into(target)
     check_stops(worlds, references[:, 0])
     loop, count = worlds[0].loop, len(gains)
     n, period = loop.plant_segments, loop.control_period
@@ -83,15 +83,15 @@ def batch(
     ticks, samples = max(1, round(sample_period(period) / period)), references.shape[2]
     followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
     wide = followed.shape[1:]
-    actual = [each.plant for each in worlds]
-    rest = np.zeros((len(worlds), k)) if start is None else np.array([start(each) for each in actual])
-    actuators = [each.actuator for each in worlds]
-    counted = [counted_motor(each.loop.actuator, own) for each, own in zip(worlds, actuators, strict=True)]
-    windings = [_winding(each, own) for each, own in zip(worlds, actuators, strict=True)]
+    actual = [world.plant for world in worlds]
+    coordinates = np.zeros((len(worlds), k)) if start is None else np.array([start(wrist) for wrist in actual])
+    actuators = [world.actuator for world in worlds]
+    counted = [counted_motor(world.loop.actuator, actuator) for world, actuator in zip(worlds, actuators, strict=True)]
+    windings = [_winding(world, actuator) for world, actuator in zip(worlds, actuators, strict=True)]
     step = period / loop.steps
     nonideals = [
-        nonideal_of(each.loop.plant, own, each.loop.plant.actuator, step)
-        for each, own in zip(worlds, actuators, strict=True)
+        nonideal_of(world.loop.plant, actuator, world.loop.plant.actuator, step)
+        for world, actuator in zip(worlds, actuators, strict=True)
     ]
     ideal = all(map(is_ideal, nonideals))
 
@@ -99,53 +99,55 @@ def batch(
         """A row of each world's as blocks; of one world as one block for all."""
         if len(worlds) == 1:
             return spread(row(0), max(1, *wide, 1))[:1]
-        return spread(np.array([row(each) for each in range(len(worlds))])[world], count)
+        return spread(np.array([row(index) for index in range(len(worlds))])[world_index], count)
 
-    def limits(each: int) -> Array:
-        loop, wrist = worlds[each]
+    def limits(index: int) -> Array:
+        loop, wrist = worlds[index]
         most = wrist.tension_limit if loop.limits else np.inf
-        return np.array([wrist.pretension, most, bending_limit(actual[each], loop.plant.end_stop_deg)])
+        return np.array([wrist.pretension, most, bending_limit(actual[index], loop.plant.end_stop_deg)])
 
-    def at_the_motors(each: int) -> Array:
-        return at_rest(drive_with(level, counted[each]), actual[each], model, rest[each], windings[each].scale)
+    def at_the_motors(index: int) -> Array:
+        return at_rest(
+            drive_with(level, counted[index]), actual[index], model, coordinates[index], windings[index].scale
+        )
 
-    def resting(each: int) -> Array:
+    def resting(index: int) -> Array:
         """State of a world's tendons and springs at rest."""
-        own, lengths = at_the_motors(each)[[0, 2]], model.taut(actual[each], rest[each])
-        reeled, short = windings[each].scale * own + windings[each].offset, actual[each].length - lengths
-        path = np.append(short, np.abs(rest[each]).sum())
-        return unmoved(reeled, path, reeled - short, rest[each])
+        counts, lengths = at_the_motors(index)[[0, 2]], model.taut(actual[index], coordinates[index])
+        reeled, short = windings[index].scale * counts + windings[index].offset, actual[index].length - lengths
+        path = np.append(short, np.abs(coordinates[index]).sum())
+        return unmoved(reeled, path, reeled - short, coordinates[index])
 
     def tendons() -> Tendons:
-        stiffness = of_worlds(lambda each: np.array([motor_of(actuators[each]).stiffness]))
+        stiffness = of_worlds(lambda index: np.array([motor_of(actuators[index]).stiffness]))
         if ideal:
             return ElasticTendons(stiffness) if level == "tendon" else NoTendons()
-        nonideal = of_worlds(lambda each: np.array(nonideals[each]))
-        state = spread(np.array([resting(each) for each in range(len(worlds))])[world], count)
+        nonideal = of_worlds(lambda index: np.array(nonideals[index]))
+        state = spread(np.array([resting(index) for index in range(len(worlds))])[world_index], count)
         return RealTendons(stiffness, nonideal, state) if level == "tendon" else PulledTendons(nonideal, state)
 
     ends = zip(motions, references[:, 0, -1], strict=True)
-    goals = np.array([own.goals_at(end) for own, end in ends])[lanes.motion]
-    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, rest[body])
+    goals = np.array([followed_motion.goals_at(end) for followed_motion, end in ends])[lanes.motion]
+    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, coordinates[body])
     values = LoopValues(
-        plant=of_worlds(lambda each: model.values(actual[each], n)),
-        model=of_worlds(lambda each: segments(worlds[each].wrist, 1)),
+        plant=of_worlds(lambda index: model.values(actual[index], n)),
+        model=of_worlds(lambda index: segments(worlds[index].wrist, 1)),
         limits=of_worlds(limits),
-        drive=drive_with(level, of_worlds(lambda each: np.array(counted[each]))),
-        winding=of_worlds(lambda each: np.array(windings[each])),
+        drive=drive_with(level, of_worlds(lambda index: np.array(counted[index]))),
+        winding=of_worlds(lambda index: np.array(windings[index])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
         schedule=frames,
     )
-    kinds = list(dict.fromkeys(each.loop.disturbances for each in worlds))
-    cases = [acting(each, motions[0].time) for each in kinds]
-    case = np.array([kinds.index(each.loop.disturbances) for each in worlds])[world]
+    kinds = list(dict.fromkeys(world.loop.disturbances for world in worlds))
+    cases = [acting(kind, motions[0].time) for kind in kinds]
+    case = np.array([kinds.index(world.loop.disturbances) for world in worlds])[world_index]
     state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
         memory=spread(np.zeros(max(1, controller.memory)), count),
-        coordinates=spread(np.concatenate([rest, np.zeros_like(rest)], axis=1)[world], count),
-        motors=spread(np.array([at_the_motors(each) for each in range(len(worlds))])[world], count),
+        coordinates=spread(np.concatenate([coordinates, np.zeros_like(coordinates)], axis=1)[world_index], count),
+        motors=spread(np.array([at_the_motors(index) for index in range(len(worlds))])[world_index], count),
         tendons=tendons(),
         sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
@@ -157,13 +159,13 @@ def batch(
 
 
 def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
-    """Of worlds that differ in nothing but their cameras one each, and which of them every world is like."""
-    found, which = dict[tuple[object, ...], tuple[int, World]](), []
-    for each in worlds:
-        loop = each.loop
-        parts = id(each.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits
-        which.append(found.setdefault(parts, (len(found), each))[0])
-    return [each for _, each in found.values()], np.array(which)
+    """Group worlds that differ only in their cameras: one representative per group, and each world's group index."""
+    bodies, which = dict[tuple[object, ...], tuple[int, World]](), []
+    for world in worlds:
+        loop = world.loop
+        parts = id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits
+        which.append(bodies.setdefault(parts, (len(bodies), world))[0])
+    return [world for _, world in bodies.values()], np.array(which)
 
 
 def sample_period(control_period: float) -> float:
@@ -180,28 +182,30 @@ def _disturbances(cases: Sequence[Array | None], samples: int) -> Disturbed | Un
 
 
 def _watch(
-    worlds: Sequence[World], lanes: Lanes, horizon: float, model: PlantModel, rest: Array
+    worlds: Sequence[World], lanes: Lanes, horizon: float, model: PlantModel, coordinates: Array
 ) -> tuple[Watch, Schedule] | tuple[NoCamera, NoCamera]:
     """Cameras with their observers by block."""
     loop, count = worlds[0].loop, len(lanes.motion)
     if loop.sensor.level == "ideal":
         return NoCamera(), NoCamera()
-    sensors = [each.sensor for each in worlds]
-    believed, period = [each.loop.sensor for each in worlds], loop.control_period
+    sensors = [world.sensor for world in worlds]
+    believed, period = [world.loop.sensor for world in worlds], loop.control_period
     tables, camera = side_by_side(sensors, believed, period, horizon)
-    bursts = [worlds[each].loop.plant.sensor.burst for each in lanes.world]
+    bursts = [worlds[index].loop.plant.sensor.burst for index in lanes.world]
     counts = frame_counts(sensors, horizon)[lanes.world].tolist()
-    taken = readings(counts, [sensors[each] for each in lanes.world], lanes.streams, bursts)
-    taken[:, :, 0] += np.deg2rad([worlds[each].loop.plant.sensor.zero_deg for each in lanes.world])[:, None]
+    taken = readings(counts, [sensors[index] for index in lanes.world], lanes.streams, bursts)
+    taken[:, :, 0] += np.deg2rad([worlds[index].loop.plant.sensor.zero_deg for index in lanes.world])[:, None]
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
-    by_block = np.array([np.moveaxis(taken[own], 0, -1) for own in order.reshape(blocks, -1)])  # (blocks, F, 2, lanes)
+    by_block = np.array(
+        [np.moveaxis(taken[block], 0, -1) for block in order.reshape(blocks, -1)]
+    )  # (blocks, F, 2, lanes)
     cameras = camera[lanes.world][order].reshape(blocks, -1)
     different = cameras if camera.any() else cameras[:1]
-    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(each[..., different], -2, 0)) for each in tables))
-    gains = stationary_gains([_belief(each) for each in worlds])
+    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(table[..., different], -2, 0)) for table in tables))
+    gains = stationary_gains([_belief(world) for world in worlds])
     start = np.zeros((len(worlds), 3))
-    start[:, 0] = model.angle(rest)
+    start[:, 0] = model.angle(coordinates)
     now = spread(start[lanes.world], count)
     observer = Observer(
         gain=spread(gains[lanes.world], count),

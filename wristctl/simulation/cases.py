@@ -27,13 +27,13 @@ from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.rollout import How, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
 
+# Numbers that are kept of rollouts whose samples are wanted.
 _RECORDED_AT_ONCE = 6_000_000
-"""Numbers that are kept of rollouts whose samples are wanted."""
+# Loops whose spectra are worked out at once.
 _SPECTRA = 256
-"""Loops whose spectra are worked out at once."""
 
+# Metrics of courses that are taken of many rollouts without a trajectory for each.
 AT_ONCE = ("oscillation", "energy", "substeps", "drift")
-"""Metrics of courses that are taken of many rollouts without a trajectory for each."""
 
 
 class Case(NamedTuple):
@@ -62,39 +62,41 @@ class Measured:
     lasted: Array
     """Share of the horizon that each stayed in its range."""
     rests: NDArray[np.bool_]
-    """Of each case, (C,)."""
+    """Whether the reference of each case comes to rest, (C,)."""
     tension_range: float = math.inf
     """The wrist's, from pretension to limit [N]; inf: whether it chatters is not known."""
 
     @property
     def limit_cycles(self) -> NDArray[np.bool_]:
-        """Where the reference rests and the wrist does not, (P, C)."""
-        found: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
-        return found
+        """Whether the wrist swings although its reference rests, (P, C)."""
+        cycling: NDArray[np.bool_] = (self.metrics["oscillation"] > LIMIT_CYCLE) & self.rests
+        return cycling
 
     @property
     def chatter(self) -> Array:
-        """How often tensions go from limit to limit and back, where it chatters, else 0, (P, C) [1/s]."""
+        """Frequency at which tensions go from limit to limit and back, where it chatters, else 0, (P, C) [1/s]."""
         if math.isinf(self.tension_range):
             return np.zeros(self.failed.shape)
         return chatter(self.metrics["chattering"], self.tension_range)
 
     @property
     def unconverged(self) -> NDArray[np.bool_]:
-        """Where the motion depends on the integration step, (P, C)."""
-        found: NDArray[np.bool_] = self.metrics["drift"] > 0.0
-        return found
+        """Whether the motion depends on the integration step, (P, C)."""
+        doubtful: NDArray[np.bool_] = self.metrics["drift"] > 0.0
+        return doubtful
 
     @property
     def swings(self) -> NDArray[np.bool_]:
-        """Where any of these holds, and nobody can rely on the rest, (P, C)."""
+        """Whether a loop swings, chatters or has not converged, so that nobody can rely on its metrics, (P, C)."""
         return self.limit_cycles | (self.chatter > 0.0) | self.unconverged
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
-        """The same of cases that are some of the motions of their world, which are so many."""
-        own = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
-        metrics = {name: values[:, own] for name, values in self.metrics.items()}
-        return Measured(metrics, self.failed[:, own], self.lasted[:, own], self.rests[own], self.tension_range)
+        """Results of the `chosen` motions, of the cases of worlds with so many `motions` each."""
+        indices = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
+        metrics = {name: values[:, indices] for name, values in self.metrics.items()}
+        return Measured(
+            metrics, self.failed[:, indices], self.lasted[:, indices], self.rests[indices], self.tension_range
+        )
 
 
 def measure(
@@ -111,28 +113,28 @@ def measure(
     `chattering` and `drift` are always among the metrics.
     """
     shape, metrics = (len(gains), len(cases)), list(dict.fromkeys([*metrics, "chattering", "drift"]))
-    found = {name: np.empty(shape) for name in metrics}
+    measured = {name: np.empty(shape) for name in metrics}
     failed, lasted = np.empty(shape, bool), np.empty(shape)
-    done = 0
-    for own in _alike(cases):
-        for rows, there in _pieces(len(gains), own, cases[own[0]], _recorded(metrics)):
-            chosen = [cases[each] for each in there]
+    finished = 0
+    for numbers in _alike(cases):
+        for rows, columns in _pieces(len(gains), numbers, cases[numbers[0]], _recorded(metrics)):
+            chosen = [cases[number] for number in columns]
             outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge)
-            at = np.ix_(rows, there)
+            cells = np.ix_(rows, columns)
             for name in metrics:
-                found[name][at] = values[name].reshape(len(rows), -1)
-            failed[at] = outcome.failed.reshape(len(rows), -1)
-            horizon = np.array([each.motion.horizon for each in chosen])
-            lasted[at] = outcome.until.reshape(len(rows), -1) / horizon
-            done += len(rows) * len(there)
+                measured[name][cells] = values[name].reshape(len(rows), -1)
+            failed[cells] = outcome.failed.reshape(len(rows), -1)
+            horizon = np.array([case.motion.horizon for case in chosen])
+            lasted[cells] = outcome.until.reshape(len(rows), -1) / horizon
+            finished += len(rows) * len(columns)
             if progress is not None:
-                progress(done / failed.size)
+                progress(finished / failed.size)
     rests, lasted = np.array([case.rests for case in cases]), np.clip(lasted, 0.0, 1.0)
-    return Measured(found, failed, lasted, rests, wrist.tension_range)
+    return Measured(measured, failed, lasted, rests, wrist.tension_range)
 
 
 def _recorded(metrics: Sequence[str]) -> How:
-    """What the metrics need beyond sums."""
+    """Samples that the metrics need beyond sums."""
     if any(METRICS[name].of_totals is None and name not in AT_ONCE for name in metrics):
         return True
     return "briefly" if any(name in ("oscillation", "energy") for name in metrics) else False
@@ -146,14 +148,18 @@ def _alike(cases: Sequence[Case]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _pieces(rows: int, own: Sequence[int], like: Case, recorded: How) -> list[tuple[Sequence[int], Sequence[int]]]:
+def _pieces(rows: int, columns: Sequence[int], like: Case, recorded: How) -> list[tuple[Sequence[int], Sequence[int]]]:
     """Rows and cases that are run at once: all, or as many as can be kept in memory."""
     if not recorded:
-        return [(range(rows), own)]
+        return [(range(rows), columns)]
     most = at_most(like.loop, like.motion, recorded)
-    parts = [own[at : at + most] for at in range(0, len(own), most)]
-    each = max(1, min(most, rows * len(own)) // len(parts[0]))
-    return [(range(first, min(first + each, rows)), part) for part in parts for first in range(0, rows, each)]
+    parts = [columns[first : first + most] for first in range(0, len(columns), most)]
+    rows_at_once = max(1, min(most, rows * len(columns)) // len(parts[0]))
+    return [
+        (range(first, min(first + rows_at_once, rows)), part)
+        for part in parts
+        for first in range(0, rows, rows_at_once)
+    ]
 
 
 def at_most(loop: Loop, followed: Motion, recorded: How) -> int:
@@ -162,18 +168,18 @@ def at_most(loop: Loop, followed: Motion, recorded: How) -> int:
 
 
 def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> dict[str, Array]:
-    """Those of the metrics that are taken of the samples, `step` [s] apart, of many rollouts without a trajectory for
+    """Metrics that are taken of the samples, `step` [s] apart, of many rollouts without a trajectory for
     each; `which` are the references that they follow."""
-    found = dict[str, Array]()
+    values = dict[str, Array]()
     if "oscillation" in metrics:
-        found["oscillation"] = _oscillation(outcome, which, step)
+        values["oscillation"] = _oscillation(outcome, which, step)
     if "substeps" in metrics:
-        found["substeps"] = outcome.steps.astype(float)
+        values["substeps"] = outcome.steps.astype(float)
     if "drift" in metrics:
-        found["drift"] = outcome.drift
+        values["drift"] = outcome.drift
     if "energy" in metrics:
-        found["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
-    return found
+        values["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
+    return values
 
 
 def _measured(
@@ -181,18 +187,18 @@ def _measured(
 ) -> tuple[Outcome, dict[str, Array]]:
     """The metrics (rows * cases,) of a batch."""
     motions = list({id(case.motion): case.motion for case in cases}.values())
-    numbers = {id(each): number for number, each in enumerate(motions)}
+    numbers = {id(followed): number for number, followed in enumerate(motions)}
     rows, count = len(gains), len(cases)
     which = np.tile([numbers[id(case.motion)] for case in cases], rows)
     loops = [case.loop for case in cases] * rows
-    one = all(each is loops[0] for each in loops)
+    one = all(loop is loops[0] for loop in loops)
     outcome = rollout(
         law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics), converge=converge,
     )  # fmt: skip
-    found = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
-    slow = [name for name in metrics if name not in found and name not in AT_ONCE]
-    found |= at_once(metrics, outcome, which, float(motions[0].time[1]))
+    values = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
+    slow = [name for name in metrics if name not in values and name not in AT_ONCE]
+    values |= at_once(metrics, outcome, which, float(motions[0].time[1]))
     if slow:
         plants = [plant_of(wrist, case.loop.plant) for case in cases]
         courses = [
@@ -202,17 +208,17 @@ def _measured(
         for name in slow:
             value = METRICS[name].of_trajectory
             assert value is not None
-            found[name] = np.array([float(value(each)) for each in courses])
-    return outcome, found
+            values[name] = np.array([float(value(course)) for course in courses])
+    return outcome, values
 
 
 def _oscillation(outcome: Outcome, which: NDArray[np.int64], step: float) -> Array:
     """The metric of that name, without a trajectory for each."""
     theta = outcome.columns("theta")
-    found = np.empty(len(theta))
+    swings = np.empty(len(theta))
     with threadpool_limits(limits=1, user_api="blas"):
         for first in range(0, len(theta), _SPECTRA):
-            own = slice(first, first + _SPECTRA)
-            there, followed = np.unique(which[own], return_inverse=True)
-            found[own] = oscillations(theta[own], outcome.references[there, 0], followed, step)
-    return found
+            chunk = slice(first, first + _SPECTRA)
+            motions, followed = np.unique(which[chunk], return_inverse=True)
+            swings[chunk] = oscillations(theta[chunk], outcome.references[motions, 0], followed, step)
+    return swings

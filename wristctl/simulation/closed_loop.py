@@ -28,8 +28,8 @@ from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import Draws, is_random, loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
 
+# Rollouts that are recorded at once.
 _TOGETHER = 64
-"""Rollouts that are recorded at once."""
 _LENGTH = WristParameters().length
 
 
@@ -46,19 +46,19 @@ def repeat(
     start: Start | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Repeated]:
-    """Each of the rows, gains (count, g) with the motion `which` (count,), as often as asked for.
+    """Repeat loops: rows of gains (count, g) with the motion `which` (count,), as often as asked for.
 
     `scenarios` are the names of the motions' scenarios, which their noise goes by. Where nothing is drawn a repetition
     could not differ from another: such loops run once.
     """
     rows, times = len(gains), repetitions if is_random(loop) else 1
-    loops = loops_of(loop, [draws.plant(each) for each in range(times)])
-    each = max(1, _TOGETHER // rows)
+    loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
+    repetitions_at_once = max(1, _TOGETHER // rows)
     belief = Belief(loop.sensor, loop.actuator, wrist, loop.control_period)
     expected = expected_error(belief) if loop.sensor.level == "camera" else None
-    found: list[Gathered] = [Gathered() for _ in range(rows)]
-    for first in range(0, times, each):
-        now = range(first, min(first + each, times))
+    gathered: list[Gathered] = [Gathered() for _ in range(rows)]
+    for first in range(0, times, repetitions_at_once):
+        now = range(first, min(first + repetitions_at_once, times))
 
         def report(share: float, now: range = now) -> None:
             if progress is not None:
@@ -74,8 +74,8 @@ def repeat(
         for lane, k in enumerate(k for k in now for _ in range(rows)):
             plant = plant_of(wrist, loops[k].plant)
             row = lane % rows
-            found[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
-    return [each.repeated(wrist) for each in found]
+            gathered[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
+    return [row_results.repeated(wrist) for row_results in gathered]
 
 
 def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
@@ -85,10 +85,10 @@ def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
         return
     for lane in range(len(outcome.failed)):
         theta, wanted = outcome.column("theta", lane), outcome.column("torque_wanted", lane)
-        at = np.flatnonzero(np.isfinite(theta) & np.isnan(wanted))
-        if len(at):
-            what = f"{law.name} returned nan at {time[at[0]]:.4g} s, theta = {theta[at[0]]:.3g} rad"
-            raise UserError(what, origin.reference, "return a finite torque [N m] whatever it sees")
+        bad = np.flatnonzero(np.isfinite(theta) & np.isnan(wanted))
+        if len(bad):
+            problem = f"{law.name} returned nan at {time[bad[0]]:.4g} s, theta = {theta[bad[0]]:.3g} rad"
+            raise UserError(problem, origin.reference, "return a finite torque [N m] whatever it sees")
 
 
 def simulation(
@@ -143,7 +143,7 @@ def scenario_of(reference: Reference, direction: DirectionName) -> str:
 
 
 def equilibrium(loop: Loop) -> Start:
-    """Where a plant of this loop rests at pretension."""
+    """Equilibrium at which a plant of this loop rests at pretension."""
     model, n = PLANTS[loop.plant.model], loop.plant_segments
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
@@ -169,23 +169,23 @@ def simulate(
     start = equilibrium(loop) if chosen.start == "equilibrium" else None
     scenario = scenario_of(chosen.reference, chosen.direction)
     which = np.zeros(1, np.int64)
-    (done,) = repeat(
+    (repeated,) = repeat(
         law, gains, [followed], which, loop, wrist, [scenario], draws, chosen.repetitions, start, progress
     )  # fmt: skip
     name = chosen.gains if isinstance(chosen.gains, str) else "given"
-    return done.labelled(f"{law.name}/{name}")
+    return repeated.labelled(f"{law.name}/{name}")
 
 
+# Integration steps of one rollout: an hour and more.
 MOST_STEPS = 1e10
-"""Integration steps of one rollout: an hour and more."""
+# Integration steps of all rollouts: a month on one core.
 MOST_IN_ALL = 1e13
-"""Integration steps of all rollouts: a month on one core."""
+# Integration steps a second on a core, of four segments side by side.
 RATE = 3e6
-"""Integration steps a second on a core, of four segments side by side."""
+# Bytes for the courses that one rollout leaves, in memory and on their way to a file.
 MOST_BYTES = 4e9
-"""For the courses that one rollout leaves, in memory and on their way to a file."""
+# Numbers a sample has then: recorded, as a trajectory, and as columns of its table.
 _COLUMNS = 40
-"""Numbers a sample has then: recorded, as a trajectory, and as columns of its table."""
 
 
 class Size(NamedTuple):
@@ -198,8 +198,8 @@ class Size(NamedTuple):
     @property
     def steps(self) -> float:
         """Integration steps of all, where none needs a shorter step."""
-        each = [self.horizon / loop.control_period * loop.steps for loop in self.loops]
-        return self.rollouts * sum(each) / len(each)
+        steps = [self.horizon / loop.control_period * loop.steps for loop in self.loops]
+        return self.rollouts * sum(steps) / len(steps)
 
 
 def check_size(size: Size) -> None:
@@ -208,25 +208,25 @@ def check_size(size: Size) -> None:
     for loop in size.loops:
         steps = horizon / loop.control_period * loop.steps
         if steps > MOST_STEPS:
-            most, what = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"
+            most, problem = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"
             fix = f"at most {most:.3g} s with this control_period and substeps, or a longer control_period"
-            raise UserError(f"{what}, {_lasting(steps, 1)}, are more than {MOST_STEPS:g}", "horizon", fix)
+            raise UserError(f"{problem}, {_lasting(steps, 1)}, are more than {MOST_STEPS:g}", "horizon", fix)
         bytes_ = 8.0 * (_COLUMNS + loop.plant_segments) * horizon / sample_period(loop.control_period)
         if bytes_ > MOST_BYTES:
-            what = f"a course of {horizon:g} s needs {bytes_ / 1e9:.2g} GB, more than {MOST_BYTES / 1e9:g}"
-            raise UserError(what, "horizon", f"at most {horizon * MOST_BYTES / bytes_:.3g} s")
+            problem = f"a course of {horizon:g} s needs {bytes_ / 1e9:.2g} GB, more than {MOST_BYTES / 1e9:g}"
+            raise UserError(problem, "horizon", f"at most {horizon * MOST_BYTES / bytes_:.3g} s")
     check_steps(size.steps, size.rollouts)
 
 
 def check_steps(steps: float, rollouts: float) -> None:
     """UserError where so many steps of so many rollouts together are too many."""
     if steps > MOST_IN_ALL:
-        what = f"{steps:.2g} integration steps of {rollouts:.3g} rollouts, {_lasting(steps, cores())}"
+        demand = f"{steps:.2g} integration steps of {rollouts:.3g} rollouts, {_lasting(steps, cores())}"
         fix = f"at most {rollouts * MOST_IN_ALL / steps:.2g} such rollouts, fewer substeps, or a shorter horizon"
-        raise UserError(f"{what}, are more than {MOST_IN_ALL:g}", "", fix)
+        raise UserError(f"{demand}, are more than {MOST_IN_ALL:g}", "", fix)
 
 
 def _lasting(steps: float, many: int) -> str:
     hours = steps / (RATE * many * 3600.0)
-    told = f"{hours:.2g} hours" if hours < 48.0 else f"{hours / 24.0:.2g} days"
-    return f"some {told} on {many} core{'s' * (many > 1)}"
+    duration = f"{hours:.2g} hours" if hours < 48.0 else f"{hours / 24.0:.2g} days"
+    return f"some {duration} on {many} core{'s' * (many > 1)}"

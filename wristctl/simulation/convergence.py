@@ -20,29 +20,29 @@ from wristctl.config.loop import MOST_SUBSTEPS, Loop
 from wristctl.simulation.oscillation import FASTEST
 from wristctl.simulation.outcome import Outcome
 
+# Factors on the integration steps, tried in this order.
 FINER = (2, 4, 8, 16, 32, 64)
-"""How many times as many steps are tried, in this order."""
+# Share of itself, or angle [rad], within which an RMSE is right.
 RELATIVE, ABSOLUTE = 0.01, float(np.deg2rad(0.002))
-"""Share of itself, or angle [rad], within which an RMSE is right."""
+# Share of that by which it may still change when the step is halved.
 HALF = 0.5
-"""Share of that by which it may still change when the step is halved."""
+# Factor on that for the mean error at the end: of a wrist that swings there the horizon cuts off a part.
 AT_THE_END = 10.0
-"""How many times as much the mean error at the end may: of a wrist that swings there the horizon cuts off a part."""
+# Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
+# times as much where forces have kinks, which the estimate takes for errors.
 DOUBT, KINKS = 4.0, 8.0
-"""Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
-times as much where forces have kinks, which the estimate takes for errors."""
+# Frequency of tensions through their whole range and back, from which a loop with kinks is in doubt [1/s]; loops
+# without are where they chatter (FASTEST).
 SWINGS = 2.0
-"""How often tensions go through their whole range and back, from which a loop with kinks is in doubt [1/s]; loops
-without are where they chatter (FASTEST)."""
+# Factor by which the estimated errors of loops that swing count where a loop cannot run again.
 SWINGING = 4.0
-"""How many times as much the estimated errors of loops that swing count where a loop cannot run again."""
 
 Rollouts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
 def tolerance(angles: Array) -> Array:
-    """By how much angles [rad] may be off [rad]: 1 % of themselves, or 0.002 deg."""
+    """Permitted error [rad] of angles [rad]: 1 % of themselves, or 0.002 deg."""
     sizes: Array = np.fmax(RELATIVE * np.abs(angles), ABSOLUTE)
     return sizes
 
@@ -67,7 +67,7 @@ def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
 
 
 def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
-    """Of rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
+    """Judge rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
 
     Where tensions swing the estimate may be as small as a third of what else puts a loop in doubt and the loop be off;
     a quarter is the limit there. The steps are twice as many times as the sum of errors is too large, and more where
@@ -82,20 +82,20 @@ def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
     return doubtful, np.where(doubtful, steps, outcome.steps)
 
 
-def agree(one: Outcome, other: Outcome) -> Mask:
+def agree(one: Outcome, finer: Outcome) -> Mask:
     """Rollouts that tell the same in both, (count,): RMSE and error at the end, and whether and when they failed."""
-    same: Mask = (one.failed == other.failed) & (np.abs(one.until - other.until) <= RELATIVE * other.until)
+    same: Mask = (one.failed == finer.failed) & (np.abs(one.until - finer.until) <= RELATIVE * finer.until)
     for name, share in (("rmse", HALF), ("steady_state", HALF * AT_THE_END)):
-        coarse, fine = one.metrics[name], other.metrics[name]
+        coarse, fine = one.metrics[name], finer.metrics[name]
         same &= (np.abs(coarse - fine) <= share * tolerance(fine)) | (np.isnan(coarse) & np.isnan(fine))
     return same
 
 
-def _difference(one: Outcome, other: Outcome) -> Array:
+def _difference(one: Outcome, finer: Outcome) -> Array:
     """Greater difference of RMSE and of error at the end, (count,) [rad]; inf where only one has them."""
-    apart = [np.abs(one.metrics[name] - other.metrics[name]) for name in ("rmse", "steady_state")]
-    found: Array = np.nan_to_num(np.maximum(*apart), nan=np.inf)
-    return found
+    apart = [np.abs(one.metrics[name] - finer.metrics[name]) for name in ("rmse", "steady_state")]
+    largest: Array = np.nan_to_num(np.maximum(*apart), nan=np.inf)
+    return largest
 
 
 def has_kinks(loop: Loop) -> bool:
@@ -120,10 +120,10 @@ def settled(
     step tells something else.
     """
     doubtful = in_doubt(outcome, kinked)
-    given, left = np.flatnonzero(doubtful & by_hand), np.flatnonzero(doubtful & ~by_hand)
-    if len(given):
-        before, fine = outcome.rows(given), run(given, 2)
-        outcome.drift[given] = np.where(agree(before, fine), 0.0, _difference(before, fine))
+    fixed, left = np.flatnonzero(doubtful & by_hand), np.flatnonzero(doubtful & ~by_hand)
+    if len(fixed):
+        before, fine = outcome.rows(fixed), run(fixed, 2)
+        outcome.drift[fixed] = np.where(agree(before, fine), 0.0, _difference(before, fine))
     before, earlier = outcome.rows(left), outcome.rows(left)
     stayed, chaotic = np.zeros(len(left), bool), kinked[left] & _swinging(before, kinked[left])
     for times in FINER:
@@ -138,7 +138,7 @@ def settled(
         fine.drift[given_up] = np.maximum(_difference(before, fine), _difference(earlier, fine))[given_up]
         for over, result in ((given_up, fine), (same & stayed, earlier)):
             outcome = outcome.replaced(left[over], result.rows(np.flatnonzero(over)))
-        rest = np.flatnonzero(~given_up & ~(same & stayed))
-        left, stayed, chaotic = left[rest], same[rest], chaotic[rest]
-        earlier, before = before.rows(rest), fine.rows(rest)
+        remaining = np.flatnonzero(~given_up & ~(same & stayed))
+        left, stayed, chaotic = left[remaining], same[remaining], chaotic[remaining]
+        earlier, before = before.rows(remaining), fine.rows(remaining)
     return outcome

@@ -23,7 +23,7 @@ _MODERN = "22 tasks of today, J. Hand Surg. 2022"
 
 
 def _task(
-    name: str, plane: Literal["ulnar", "flexion"], low_deg: float, high_deg: float, what: str, source: str
+    name: str, plane: Literal["ulnar", "flexion"], low_deg: float, high_deg: float, activity: str, source: str
 ) -> ReferenceKind:
     """A task that takes the wrist from `low_deg` to `high_deg` in a plane; an end at 0 is where it starts."""
     ends = [end for end in (high_deg, low_deg) if end != 0.0]
@@ -33,16 +33,16 @@ def _task(
         strokes = time / reference.duration
         number = np.floor(strokes + 1e-12).astype(np.int64)
         before = np.resize(angles[:-1], number.max(initial=0) + 2)
-        found = np.empty((3, len(time)))
-        smooth_stroke(np.maximum(strokes - number, 0.0), reference.duration, found)
-        found *= np.diff(before)[number]
-        found[0] += before[number]
-        return found
+        rows = np.empty((3, len(time)))
+        smooth_stroke(np.maximum(strokes - number, 0.0), reference.duration, rows)
+        rows *= np.diff(before)[number]
+        rows[0] += before[number]
+        return rows
 
     signs = ("extension", "flexion") if plane == "flexion" else ("radial", "ulnar")
-    told = " to ".join(f"{abs(end):g} deg {signs[end > 0.0]}" for end in (low_deg, high_deg) if end != 0.0)
+    stations = " to ".join(f"{abs(end):g} deg {signs[end > 0.0]}" for end in (low_deg, high_deg) if end != 0.0)
     return ReferenceKind(
-        f"{what}: {told} ({source})",
+        f"{activity}: {stations} ({source})",
         course=course,
         described=lambda reference: f"adl:{name} {reference.duration:g} s strokes" + _scaled(reference),
         targets="none",

@@ -14,8 +14,8 @@ from wristctl.config.choices import Choices
 from wristctl.config.plant import Disturbances
 from wristctl.config.section import Parameter
 
+# From the settings and times (T,) [s] to what is so then, (T,).
 Of = Callable[[Disturbances, Array], Array]
-"""From the settings and times (T,) [s] to what is so then, (T,)."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Disturbance:
     force: Of | None = None
     """On the last disc, across the straight wrist [N]."""
     scale: Of | None = None
-    """Of the stiffness, over the plant's own."""
+    """Stiffness over that of the plant."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
 
 
@@ -39,13 +39,13 @@ DISTURBANCES: Choices[Disturbance] = _TABLE
 
 def acting(settings: Disturbances, time: Array) -> Array | None:
     """Tip force across the straight wrist [N] and stiffness over the plant's own, (T, 2); None if nothing acts."""
-    chosen = [each for each in DISTURBANCES.values() if each.acts(settings)]
+    chosen = [disturbance for disturbance in DISTURBANCES.values() if disturbance.acts(settings)]
     if not chosen:
         return None
     force, scale = np.zeros(len(time)), np.ones(len(time))
-    for each in chosen:
-        force = force if each.force is None else force + each.force(settings, time)
-        scale = scale if each.scale is None else scale * each.scale(settings, time)
+    for disturbance in chosen:
+        force = force if disturbance.force is None else force + disturbance.force(settings, time)
+        scale = scale if disturbance.scale is None else scale * disturbance.scale(settings, time)
     return np.stack([force, scale], axis=1)
 
 

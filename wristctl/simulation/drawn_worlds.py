@@ -26,8 +26,14 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
     """The names of the streams that its worlds are drawn from."""
     numbers = range(len(family.references))
     leaves = [_leaf(split, name, key) for key in family.draw if not key.startswith("reference.")]
-    motions = [_leaf(split, name, key, at) for key in family.draw if key.startswith("reference.") for at in numbers]
-    return [*leaves, *motions, *(_camera(split, name, at) for at in numbers if family.loop.sensor.level == "camera")]
+    motions = [
+        _leaf(split, name, key, number) for key in family.draw if key.startswith("reference.") for number in numbers
+    ]
+    return [
+        *leaves,
+        *motions,
+        *(_camera(split, name, number) for number in numbers if family.loop.sensor.level == "camera"),
+    ]
 
 
 def drawn_cases(

@@ -21,20 +21,20 @@ def _about(reference: Reference, swing: Array) -> Array:
 
 def _held(swing: Array) -> Array:
     """A swing (T,) that jumps, with two derivatives."""
-    found = np.zeros((3, len(swing)))
-    found[0] = swing
-    return found
+    course = np.zeros((3, len(swing)))
+    course[0] = swing
+    return course
 
 
 def _turning(phase: Array, rate: Array | float, acceleration: Array | float) -> Array:
     """The sine of a phase that moves, with two derivatives."""
-    found, cosine = np.empty((3, len(phase))), np.cos(phase)
-    np.sin(phase, out=found[0])
-    np.multiply(rate, cosine, out=found[1])
-    np.multiply(-rate * rate, found[0], out=found[2])
+    course, cosine = np.empty((3, len(phase))), np.cos(phase)
+    np.sin(phase, out=course[0])
+    np.multiply(rate, cosine, out=course[1])
+    np.multiply(-rate * rate, course[0], out=course[2])
     cosine *= acceleration
-    found[2] += cosine
-    return found
+    course[2] += cosine
+    return course
 
 
 def _two_sided(reference: Reference, time: Array) -> Array:
@@ -44,7 +44,7 @@ def _two_sided(reference: Reference, time: Array) -> Array:
 
 
 def _chirp(reference: Reference, time: Array) -> Array:
-    low, high = (2.0 * np.pi * each for each in (reference.frequency, _end_frequency(reference)))
+    low, high = (2.0 * np.pi * frequency for frequency in (reference.frequency, _end_frequency(reference)))
     ramp, within = (high - low) / reference.duration, np.minimum(time, reference.duration)
     rate = low + ramp * within
     phase = 0.5 * (low + rate) * within + high * (time - within)

@@ -20,17 +20,17 @@ from wristctl.simulation.drawn_worlds import world_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
 
+# As a unit of work names it.
 GOLDEN = "wristctl.simulation.golden:golden"
-"""As a unit of work names it."""
 _TICKS, _LANES, _DRAWN = 40, 16, 40
 
 
 def golden_spec(laws: Iterable[str], loops: Iterable[Loop], wrist: WristParameters) -> dict[str, Any]:
-    """What `golden` runs: one loop of each structure with the first law, and the first loop with each law."""
-    kinds = {structure(each): each for each in loops}
+    """Runs of `golden`: one loop of each structure with the first law, and the first loop with each law."""
+    kinds = {structure(loop): loop for loop in loops}
     return {
         "laws": list(laws),
-        "loops": [json.loads(each.model_dump_json(by_alias=True)) for each in kinds.values()],
+        "loops": [json.loads(loop.model_dump_json(by_alias=True)) for loop in kinds.values()],
         "wrist": json.loads(wrist.model_dump_json(by_alias=True)),
     }
 
@@ -38,15 +38,15 @@ def golden_spec(laws: Iterable[str], loops: Iterable[Loop], wrist: WristParamete
 def kinds_of_worlds(families: Mapping[str, Family], names: Iterable[str], seed: int) -> list[Loop]:
     """A world of every kind that the first of each family are."""
     drawn = [world_of(families[name], name, "test", seed, number) for name in names for number in range(_DRAWN)]
-    return list({structure(each): each for each in drawn}.values())
+    return list({structure(loop): loop for loop in drawn}.values())
 
 
 def golden(spec: Mapping[str, Any]) -> str:
     """SHA-256 of the metrics of these rollouts."""
     wrist = WristParameters.model_validate_json(json.dumps(spec["wrist"]))
-    loops = [Loop.model_validate_json(json.dumps(each)) for each in spec["loops"]]
-    digest, laws = hashlib.sha256(), [controller(each) for each in spec["laws"]]
-    for law, loop in [*((laws[0], each) for each in loops), *((each, loops[0]) for each in laws[1:])]:
+    loops = [Loop.model_validate_json(json.dumps(spec_loop)) for spec_loop in spec["loops"]]
+    digest, laws = hashlib.sha256(), [controller(name) for name in spec["laws"]]
+    for law, loop in [*((laws[0], case) for case in loops), *((case, loops[0]) for case in laws[1:])]:
         digest.update(_numbers(law, loop, wrist).tobytes())
     return digest.hexdigest()
 

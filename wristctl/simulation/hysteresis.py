@@ -19,14 +19,14 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.simulation.convergence import ABSOLUTE, FINER, RELATIVE
 from wristctl.simulation.spool_driven import FrictionCase, Spooled, Strokes, spooled
 
+# Time for which a wrist is held at the end of a ramp [s].
 _HOLD = 1.5
-"""How long a wrist is held at the end of a ramp [s]."""
+# Path, over presliding, after which a bristle is bent fully: to exp(-5).
 _FULLY = 5.0
-"""Path, over presliding, after which a bristle is bent fully: to exp(-5)."""
+# Share of the raw loop's area below which a work is compared with that share.
 _LEAST_WORK = 0.01
-"""Share of the raw loop's area below which a work is compared with that share."""
+# Width [rad] below which an angle is compared with that.
 _LEAST_WIDTH = ABSOLUTE / RELATIVE
-"""Width [rad] below which an angle is compared with that."""
 
 
 class LoopCase(NamedTuple):
@@ -48,7 +48,7 @@ class HysteresisLoop:
     unhindered: Array
     """Angle of a wrist at rest without friction on these spools, (T,) [rad]."""
     course: Spooled
-    """What the wrist did, (T,) each."""
+    """Courses of the wrist, (T,) each."""
     exact_width: float
     """Dead band in the middle of the range, by the statics [rad]."""
     step: float
@@ -58,13 +58,13 @@ class HysteresisLoop:
 
     @property
     def width(self) -> float:
-        """By how much more it is bent on its way back than on its way there, in the middle of the range [rad]."""
+        """Bend on the way back less that on the way out, in the middle of the range [rad]."""
         quarter = (len(self.time) - 1) // 4
         return float(self.course.theta[quarter] - self.course.theta[3 * quarter])
 
     @property
     def friction_work(self) -> float:
-        """What friction took [J]."""
+        """Energy that friction took [J]."""
         return _gained(self.course.friction)
 
     @property
@@ -74,7 +74,7 @@ class HysteresisLoop:
 
     @property
     def damped_work(self) -> float:
-        """What the wrist's damping took [J]."""
+        """Energy that the wrist's damping took [J]."""
         return _gained(self.course.damped)
 
     def change(self, coarse: HysteresisLoop) -> float:
@@ -92,16 +92,16 @@ def _gained(work: Array) -> float:
 
 def _largest(changes: Sequence[float]) -> float:
     """The largest; what is no number has changed beyond all."""
-    return max(each if math.isfinite(each) else math.inf for each in changes)
+    return max(change if math.isfinite(change) else math.inf for change in changes)
 
 
 @dataclass(frozen=True)
 class DeadBand:
-    """Where held spools leave a wrist that comes from below and from above [rad]."""
+    """Angles at which held spools leave a wrist that comes from below and from above [rad]."""
 
     tendons: FrictionCase
     unhindered: float
-    """Where they would without friction."""
+    """Angle at which they would leave it without friction."""
     exact_below: float
     """By the statics."""
     exact_above: float
@@ -135,32 +135,35 @@ Found = TypeVar("Found", HysteresisLoop, DeadBand)
 
 
 def _converged(run: Callable[[NDArray[np.int64], int], list[Found]], count: int, steps: int) -> list[Found]:
-    """What `run` finds of `count` wrists, each with as many integration steps as it takes.
+    """Results of `run` for `count` wrists, each with as many integration steps as it takes.
 
     `run` drives some of them with so many steps in an interval of its own, `steps` or a multiple. The first number of
     steps whose result is within 1 % (or 0.002 deg) of that with half of them is taken.
     """
     left, coarse = np.arange(count), max(1, steps // 2)
-    found, before = run(left, coarse), dict[int, Found]()
+    results, before = run(left, coarse), dict[int, Found]()
     for times in (1, *FINER):
         if times * steps == coarse:
             continue
-        before |= zip(left.tolist(), (found[at] for at in left), strict=True)
-        for at, fine in zip(left.tolist(), run(left, times * steps), strict=True):
-            found[at] = fine
-        left = np.array([at for at in left.tolist() if found[at].change(before[at]) > RELATIVE], np.int64)
+        before |= zip(left.tolist(), (results[index] for index in left), strict=True)
+        for index, fine in zip(left.tolist(), run(left, times * steps), strict=True):
+            results[index] = fine
+        left = np.array([index for index in left.tolist() if results[index].change(before[index]) > RELATIVE], np.int64)
         if not len(left):
             break
-    for at in left.tolist():
-        found[at] = replace(found[at], drift=found[at].change(before[at]))
-    return found
+    for index in left.tolist():
+        results[index] = replace(results[index], drift=results[index].change(before[index]))
+    return results
 
 
 def friction_cases(settings: HysteresisSettings) -> list[FrictionCase]:
     """Every combination; without a coefficient there is one, since neither sheath nor presliding does anything."""
     every = itertools.product(settings.frictions, settings.sheaths, settings.preslidings)
     none = 0.0, settings.preslidings[0]
-    cases = [FrictionCase(friction, *(rest if friction > 0.0 else none)) for friction, *rest in every]
+    cases = [
+        FrictionCase(friction, *(sheath_and_presliding if friction > 0.0 else none))
+        for friction, *sheath_and_presliding in every
+    ]
     return list(dict.fromkeys(cases))
 
 
@@ -177,7 +180,7 @@ def with_sheaths(settings: HysteresisSettings) -> list[FrictionCase]:
 
 def with_preslidings(settings: HysteresisSettings) -> list[FrictionCase]:
     """Every presliding, shortest first, of the main one."""
-    return [main_case(settings)._replace(presliding=each) for each in sorted(settings.preslidings)]
+    return [main_case(settings)._replace(presliding=presliding) for presliding in sorted(settings.preslidings)]
 
 
 def loop_cases(settings: HysteresisSettings) -> list[LoopCase]:
@@ -187,25 +190,25 @@ def loop_cases(settings: HysteresisSettings) -> list[LoopCase]:
     return [LoopCase(tendons, frequency, *ends) for ends, tendons, frequency in every]
 
 
-def loops(own: Strokes, progress: Callable[[float], None] = lambda share: None) -> list[HysteresisLoop]:
+def loops(held: Strokes, progress: Callable[[float], None] = lambda share: None) -> list[HysteresisLoop]:
     """Every loop of the settings; `progress` is called with the share that is done."""
-    settings, cases = own.settings, loop_cases(own.settings)
-    share = {each: 1.0 / each / sum(1.0 / other for other in settings.frequencies) for each in settings.frequencies}
-    found: dict[LoopCase, HysteresisLoop] = {}
-    done = 0.0
+    settings, cases = held.settings, loop_cases(held.settings)
+    share = {speed: 1.0 / speed / sum(1.0 / f for f in settings.frequencies) for speed in settings.frequencies}
+    driven: dict[LoopCase, HysteresisLoop] = {}
+    finished = 0.0
     for frequency in settings.frequencies:
-        found |= _driven(own, frequency, [each for each in cases if each.frequency == frequency])
-        done += share[frequency]
-        progress(done)
-    return [found[each] for each in cases]
+        driven |= _driven(held, frequency, [case for case in cases if case.frequency == frequency])
+        finished += share[frequency]
+        progress(finished)
+    return [driven[case] for case in cases]
 
 
-def _driven(own: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[LoopCase, HysteresisLoop]:
+def _driven(held: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[LoopCase, HysteresisLoop]:
     """The loops of one speed."""
-    settings = own.settings
-    low, high = np.array([(each.low, each.high) for each in cases]).T
-    ends = own.exact([each.tendons for each in cases], 0.5 * (low + high))
-    wrists = [own.lane(each.tendons, each.low) for each in cases]
+    settings = held.settings
+    low, high = np.array([(case.low, case.high) for case in cases]).T
+    ends = held.exact([case.tendons for case in cases], 0.5 * (low + high))
+    wrists = [held.lane(case.tendons, case.low) for case in cases]
     cycle = np.arange(settings.samples // 2, 3 * settings.samples // 2 + 1)
     swing = _swing(cycle / settings.samples, settings.shape)
 
@@ -214,20 +217,21 @@ def _driven(own: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[L
         first, rises = low[which], (high - low)[which]
 
         def told(time: Array, lanes: NDArray[np.int64]) -> Array:
-            return own.told(first[lanes] + rises[lanes] * _swing(frequency * time, settings.shape)[:, None])
+            return held.told(first[lanes] + rises[lanes] * _swing(frequency * time, settings.shape)[:, None])
 
-        done = spooled([wrists[at] for at in which], told, 3 * settings.samples * every // 2 + 1, h, every)
+        courses = spooled([wrists[index] for index in which], told, 3 * settings.samples * every // 2 + 1, h, every)
         time = h * every * np.arange(0.0, settings.samples + 1)
         return [
             HysteresisLoop(
-                cases[at], time, low[at] + (high - low)[at] * swing, Spooled(*(each[lane, cycle] for each in done)),
-                float(ends[at, 1] - ends[at, 0]), h,
+                cases[index], time, low[index] + (high - low)[index] * swing,
+                Spooled(*(column[lane, cycle] for column in courses)),
+                float(ends[index, 1] - ends[index, 0]), h,
             )
-            for lane, at in enumerate(which.tolist())
+            for lane, index in enumerate(which.tolist())
         ]  # fmt: skip
 
     every = math.ceil(1.0 / (frequency * settings.step * settings.samples) * (1.0 - 1e-9))
-    return {each.case: each for each in _converged(run, len(cases), every)}
+    return {loop.case: loop for loop in _converged(run, len(cases), every)}
 
 
 def _swing(phase: Array, shape: str) -> Array:
@@ -237,14 +241,14 @@ def _swing(phase: Array, shape: str) -> Array:
     return 1.0 - np.abs(1.0 - 2.0 * (phase % 1.0))
 
 
-def dead_bands(own: Strokes) -> list[DeadBand]:
+def dead_bands(held: Strokes) -> list[DeadBand]:
     """At every angle of the settings, of every friction: where held spools leave a wrist, approached by ramps."""
-    settings = own.settings
+    settings = held.settings
     every = [(case, math.radians(angle)) for case in friction_cases(settings) for angle in settings.angles_deg]
     if not every:
         return []
     angle, ends = np.array([angle for _, angle in every]), np.radians(settings.ranges_deg[0])
-    exact = own.exact([tendons for tendons, _ in every], angle)
+    exact = held.exact([tendons for tendons, _ in every], angle)
     lasts = settings.ramp + _HOLD
 
     def run(which: NDArray[np.int64], steps: int) -> list[DeadBand]:
@@ -252,19 +256,19 @@ def dead_bands(own: Strokes) -> list[DeadBand]:
 
         def told(time: Array, lanes: NDArray[np.int64]) -> Array:
             s = np.minimum(time / settings.ramp, 1.0)[:, None]
-            return own.told(begin[lanes] + (goal - begin)[lanes] * s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+            return held.told(begin[lanes] + (goal - begin)[lanes] * s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
-        wrists = [own.lane(every[at][0], float(end)) for end in ends for at in which]
-        done = spooled(wrists, told, steps + 1, lasts / steps, steps)
-        path = own.wrist.tendon_offset * np.abs(done.theta[:, -1] - begin).reshape(2, -1).min(axis=0)
-        slid = path > _FULLY * np.array([every[at][0].presliding for at in which])
-        below, above = done.theta[:, -1].reshape(2, -1).tolist()
+        wrists = [held.lane(every[index][0], float(end)) for end in ends for index in which]
+        courses = spooled(wrists, told, steps + 1, lasts / steps, steps)
+        path = held.wrist.tendon_offset * np.abs(courses.theta[:, -1] - begin).reshape(2, -1).min(axis=0)
+        slid = path > _FULLY * np.array([every[index][0].presliding for index in which])
+        below, above = courses.theta[:, -1].reshape(2, -1).tolist()
         return [
             DeadBand(
-                every[at][0], every[at][1], float(exact[at, 0]), float(exact[at, 1]),
+                every[index][0], every[index][1], float(exact[index, 0]), float(exact[index, 1]),
                 below[k], above[k], bool(slid[k]), lasts / steps,
             )
-            for k, at in enumerate(which.tolist())
+            for k, index in enumerate(which.tolist())
         ]  # fmt: skip
 
     return _converged(run, len(every), max(2, round(lasts / settings.step)))

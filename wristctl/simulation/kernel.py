@@ -20,15 +20,15 @@ from wristctl.wrist.segments import load_segments
 from wristctl.wrist.tendon_mechanics import pulls_at_start, tendons_in_lanes
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
+# Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
+# angle that the law sees, and the load that its observer estimates. theta is nan where the lane has failed.
 RECORDED = (
     "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
     "load",
 )  # fmt: skip
-"""Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
-angle that the law sees, and the load that its observer estimates. theta is nan where the lane has failed."""
 
+# Columns that are recorded where no more are asked for.
 BRIEFLY = RECORDED[:4]
-"""Those of them that are recorded where no more are asked for."""
 _ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
 _COLUMNS, _BRIEFLY = len(RECORDED), len(BRIEFLY)
 _SIDE = float(TENDONS_PER_SIDE)
@@ -36,7 +36,7 @@ _NAN = float("nan")
 
 
 class Setup(NamedTuple):
-    """What is the same for all lanes. `coordinates` has an entry for each of the plant's, whose values mean nothing.
+    """Values that all lanes share. `coordinates` has an entry for each of the plant's, whose values mean nothing.
 
     The law looks `preview` periods ahead.
     """
@@ -61,7 +61,7 @@ class Disturbed(NamedTuple):
 
 
 class LoopCourse(NamedTuple):
-    """What happens over time, on the sample grid.
+    """Course of references and disturbances over time, on the sample grid.
 
     `references` [motion, (angle, rate, acceleration), sample], continued between samples by its own derivatives;
     `acting` is Disturbed or Undisturbed.
@@ -89,7 +89,7 @@ class LoopValues(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """What goes on, by block first: a long run may be done in pieces.
+    """State of the rollouts, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates,
     `tendons` one of `wristctl.wrist.tendon_mechanics.Tendons` as they are, with their state.
@@ -201,7 +201,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
 
 @compiled
 def gather_lanes(tables: Any, which: Any, sample: int, out: Any) -> None:
-    """Each lane's own values of one sample, from tables [case, value, sample] into [value, lane]."""
+    """Gather every lane's values of one sample, from tables [case, value, sample] into [value, lane]."""
     for value in range(out.shape[0]):
         for lane in range(len(which)):
             out[value, lane] = tables[which[lane], value, sample]

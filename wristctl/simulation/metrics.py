@@ -26,17 +26,17 @@ def energy(torque: Array, rate: Array, step: float) -> Any:
 
 
 def course_energy(course: Trajectory) -> float:
-    """The same of one course."""
+    """Energy of one course, as `energy` takes it of many."""
     return float(energy(course.torque, course.rate, float(course.time[1] - course.time[0])))
 
 
 _ANGLE = float(np.deg2rad(0.01))
+# Move [rad] below which there is nothing to settle on.
 _LEAST_MOVE = 1e-9
-"""Move [rad] below which there is nothing to settle on."""
 
 
 class Totals(NamedTuple):
-    """What was summed up over rollouts: `sums` by the names of SUMS, `goals` by those of Goals, each (count,)."""
+    """Sums over rollouts: `sums` by the names of SUMS, `goals` by those of Goals, each (count,)."""
 
     sums: Mapping[str, Array]
     goals: Mapping[str, Array]
@@ -57,7 +57,7 @@ class Metric:
     of_error: bool = True
     """Whether it is of the error, and so means nothing where the wrist has diverged."""
     never: Callable[[float], float] | None = None
-    """What `never` (nan) counts in tuning, by the horizon [s]; None: such gains have failed."""
+    """Value of `never` (nan) in tuning, by the horizon [s]; None: such gains have failed."""
     floor: float = 1e-3
     """In tuning, below which a difference is of no interest; in its unit."""
 
@@ -68,13 +68,13 @@ METRICS: Choices[Metric] = _TABLE
 def summary(totals: Totals) -> dict[str, Array]:
     """The metrics that come from sums, each (count,); of the error nan where the wrist has diverged."""
     alive = totals.sums["alive"] > 0.0
-    found = {}
+    values = {}
     with np.errstate(divide="ignore", invalid="ignore"):
         for name, metric in summed().items():
             assert metric.of_totals is not None
             value = metric.of_totals(totals)
-            found[name] = np.where(alive, value, np.nan) if metric.of_error else value
-    return found
+            values[name] = np.where(alive, value, np.nan) if metric.of_error else value
+    return values
 
 
 def summed() -> dict[str, Metric]:
@@ -125,8 +125,8 @@ def _rmse_move(of: Totals) -> Array:
 def _rmse_settled(of: Totals) -> Array:
     sums = of.sums
     after = np.round(sums["ticks"] - sums["exit_2"] / of.period) - 1.0
-    rest = np.sqrt((sums["squared"] - sums["squared_exit"]).clip(0.0) / after)
-    return np.where(_settled(of, "exit_2"), rest, np.nan)
+    rest_rms = np.sqrt((sums["squared"] - sums["squared_exit"]).clip(0.0) / after)
+    return np.where(_settled(of, "exit_2"), rest_rms, np.nan)
 
 
 def _settling(of: Totals) -> Array:

@@ -1,4 +1,4 @@
-"""What a wrist follows: angles with two derivatives over time, worked out where they are asked for."""
+"""Motions that a wrist follows: angles with two derivatives over time, worked out where they are asked for."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class Angles:
 
     @classmethod
     def of(cls, rows: Array) -> Angles:
-        """Those that are known, (3, T), which nobody may change from now on."""
-        found = cls(rows.shape[1], lambda out: None)
-        found.rows = _fixed(rows)
-        return found
+        """Angles of known rows, (3, T), which nobody may change from now on."""
+        angles = cls(rows.shape[1], lambda out: None)
+        angles.rows = _fixed(rows)
+        return angles
 
     @cached_property
     def rows(self) -> Array:
         """The three rows, which are kept, read-only."""
-        found = np.empty((3, self._samples))
-        self._work(found)
-        return _fixed(found)
+        rows = np.empty((3, self._samples))
+        self._work(rows)
+        return _fixed(rows)
 
     def into(self, out: Array) -> None:
         """Write the rows into `out` (3, T); unless they are known already, they are not kept."""
@@ -41,7 +41,7 @@ class Angles:
 
 
 class Goals(NamedTuple):
-    """What metrics need of a reference: simulated loops, recorded trials and tests are all judged by it."""
+    """Facts of a reference that metrics need: simulated loops, recorded trials and tests are all judged by it."""
 
     final: float
     """Last reference angle [rad]."""
@@ -74,31 +74,31 @@ class Motion:
     outside: float = 0.0
     """Share of samples whose tip position lies outside the domain that the network was trained on."""
     wanted: Angles | None = None
-    """What is truly wanted, where a network only approximates it."""
+    """Angles that are truly wanted, where a network only approximates them."""
 
     @property
     def theta_ref(self) -> Array:
         """The reference angle, (T,) [rad]."""
-        found: Array = self.angles.rows[0]
-        return found
+        theta: Array = self.angles.rows[0]
+        return theta
 
     @property
     def rate_ref(self) -> Array:
-        """Its rate, (T,) [rad/s]."""
-        found: Array = self.angles.rows[1]
-        return found
+        """Rate of the reference, (T,) [rad/s]."""
+        rate: Array = self.angles.rows[1]
+        return rate
 
     @property
     def acceleration_ref(self) -> Array:
-        """Its acceleration, (T,) [rad/s^2]."""
-        found: Array = self.angles.rows[2]
-        return found
+        """Acceleration of the reference, (T,) [rad/s^2]."""
+        acceleration: Array = self.angles.rows[2]
+        return acceleration
 
     @property
     def theta_desired(self) -> Array:
         """The true wanted angle, (T,) [rad], which a network only approximates."""
-        found: Array = (self.wanted or self.angles).rows[0]
-        return found
+        theta: Array = (self.wanted or self.angles).rows[0]
+        return theta
 
     @cached_property
     def tip_desired(self) -> Array:
@@ -112,11 +112,11 @@ class Motion:
 
     @property
     def goals(self) -> Goals:
-        """What metrics need of it."""
+        """Facts of the motion that metrics need."""
         return self.goals_at(self.final)
 
     def goals_at(self, final: float) -> Goals:
-        """What metrics need of it, by its last angle [rad], where that is known already."""
+        """Facts of the motion that metrics need, by its last angle [rad], where that is known already."""
         return Goals(final, final if self.turn is None else self.turn, self.begin, self.rest, self.horizon)
 
 

@@ -1,4 +1,4 @@
-"""What ideal tendons and springs leave out, from a study's leaves: values, states, and spools that slip."""
+"""Effects that ideal tendons and springs leave out, from a study's leaves: values, states, and spools that slip."""
 
 import math
 from typing import Any
@@ -28,10 +28,10 @@ from wristctl.wrist.tendon_mechanics import (
 )
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Electrical, of a two-phase motor.
 _FULL_STEPS_PER_TURN = 4
-"""Electrical, of a two-phase motor."""
+# Share of a side's tendons that is left where one of them breaks.
 _ONE_OF_A_SIDE_LESS = 1.0 - 1.0 / TENDONS_PER_SIDE
-"""Share of a side's tendons that is left where one of them breaks."""
 
 
 def electrical_turn(actuator: Actuator) -> float:
@@ -64,16 +64,16 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
     )
 
 
-def is_ideal(own: Nonideal) -> bool:
+def is_ideal(nonideal: Nonideal) -> bool:
     """Whether these values change nothing."""
-    shares = own.friction, own.tendon_creep, own.spring_creep, own.backlash
-    times = own.stop, own.broken_at, own.slips_at, own.torque
+    shares = nonideal.friction, nonideal.tendon_creep, nonideal.spring_creep, nonideal.backlash
+    times = nonideal.stop, nonideal.broken_at, nonideal.slips_at, nonideal.torque
     return not any(shares) and not any(map(math.isfinite, times))
 
 
-def wears(own: Nonideal) -> bool:
+def wears(nonideal: Nonideal) -> bool:
     """Whether tendons may have reeled in something else than their spools."""
-    return own.backlash > 0.0 or any(map(math.isfinite, (own.broken_at, own.slips_at, own.torque)))
+    return nonideal.backlash > 0.0 or any(map(math.isfinite, (nonideal.broken_at, nonideal.slips_at, nonideal.torque)))
 
 
 def _time(time: float | None) -> float:
@@ -95,8 +95,8 @@ def unmoved(reeled: Array, path: Array, crept: Array, q: Array) -> Array:
 
 def of_tendons(state: Array, count: int) -> Array:
     """A view of a state's rows of so many tendons, (count, rows of each)."""
-    own: Array = state[PATH : PATH + len(OF_A_TENDON) * count].reshape(count, -1)
-    return own
+    values: Array = state[PATH : PATH + len(OF_A_TENDON) * count].reshape(count, -1)
+    return values
 
 
 @compiled

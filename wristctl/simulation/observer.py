@@ -96,7 +96,7 @@ def sample(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angl
     frames, lanes = schedule.captures.shape
     readings, pictures = watch.readings.reshape(frames, 2, lanes), watch.pictures.reshape(frames, lanes)
     rows, arriving = rows_of(watch.arriving), watch.arriving.reshape(3, lanes)
-    at = watch.observer.at.reshape(lanes)
+    newest = watch.observer.at.reshape(lanes)
     rows[1] = angle
     begin, first, last = tick, tick, -1
     for lane in range(lanes):
@@ -108,7 +108,7 @@ def sample(watch: Any, schedule: Any, drive: Any, believed: Any, tick: int, angl
         arriving[0, lane] = -1.0
         if arrived < taken and schedule.captures[arrived, lane] + schedule.late[lane] == tick:
             captured = max(tick - schedule.believed[lane], 0)
-            begin, first, last = min(begin, int(at[lane])), min(first, captured), max(last, captured)
+            begin, first, last = min(begin, int(newest[lane])), min(first, captured), max(last, captured)
             arriving[0, lane] = captured
             arriving[1, lane] = pictures[arrived, lane]
             arriving[2, lane] = readings[arrived, 1, lane]
@@ -151,11 +151,18 @@ def fuse(observer: Any, drive: Any, believed: Any, ticks: Any, frame: Any, h: fl
     """
     begin, first, last, tick = ticks
     size = observer.delivered.shape[0]
-    gain, fused, now, at = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now), rows_of(observer.at)
+    gain, fused, now, newest = (
+        rows_of(observer.gain),
+        rows_of(observer.fused),
+        rows_of(observer.now),
+        rows_of(observer.at),
+    )
     zero = zero_like(believed.length)
     for past in range(begin, last):
         sent = rows_of(observer.delivered[past % size])
-        propagate(drive, believed, fused, sent[0], sent[1], where((at[0] <= past) & (frame.captured > past), h, zero))
+        propagate(
+            drive, believed, fused, sent[0], sent[1], where((newest[0] <= past) & (frame.captured > past), h, zero)
+        )
     arrives = frame.captured >= zero
     innovation = frame.seen * (frame.angle - fused[0] - frame.since * fused[1])
     for i in range(3):
@@ -165,7 +172,7 @@ def fuse(observer: Any, drive: Any, believed: Any, ticks: Any, frame: Any, h: fl
     for past in range(first, tick):
         sent = rows_of(observer.delivered[past % size])
         propagate(drive, believed, now, sent[0], sent[1], where(arrives & (frame.captured <= past), h, zero))
-    at[0] = where(arrives, frame.captured, at[0])
+    newest[0] = where(arrives, frame.captured, newest[0])
 
 
 @compiled

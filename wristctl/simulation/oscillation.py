@@ -14,38 +14,38 @@ from numpy.typing import ArrayLike, NDArray
 from wristctl.arrays import Array
 from wristctl.simulation.trajectory import Trajectory
 
+# Half peak-to-peak [rad] above which a loop is said to swing.
 LIMIT_CYCLE = np.deg2rad(0.1)
-"""Half peak-to-peak [rad] above which a loop is said to swing."""
+# Time at the end over which a swing is looked for [s].
 WINDOW = 1.0
-"""[s]"""
+# Rest [s] from which a swing is the loop's own: one to settle, in which a move's tail dies out, and one to look at.
 REST = 2.0 * WINDOW
-"""Rest [s] from which a swing is the loop's own: one to settle, in which a move's tail dies out, and one to look at."""
+# No wrist follows what is faster [1/s].
 FASTEST = 25.0
-"""No wrist follows what is faster [1/s]."""
+# Rest [s] that shows whether a loop hunts.
 LONG_HOLD = 20.0
-"""Rest [s] that shows whether a loop hunts."""
 _HARMONICS = 4.0
+# [rad] below which there is nothing but rounding.
 _STILL = 1e-9
-"""[rad] below which there is nothing but rounding."""
 _UNKNOWN = math.nan
 _FIRST = np.zeros(1, np.int64)
+# Between samples that show how fast a reference goes [s].
 _ENOUGH = 0.5 / FASTEST
-"""Between samples that show how fast a reference goes [s]."""
 
 
 def oscillation(course: Trajectory) -> float:
     """Half the peak-to-peak [rad] that is left at rest; nan where the wrist has failed or there is no time to rest."""
-    found = float(oscillations(course.theta[None], course.theta_ref[None], _FIRST, _step(course))[0])
-    return _UNKNOWN if math.isnan(found) else found
+    amplitude = float(oscillations(course.theta[None], course.theta_ref[None], _FIRST, _step(course))[0])
+    return _UNKNOWN if math.isnan(amplitude) else amplitude
 
 
 def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step: float) -> Array:
-    """The same of many loops (L,), of their angles (L, T) `step` [s] apart, and which (L,) of references (M, T) each
+    """Oscillation of many loops (L,), of their angles (L, T) `step` [s] apart, and which (L,) of references (M, T) each
     follows."""
-    found = np.full(len(theta), _UNKNOWN)
-    for own, left in _remaining(theta, references, which, step):
-        found[own] = np.ptp(left, axis=1) / 2.0
-    return found
+    amplitudes = np.full(len(theta), _UNKNOWN)
+    for indices, left in _remaining(theta, references, which, step):
+        amplitudes[indices] = np.ptp(left, axis=1) / 2.0
+    return amplitudes
 
 
 def at_rest(course: Trajectory) -> bool:
@@ -55,7 +55,7 @@ def at_rest(course: Trajectory) -> bool:
 
 
 def chatter(variation: ArrayLike, tension_range: ArrayLike) -> Array:
-    """How often tensions go from limit to limit and back [1/s], where that is faster than any wrist follows; else 0.
+    """Frequency of tensions between their limits [1/s], where that is faster than any wrist follows; else 0.
 
     `variation` [N/s] is that of both sides, the metric `chattering`. `tension_range` [N] is the wrist's, from
     pretension to limit, also where a loop's tensions have no limit. What lies near: docs/chattering.md.
@@ -80,7 +80,7 @@ def hunting(course: Trajectory) -> float:
 
 
 def oscillation_frequency(course: Trajectory) -> float:
-    """Of what is left the strongest frequency [1/s]; nan where there is nothing."""
+    """Strongest frequency of the remaining swing [1/s]; nan where there is none."""
     for _, left in _remaining(course.theta[None], course.theta_ref[None], _FIRST, _step(course)):
         if np.ptp(left) >= _STILL:
             return float(_strongest(left, _step(course))[0])
@@ -90,15 +90,15 @@ def oscillation_frequency(course: Trajectory) -> float:
 def _remaining(
     theta: Array, references: Array, which: NDArray[np.int64], step: float
 ) -> Iterator[tuple[NDArray[np.intp], Array]]:
-    """Of loops that are judged alike, what is left at the end of each course (l, W) [rad], its trend or what follows
+    """Residual at the end of each course (l, W) [rad], by loops that are judged alike, its trend or what follows
     its reference removed: nan where a wrist has failed. Of none, where there is no time to rest."""
     window, samples = round(WINDOW / step), references.shape[1]
     if window > samples:
         return
     rests = np.ptp(references[:, -window:], axis=1) == 0.0
     if rests.any():  # whichever it follows
-        own = np.flatnonzero(rests[which])
-        yield own, _without_trend(theta[own, -window:])
+        indices = np.flatnonzero(rests[which])
+        yield indices, _without_trend(theta[indices, -window:])
     if rests.all():
         return
     frequency = _strongest(references, step, max(1, round(_ENOUGH / step)), references.mean(axis=1))
@@ -106,10 +106,10 @@ def _remaining(
     waves = math.pi * _HARMONICS * frequency * step * windows  # a polynomial follows so many waves, and no more
     degrees = np.minimum(4 + np.rint(waves).astype(int), windows // 2)
     for most, degree in dict.fromkeys(zip(windows[~rests].tolist(), degrees[~rests].tolist(), strict=True)):
-        own = np.flatnonzero((~rests & (windows == most) & (degrees == degree))[which])
+        indices = np.flatnonzero((~rests & (windows == most) & (degrees == degree))[which])
         basis = _polynomials(most, degree)
-        error = theta[own, -most:] - references[which[own], -most:]
-        yield own, error - error @ basis @ basis.T
+        error = theta[indices, -most:] - references[which[indices], -most:]
+        yield indices, error - error @ basis @ basis.T
 
 
 @lru_cache(32)
@@ -141,16 +141,16 @@ def _without_swing(angle: Array, left: Array, trend: Array) -> Array:
     # least squares on what of the swing is no trend; the trend is then what of the angle that swing does not explain
     normal = np.swapaxes(swing_left, 1, 2) @ swing_left
     size = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (np.swapaxes(swing_left, 1, 2) @ left[:, :, None])
-    rest = angle - (swing @ size)[:, :, 0]
-    found: Array = angle - rest @ trend @ trend.T
-    return found
+    unexplained = angle - (swing @ size)[:, :, 0]
+    detrended: Array = angle - unexplained @ trend @ trend.T
+    return detrended
 
 
 def _strongest(values: Array, step: float, every: int = 1, mean: Array | float = 0.0) -> Array:
     """The strongest frequency [1/s] of each row (L, T) of values `step` [s] apart less its mean, (L,), by one in
     `every`."""
-    own, count = slice(None, None, every), round(8 * values.shape[1] / every)
-    windowed = (values[:, own] - np.reshape(mean, (-1, 1))) * np.hanning(values.shape[1])[own]
+    taken, count = slice(None, None, every), round(8 * values.shape[1] / every)
+    windowed = (values[:, taken] - np.reshape(mean, (-1, 1))) * np.hanning(values.shape[1])[taken]
     power = np.abs(np.fft.rfft(windowed, count, axis=1))
     return np.asarray((np.argmax(power[:, 8:], axis=1) + 8) / (count * every * step))
 

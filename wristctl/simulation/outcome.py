@@ -1,4 +1,4 @@
-"""What becomes of rollouts: metrics, who has failed, how finely they were integrated, and what was recorded."""
+"""Outcome of rollouts: metrics, failures, how finely they were integrated, and what was recorded."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class KeptSamples(NamedTuple):
     """Samples of rollouts, of a batch or of several."""
 
     parts: Sequence[Array]
-    """Of each batch (blocks, T, columns, lanes)."""
+    """Samples of each batch (blocks, T, columns, lanes)."""
     places: NDArray[np.int64]
-    """Of each rollout its batch and which of that one's it is, (count, 2)."""
+    """Batch of each rollout and its number within the batch, (count, 2)."""
 
     @classmethod
     def of(cls, record: Array, count: int) -> Self:
@@ -29,10 +29,10 @@ class KeptSamples(NamedTuple):
 
     @classmethod
     def joined(cls, kept: Sequence[KeptSamples], order: NDArray[np.int64]) -> Self:
-        """Of all after each other, in this order."""
-        before = np.cumsum([0, *(len(each.parts) for each in kept)])
-        places = [each.places + np.array([first, 0]) for first, each in zip(before.tolist(), kept, strict=False)]
-        return cls([part for each in kept for part in each.parts], np.concatenate(places)[order])
+        """Samples of all `kept` after each other, in this order."""
+        before = np.cumsum([0, *(len(samples.parts) for samples in kept)])
+        places = [samples.places + np.array([first, 0]) for first, samples in zip(before.tolist(), kept, strict=False)]
+        return cls([part for samples in kept for part in samples.parts], np.concatenate(places)[order])
 
     def rows(self, rollouts: NDArray[np.int64]) -> KeptSamples:
         """Some of the rollouts, in this order; nothing is copied."""
@@ -40,23 +40,23 @@ class KeptSamples(NamedTuple):
 
     def column(self, number: int) -> Array:
         """One column of every rollout, (count, T)."""
-        found = np.empty((len(self.places), self.parts[0].shape[1]))
+        values = np.empty((len(self.places), self.parts[0].shape[1]))
         for part, blocks in enumerate(self.parts):
-            own = np.flatnonzero(self.places[:, 0] == part)
-            block, lane = np.divmod(self.places[own, 1], blocks.shape[3])
-            found[own] = blocks[block, :, number, lane]
-        return found
+            indices = np.flatnonzero(self.places[:, 0] == part)
+            block, lane = np.divmod(self.places[indices, 1], blocks.shape[3])
+            values[indices] = blocks[block, :, number, lane]
+        return values
 
     def rollout(self, number: int) -> Array:
         """A view of one rollout's samples, (T, columns)."""
-        part, each = self.places[number]
+        part, index = self.places[number]
         blocks = self.parts[part]
-        found: Array = blocks[each // blocks.shape[3], :, :, each % blocks.shape[3]]
-        return found
+        samples: Array = blocks[index // blocks.shape[3], :, :, index % blocks.shape[3]]
+        return samples
 
     def all(self) -> Array:
         """Everything, (count, T, columns)."""
-        return np.array([self.rollout(each) for each in range(len(self.places))])
+        return np.array([self.rollout(number) for number in range(len(self.places))])
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ class Outcome:
     until: Array
     """When they were last within it [s]: where they have failed."""
     references: Array
-    """What was followed, angle with rate and acceleration, (motions, 3, T)."""
+    """References, angle with rate and acceleration, (motions, 3, T)."""
     steps: NDArray[np.int64]
     """Integration steps in a control period, (count,)."""
     step_error: Array
     """Sum of the estimated errors of all steps, as an angle, (count,) [rad]."""
     drift: Array
-    """By how much RMSE or error at the end still change at the shortest steps tried, (count,) [rad]; 0: converged."""
+    """Change of RMSE or error at the end at the shortest steps tried, (count,) [rad]; 0: converged."""
     kept: KeptSamples | None = None
 
     @property
@@ -136,8 +136,8 @@ class Outcome:
             KeptSamples.joined(kept, order) if kept else None,
         )
 
-    def replaced(self, rollouts: NDArray[np.int64], others: Outcome) -> Outcome:
-        """The same with `others` in the place of these rollouts."""
+    def replaced(self, rollouts: NDArray[np.int64], replacements: Outcome) -> Outcome:
+        """Outcome with `replacements` in the place of these rollouts."""
         order = np.arange(len(self.failed))
         order[rollouts] = len(order) + np.arange(len(rollouts))
-        return Outcome.joined([self, others], order) if len(rollouts) else self
+        return Outcome.joined([self, replacements], order) if len(rollouts) else self

@@ -20,15 +20,15 @@ from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected, Measu
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.wrist.kinematics import exact_arc
 
+# Names of the bending angle, the first of which that stands there is taken.
 ANGLES = ("angle", "bend", "theta")
-"""Names of the bending angle, the first of which that stands there is taken."""
 TIP = ("tip_x", "tip_y")
 _EXAMPLE = "time [s],angle [deg]"
 _FEWEST = 4
+# Number of its usual steps that a recording's time may skip.
 _GAP = 5.0
-"""How many of its usual steps a recording's time may skip."""
+# Jump between two samples [rad]: beyond it a spline through them swings.
 _JUMP = np.deg2rad(10.0)
-"""Between two samples [rad]: beyond it a spline through them swings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +79,23 @@ def _check(table: MeasuredTable, time: Array, angle: Array) -> None:
         raise UserError(f"{len(time)} samples, too few for a motion", str(table.file), f"at least {_FEWEST}")
     steps = np.diff(time)
     if (bad := np.flatnonzero(steps <= 0.0)).size:
-        told = "time repeats" if steps[bad[0]] == 0.0 else "time goes back"
-        raise UserError(told, table.at(bad[0] + 1), "one motion a file, its samples in the order of their times")
+        problem = "time repeats" if steps[bad[0]] == 0.0 else "time goes back"
+        raise UserError(problem, table.at(bad[0] + 1), "one motion a file, its samples in the order of their times")
     usual = float(np.median(steps))
     if (bad := np.flatnonzero(steps > _GAP * usual)).size:
-        told = f"a gap of {steps[bad[0]]:.3g} s, where samples are {usual:.3g} s apart"
-        raise UserError(told, table.at(bad[0] + 1), "fill it in, or cut the recording there")
+        problem = f"a gap of {steps[bad[0]]:.3g} s, where samples are {usual:.3g} s apart"
+        raise UserError(problem, table.at(bad[0] + 1), "fill it in, or cut the recording there")
     if not np.isfinite(angle).all():
         raise UserError("a tip at the base", table.at(int(np.argmin(np.isfinite(angle)))), "tips in front of the base")
     jumps = np.abs(np.diff(angle))
     if (bad := np.flatnonzero(jumps > _JUMP)).size:
-        told = f"the angle jumps by {np.rad2deg(jumps[bad[0]]):.3g} deg from a sample to the next"
+        problem = f"the angle jumps by {np.rad2deg(jumps[bad[0]]):.3g} deg from a sample to the next"
         fix = "mend that sample, record more often, or put the right unit into the header"
-        raise UserError(told, table.at(bad[0] + 1), fix)
+        raise UserError(problem, table.at(bad[0] + 1), fix)
 
 
 def recording_of(reference: Reference) -> Recording:
-    """What the file of a reference holds; read again where it has changed. Raises UserError as `read_recording`."""
+    """Recording in the file of a reference; read again where it has changed. Raises UserError as `read_recording`."""
     if not reference.file:
         raise UserError("a recording needs its file", "reference.file", "reference.file: walk.csv")
     file = Path(reference.file)
@@ -110,9 +110,9 @@ def _read(file: Path, column: str | None, stamp: object) -> Recording:
 
 def _course(reference: Reference, time: Array) -> Array:
     """Angle [rad] and, of tips, arc length [m], with two derivatives each: (3, T) or (2, 3, T)."""
-    found = _joined(recording_of(reference), reference.value("noise_deg"), time.tobytes()).copy()
-    found[:1] *= reference.value("scale")
-    return found if len(found) == 2 else found[0]
+    course = _joined(recording_of(reference), reference.value("noise_deg"), time.tobytes()).copy()
+    course[:1] *= reference.value("scale")
+    return course if len(course) == 2 else course[0]
 
 
 @lru_cache(maxsize=4)
@@ -121,20 +121,20 @@ def _joined(recorded: Recording, noise_deg: float, times: bytes) -> Array:
     time, end = np.frombuffer(times), recorded.time[-1]
     within = np.clip(time, 0.0, end)
     arcs = zip(recorded.arc[: 1 + recorded.of_tips], (np.deg2rad(noise_deg), 0.0), strict=False)
-    found = np.stack([_splined(recorded.time, each, noise, within) for each, noise in arcs])
-    found[:, 1:, (time < 0.0) | (time > end + 1e-12)] = 0.0
-    return found
+    course = np.stack([_splined(recorded.time, arc, noise, within) for arc, noise in arcs])
+    course[:, 1:, (time < 0.0) | (time > end + 1e-12)] = 0.0
+    return course
 
 
-def _splined(time: Array, samples: Array, noise: float, at: Array) -> Array:
+def _splined(time: Array, samples: Array, noise: float, times: Array) -> Array:
     """A spline through samples, or past them by a standard deviation, and its two derivatives, (3, T)."""
     from scipy.interpolate import CubicSpline, UnivariateSpline
 
     if noise == 0.0:
         spline = CubicSpline(time, samples)
-        return np.stack([spline(at), spline(at, 1), spline(at, 2)])
+        return np.stack([spline(times), spline(times, 1), spline(times, 2)])
     smooth = UnivariateSpline(time, samples, k=5, s=len(time) * noise**2)
-    return np.stack([smooth(at), smooth.derivative(1)(at), smooth.derivative(2)(at)])
+    return np.stack([smooth(times), smooth.derivative(1)(times), smooth.derivative(2)(times)])
 
 
 def _rest(reference: Reference, begin: float, horizon: float) -> float:

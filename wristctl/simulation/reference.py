@@ -22,19 +22,19 @@ from wristctl.simulation.motion import Angles, Motion
 from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.kinematics import Inverse, arc_path, arc_tip, exact_arc
 
+# Form of the targets in a study: one angle or tip at the end, or the leaf with several, one every `duration`.
 Targets = Literal["end", "angles_deg", "tips", "none"]
-"""Where they stand: one angle or tip at the end, or the leaf with several, one every `duration`."""
 
+# Permitted distance of a target from the tips that one arc of the wrist reaches, as a share of the wrist's length.
 TIP_TOLERANCE = 0.01
-"""How far from the tips that one arc of the wrist reaches a target may be, as a share of the wrist's length."""
 
 
-def targets_of(reference: Reference, at: Targets, wrist: WristParameters) -> list[tuple[float, float]]:
+def targets_of(reference: Reference, form: Targets, wrist: WristParameters) -> list[tuple[float, float]]:
     """Angle [rad] and arc length [m] of each target in turn; UserError for one out of reach."""
-    if at == "tips":
+    if form == "tips":
         where = "reference.tip_ratios" if reference.tips is None else "reference.tips"
         return [_tip_target(tip, where, wrist) for tip in reference.in_metres(wrist.length).tips or ()]
-    if at == "angles_deg":
+    if form == "angles_deg":
         return [_angle_target(angle, "reference.angles_deg", wrist) for angle in reference.angles_deg]
     if reference.tip is not None:
         return [_tip_target(reference.tip, "reference.tip", wrist)]
@@ -84,8 +84,8 @@ def _arc_to(tip: tuple[float, float]) -> tuple[float, float]:
     return float(theta), float(length)
 
 
+# Time before a move begins [s]: there is nothing of it by then.
 _EARLY = 1e-6
-"""Before a move begins [s]: there is nothing of it by then."""
 
 
 def _never(reference: Reference, begin: float, horizon: float) -> float:
@@ -131,8 +131,8 @@ def toward(reference: Reference, direction: DirectionName) -> Reference:
     """The reference whose angles count toward this direction. Raises UserError for a motion of the other plane."""
     if plane := REFERENCES[reference.kind].plane:
         if plane != DIRECTIONS[direction].plane:
-            what = f"{reference.kind} is a motion of the {plane} plane, and {direction} is not in it"
-            raise UserError(what, "direction", f"direction: {plane}")
+            problem = f"{reference.kind} is a motion of the {plane} plane, and {direction} is not in it"
+            raise UserError(problem, "direction", f"direction: {plane}")
         return reference
     return reference if DIRECTIONS[direction].sign > 0 else reference.mirrored()
 
@@ -154,12 +154,12 @@ def motion(
     only there. The arrays are read-only.
     """
     if reference.inverse == "network" or reference.file:  # a file may be another by now
-        found = _evaluated(reference, wrist, horizon, period, network)
+        result = _evaluated(reference, wrist, horizon, period, network)
     else:
-        found = _known(reference, wrist.length, wrist.range_deg, horizon, period)
+        result = _known(reference, wrist.length, wrist.range_deg, horizon, period)
     if not later and REFERENCES[reference.kind].targets == "none":
-        _ = found.theta_desired
-    return found
+        _ = result.theta_desired
+    return result
 
 
 @lru_cache(maxsize=64)
@@ -194,14 +194,14 @@ def _evaluated(
     kind = REFERENCES[reference.kind]
     time = _grid(horizon, period)
     angles, length, move, begin = (_whole if kind.targets == "none" else _moves)(reference, kind, wrist, time)
-    rest, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
+    rest_time, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
     if reference.inverse != "network":
-        return Motion(time, angles, tips, move, begin, rest, horizon)
+        return Motion(time, angles, tips, move, begin, rest_time, horizon)
     if network is None:
         raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")
-    found = network(arc_path(angles.rows, length()))
-    reached = Angles.of(np.array([found.theta, found.rate, found.acceleration]))
-    return Motion(time, reached, tips, move, begin, rest, horizon, float(np.mean(found.outside)), angles)
+    estimate = network(arc_path(angles.rows, length()))
+    reached = Angles.of(np.array([estimate.theta, estimate.rate, estimate.acceleration]))
+    return Motion(time, reached, tips, move, begin, rest_time, horizon, float(np.mean(estimate.outside)), angles)
 
 
 @lru_cache(maxsize=64)
@@ -212,9 +212,9 @@ def _grid(horizon: float, period: float) -> Array:
 
 
 def _tips(angles: Angles, length: Callable[[], Array]) -> Array:
-    found = arc_path(angles.rows, length()).position
-    found.setflags(write=False)
-    return found
+    position = arc_path(angles.rows, length()).position
+    position.setflags(write=False)
+    return position
 
 
 @lru_cache(maxsize=64)
@@ -223,24 +223,24 @@ def _unstretched(length: float, samples: int) -> Array:
 
 
 def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
-    """Its course; UserError for one from elsewhere that fails, or is no angle with two derivatives everywhere."""
+    """Course of a reference; UserError where a plugin fails, or is no angle with two derivatives everywhere."""
     name, key = reference.kind, "reference.kind"
     if REFERENCES.belongs(name):
         return kind.course(reference, time)
     try:
-        found = np.array(kind.course(reference, time), np.float64)  # theirs may be used again
+        course = np.array(kind.course(reference, time), np.float64)  # theirs may be used again
     except BaseException as error:
         if isinstance(error, UserError) or from_outside(error):
             raise
-        what = f"the course failed at {raised_at(error) or name}: {type(error).__name__}: {error}"
-        raise UserError(what, key, "mend it; --debug shows more") from error
-    if found.shape[-2:] != (3, len(time)):
-        what = f"the course of {name} is an array of {found.shape}, not of (3, {len(time)})"
-        raise UserError(what, key, "give angle, rate and acceleration at every time")
-    if not (sound := np.isfinite(found).all(axis=tuple(range(found.ndim - 1)))).all():
-        what = f"the course of {name} is no number at {time[~sound][0]:.4g} s"
-        raise UserError(what, key, "make it finite at every time, before its begin too")
-    return found
+        problem = f"the course failed at {raised_at(error) or name}: {type(error).__name__}: {error}"
+        raise UserError(problem, key, "mend it; --debug shows more") from error
+    if course.shape[-2:] != (3, len(time)):
+        problem = f"the course of {name} is an array of {course.shape}, not of (3, {len(time)})"
+        raise UserError(problem, key, "give angle, rate and acceleration at every time")
+    if not (sound := np.isfinite(course).all(axis=tuple(range(course.ndim - 1)))).all():
+        problem = f"the course of {name} is no number at {time[~sound][0]:.4g} s"
+        raise UserError(problem, key, "make it finite at every time, before its begin too")
+    return course
 
 
 def _moves(
@@ -251,12 +251,12 @@ def _moves(
     turns, stretches = ([to[k] - before[k] for before, to in pairwise(targets)] for k in (0, 1))
 
     def moved(by: Sequence[float], out: Array) -> None:
-        for number, each in enumerate(by):
+        for number, change in enumerate(by):
             begin = number * reference.duration
             first = np.searchsorted(time, begin - _EARLY) if number else 0
-            if each and first < len(time):
+            if change and first < len(time):
                 course = _course(reference, kind, time[first:] - begin if number else time)
-                course *= each
+                course *= change
                 out[:, first:] += course
 
     def bend(out: Array) -> None:
@@ -264,9 +264,9 @@ def _moves(
         moved(turns, out)
 
     def length() -> Array:
-        found = _unstretched(wrist.length, len(time)).copy()
-        moved(stretches, found)
-        return found
+        lengths = _unstretched(wrist.length, len(time)).copy()
+        moved(stretches, lengths)
+        return lengths
 
     return Angles(len(time), bend), length, turns[-1], (len(turns) - 1) * reference.duration
 
@@ -274,7 +274,7 @@ def _moves(
 def _whole(
     reference: Reference, kind: ReferenceKind, wrist: WristParameters, time: Array
 ) -> tuple[Angles, Callable[[], Array], float | None, float]:
-    """The same of a course that has no targets: its last move is from straight to where it ends."""
+    """Angles and arc length of a course without targets: its last move is from straight to where it ends."""
 
     def bend(out: Array) -> None:
         course = _course(reference, kind, time)
@@ -290,9 +290,9 @@ def _whole(
 
 
 def _beyond(reference: Reference, wrist: WristParameters, time: Array, angle: Array) -> UserError:
-    at = int(np.argmax(np.abs(angle)))
+    largest = int(np.argmax(np.abs(angle)))
     return UserError(
-        f"{reference_name(reference)} bends by {np.rad2deg(abs(angle[at])):.1f} deg at {time[at]:.3g} s, "
+        f"{reference_name(reference)} bends by {np.rad2deg(abs(angle[largest])):.1f} deg at {time[largest]:.3g} s, "
         f"beyond the wrist's range of +-{wrist.range_deg:g} deg",
         where="reference",
         fix="make it smaller (scale, angle_deg, offset_deg), see to the unit in a header, or widen wrist.range_deg",

@@ -12,19 +12,19 @@ def minimum_jerk(time: Array, duration: float) -> Array:
 
     From Flash and Hogan, J. Neurosci. 5 (1985) 1688.
     """
-    found = np.zeros((3, len(time)))
+    course = np.zeros((3, len(time)))
     first, last = np.searchsorted(time, 0.0, "right"), np.searchsorted(time, duration, "left")
-    found[0, last:] = 1.0
-    smooth_stroke(time[first:last] / duration, duration, found[:, first:last])
-    return found
+    course[0, last:] = 1.0
+    smooth_stroke(time[first:last] / duration, duration, course[:, first:last])
+    return course
 
 
 def smooth_stroke(s: Array, duration: float, out: Array) -> None:
-    """The same within the move, into `out` (3, T), by the share s (T,) of the duration that has passed."""
-    square, rest = s**2, 1.0 - s
+    """Smooth stroke within the move, into `out` (3, T), by the share s (T,) of the duration that has passed."""
+    square, remaining = s**2, 1.0 - s
     np.multiply(s**3, 10.0 - 15.0 * s + 6.0 * square, out=out[0])
-    np.divide(30.0 * square * rest**2, duration, out=out[1])
-    np.divide(60.0 * s * rest * (1.0 - 2.0 * s), duration**2, out=out[2])
+    np.divide(30.0 * square * remaining**2, duration, out=out[1])
+    np.divide(60.0 * s * remaining * (1.0 - 2.0 * s), duration**2, out=out[2])
 
 
 def _step(reference: Reference, time: Array) -> Array:
@@ -32,15 +32,15 @@ def _step(reference: Reference, time: Array) -> Array:
 
 
 def _sine(reference: Reference, time: Array) -> Array:
-    w, found = 2.0 * np.pi * reference.frequency, np.empty((3, len(time)))
+    w, course = 2.0 * np.pi * reference.frequency, np.empty((3, len(time)))
     phase = w * time
-    np.cos(phase, out=found[0])
-    np.sin(phase, out=found[1])
-    np.multiply(found[0], 0.5 * w * w, out=found[2])
-    found[1] *= 0.5 * w
-    found[0] *= -0.5
-    found[0] += 0.5
-    return found
+    np.cos(phase, out=course[0])
+    np.sin(phase, out=course[1])
+    np.multiply(course[0], 0.5 * w * w, out=course[2])
+    course[1] *= 0.5 * w
+    course[0] *= -0.5
+    course[0] += 0.5
+    return course
 
 
 def _minimum_jerk(reference: Reference, time: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What becomes of a closed loop that is run once or several times: its metrics, and in words how it ended."""
+"""Results of a closed loop that is run once or several times: its metrics, and in words how it ended."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from wristctl.simulation.arrival import arrives
 from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter, oscillation_frequency
 from wristctl.simulation.trajectory import Trajectory
 
+# Why a loop is no good.
 MARKS = ("failed", "does not arrive", "limit cycle", "chatters", "not physical", "not converged")
-"""Why a loop is no good."""
+# Times its limit that a tension may be: what a spool's steps and a swing of the wrist may add.
 STRAIN = 1.01
-"""Times its limit that a tension may be: what a spool's steps and a swing of the wrist may add."""
+# Repetitions of which the errors are kept.
 _DRAWN = 64
-"""Repetitions of which the errors are kept."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Repeated:
-    """The same loop several times, each with noise and a drawn plant of its own."""
+    """Repetitions of one loop, each with noise and a drawn plant of its own."""
 
     first: Simulation
     metrics: dict[str, Array]
-    """Of each repetition, (R,)."""
+    """Metrics of each repetition, (R,)."""
     failed: NDArray[np.bool_]
     """(R,)"""
     until: Array
@@ -48,13 +48,19 @@ class Repeated:
     bears: float = math.inf
     """Largest tension that a tendon bears [N]."""
     tension_range: float = math.inf
-    """That less the least one [N]."""
+    """Largest tension less the least one [N]."""
 
     @classmethod
-    def once(cls, done: Simulation) -> Repeated:
+    def once(cls, simulation: Simulation) -> Repeated:
         """One simulation."""
-        metrics = {name: np.array([value]) for name, value in done.metrics.items()}
-        return cls(done, metrics, np.array([done.failed]), np.array([done.until]), done.trajectory.error[None])
+        metrics = {name: np.array([value]) for name, value in simulation.metrics.items()}
+        return cls(
+            simulation,
+            metrics,
+            np.array([simulation.failed]),
+            np.array([simulation.until]),
+            simulation.trajectory.error[None],
+        )
 
     @property
     def failure(self) -> str:
@@ -67,7 +73,7 @@ class Repeated:
     @property
     def fate(self) -> str:
         """In words why it is no good, or may be: its marks with their numbers, and ripples; else empty."""
-        return "; ".join(each for each in (self._end, self._strain, self._accuracy) if each)
+        return "; ".join(remark for remark in (self._end, self._strain, self._accuracy) if remark)
 
     @property
     def marks(self) -> list[str]:
@@ -80,8 +86,8 @@ class Repeated:
     @property
     def beyond(self) -> float:
         """Largest tension, where it is above what a tendon bears, else 0 [N]."""
-        known = self.metrics.get("peak_tension", np.empty(0))
-        most = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
+        peaks = self.metrics.get("peak_tension", np.empty(0))
+        most = float(np.nanmax(peaks)) if np.isfinite(peaks).any() else 0.0
         return most if most > STRAIN * self.bears else 0.0
 
     @property
@@ -91,16 +97,16 @@ class Repeated:
 
     @property
     def _ripple(self) -> float:
-        """The same also where the reference has not rested, and a move's tail or friction looks like a swing."""
-        known = self.metrics.get("oscillation", np.empty(0))
-        ripple = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        """Ripple, also where the reference has not rested, and a move's tail or friction looks like a swing."""
+        amplitudes = self.metrics.get("oscillation", np.empty(0))
+        ripple = float(np.median(amplitudes[np.isfinite(amplitudes)])) if np.isfinite(amplitudes).any() else 0.0
         return ripple if ripple > LIMIT_CYCLE else 0.0
 
     @property
     def chatter(self) -> float:
-        """How often tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
-        known = self.metrics.get("chattering", np.empty(0))
-        variation = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+        """Frequency at which tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
+        variations = self.metrics.get("chattering", np.empty(0))
+        variation = float(np.median(variations[np.isfinite(variations)])) if np.isfinite(variations).any() else 0.0
         return float(chatter(variation, self.tension_range))
 
     @property
@@ -131,15 +137,15 @@ class Repeated:
             return f"FAILED: {self.failure}"
         short = [] if self.arrives else ["DOES NOT ARRIVE"]
         if self._ripple > 0.0:
-            found = f"+-{np.degrees(self._ripple):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
-            turning = f"RIPPLE: {found} (a swing, friction, or the move's tail)"
-            short.append(f"LIMIT CYCLE: {found}" if self.swing > 0.0 else turning)
+            swing = f"+-{np.degrees(self._ripple):.2g} deg at {oscillation_frequency(self.first.trajectory):.2g} Hz"
+            turning = f"RIPPLE: {swing} (a swing, friction, or the move's tail)"
+            short.append(f"LIMIT CYCLE: {swing}" if self.swing > 0.0 else turning)
         if self.chatter > 0.0:
             short.append(f"CHATTERS: tensions go from limit to limit and back {self.chatter:.0f} times a second")
         return "; ".join(short)
 
     def labelled(self, label: str) -> Repeated:
-        """The same with this label on its trajectory."""
+        """Repetitions with this label on their trajectory."""
         course = replace(self.first.trajectory, label=label)
         return replace(self, first=replace(self.first, trajectory=course))
 
@@ -154,19 +160,19 @@ class Gathered:
         self._until: list[float] = []
         self._errors: list[Array] = []
 
-    def add(self, done: Simulation) -> None:
+    def add(self, simulation: Simulation) -> None:
         """One more."""
-        self._first = self._first or done
-        self._metrics.append(done.metrics)
-        self._failed.append(done.failed)
-        self._until.append(done.until)
+        self._first = self._first or simulation
+        self._metrics.append(simulation.metrics)
+        self._failed.append(simulation.failed)
+        self._until.append(simulation.until)
         if len(self._errors) < _DRAWN:
-            self._errors.append(done.trajectory.error)
+            self._errors.append(simulation.trajectory.error)
 
     def repeated(self, wrist: WristParameters) -> Repeated:
-        """All of them; `wrist` says what its tendons bear."""
+        """Repetitions gathered; `wrist` says what its tendons bear."""
         assert self._first is not None
-        metrics = {name: np.array([each[name] for each in self._metrics]) for name in self._first.metrics}
+        metrics = {name: np.array([values[name] for values in self._metrics]) for name in self._first.metrics}
         failed, until = np.array(self._failed), np.array(self._until)
         errors, tensions = np.array(self._errors), (wrist.tension_limit, wrist.tension_range)
         return Repeated(self._first, metrics, failed, until, errors, *tensions)

@@ -25,18 +25,18 @@ from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
 
+# Control ticks of a block between two looks at whether the user has asked to stop.
 _SLICE_TICKS = 200_000
-"""Control ticks of a block between two looks at whether the user has asked to stop."""
+# Least number of pieces of work for each thread, where there are so many blocks, so that all end together.
 _SHARES = 8
-"""Least number of pieces of work for each thread, where there are so many blocks, so that all end together."""
 
 
+# Whether samples are recorded: all columns, or BRIEFLY.
 How = bool | Literal["briefly"]
-"""Whether samples are recorded: all columns, or BRIEFLY."""
 
 
 def columns_of(record: How, coordinates: int) -> int:
-    """How many columns of a plant with so many coordinates are recorded."""
+    """Number of recorded columns of a plant with so many coordinates."""
     if record == "briefly":
         return len(BRIEFLY)
     return len(RECORDED) + coordinates if record else 0
@@ -75,7 +75,7 @@ def rollout(
     everyone = np.arange(count)
 
     def run(rollouts: NDArray[np.int64], times: int, progress: Callable[[float], None] | None = None) -> Outcome:
-        groups = [rollouts[at : at + 1] for at in range(len(rollouts))] if controller.plain else [rollouts]
+        groups = [rollouts[lane : lane + 1] for lane in range(len(rollouts))] if controller.plain else [rollouts]
         parts = list[Outcome]()
         for number, group in enumerate(groups):
 
@@ -83,19 +83,23 @@ def rollout(
                 if progress is not None:
                     progress((number + share) / len(groups))
 
-            there, own, followed = *part_of(worlds, lanes, group), motions
+            group_worlds, group_lanes, followed = *part_of(worlds, lanes, group), motions
             if times > 1:
-                there = [World(more_finely(world.loop, times), world.wrist) for world in there]
-                numbers, motion = np.unique(own.motion, return_inverse=True)
-                followed, own = [motions[number] for number in numbers], own._replace(motion=motion)
-            parts.append(_run(controller, gains[group], followed, there, own, start, record, threads, so_far, stop))
+                group_worlds = [World(more_finely(world.loop, times), world.wrist) for world in group_worlds]
+                numbers, motion = np.unique(group_lanes.motion, return_inverse=True)
+                followed, group_lanes = [motions[number] for number in numbers], group_lanes._replace(motion=motion)
+            parts.append(
+                _run(
+                    controller, gains[group], followed, group_worlds, group_lanes, start, record, threads, so_far, stop
+                )
+            )
         return parts[0] if len(parts) == 1 else Outcome.joined(parts, np.arange(len(rollouts)))
 
     outcome = run(everyone, 1, progress)
     if stop.is_set() or not converge:
         return outcome
-    by_hand = np.array([there.loop.substeps is not None for there in worlds])[world]
-    kinked = np.array([has_kinks(there.loop) for there in worlds])[world]
+    by_hand = np.array([setting.loop.substeps is not None for setting in worlds])[world]
+    kinked = np.array([has_kinks(setting.loop) for setting in worlds])[world]
     return settled(outcome, run, by_hand, kinked, stop)
 
 
@@ -115,21 +119,23 @@ def worlds_of(
         if number == len(worlds):
             worlds.append(World(*pair))
         which[lane] = number
-    if len({structure(each.loop) for each in worlds}) != 1:
+    if len({structure(world.loop) for world in worlds}) != 1:
         raise ValueError("loops of one batch differ in segments, plant, timing, or levels of actuator and sensor")
     return worlds, which
 
 
 def structure(loop: Loop) -> tuple[object, ...]:
-    """What loops of one batch have in common."""
+    """Structure that loops of one batch have in common."""
     timing = loop.control_period, loop.steps
     return loop.plant.model, loop.plant_segments, *timing, loop.actuator.level, loop.sensor.level
 
 
-def part_of(worlds: Sequence[World], lanes: Lanes, own: NDArray[np.intp]) -> tuple[list[World], Lanes]:
+def part_of(worlds: Sequence[World], lanes: Lanes, rollouts: NDArray[np.intp]) -> tuple[list[World], Lanes]:
     """Worlds and lanes of some of the rollouts."""
-    there, which = np.unique(lanes.world[own], return_inverse=True)
-    return [worlds[each] for each in there], Lanes(lanes.motion[own], which, [lanes.streams[each] for each in own])
+    numbers, which = np.unique(lanes.world[rollouts], return_inverse=True)
+    return [worlds[index] for index in numbers], Lanes(
+        lanes.motion[rollouts], which, [lanes.streams[index] for index in rollouts]
+    )
 
 
 def _run(
@@ -147,39 +153,39 @@ def _run(
     loop, count = worlds[0].loop, len(gains)
     model = PLANTS[loop.plant.model]
     columns = columns_of(record, model.coordinates(loop.plant_segments))
-    done = batch(controller, gains, motions, worlds, lanes, model, start, columns)
-    _advance(done, kernel_of(run_blocks, model), threads or cores(), progress, stop)
-    done.setup.law.check()
-    return outcome_of(done, count, loop, KeptSamples.of(done.state.record, count) if record else None)
+    rollouts = batch(controller, gains, motions, worlds, lanes, model, start, columns)
+    _advance(rollouts, kernel_of(run_blocks, model), threads or cores(), progress, stop)
+    rollouts.setup.law.check()
+    return outcome_of(rollouts, count, loop, KeptSamples.of(rollouts.state.record, count) if record else None)
 
 
-def outcome_of(done: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
-    """What has become of a batch's rollouts, so far as they have come."""
-    sums, goals = to_rows(done.state.sums, count), to_rows(done.world.goals, count)
+def outcome_of(rollouts: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
+    """Outcome of a batch's rollouts, so far as they have come."""
+    sums, goals = to_rows(rollouts.state.sums, count), to_rows(rollouts.world.goals, count)
     named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(Goals._fields, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
     steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
-    return Outcome(summary(totals), failed, until, done.course.references, steps, error, drift, kept)
+    return Outcome(summary(totals), failed, until, rollouts.course.references, steps, error, drift, kept)
 
 
 def _advance(
-    done: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None], stop: Event
+    rollouts: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None], stop: Event
 ) -> None:
     """Run all blocks to the end, or until they are to stop, on so many threads."""
-    setup, blocks, samples = done.setup, done.blocks, done.samples
-    each = samples * setup.ticks * setup.substeps
-    together = max(1, min(_SLICE_TICKS // each, blocks // (_SHARES * workers)))
+    setup, blocks, samples = rollouts.setup, rollouts.blocks, rollouts.samples
+    ticks_of_block = samples * setup.ticks * setup.substeps
+    together = max(1, min(_SLICE_TICKS // ticks_of_block, blocks // (_SHARES * workers)))
     piece = max(1, _SLICE_TICKS // (setup.ticks * setup.substeps))
     ended = [0] * blocks
 
     def run(begin: int) -> None:
-        end, scratch = min(begin + together, blocks), done.scratch()
+        end, scratch = min(begin + together, blocks), rollouts.scratch()
         for first in range(0, samples, piece):
             if stop.is_set():
                 return
             last = min(first + piece, samples)
-            kernel(setup, done.course, done.world, done.state, scratch, Span(begin, end, first, last))
+            kernel(setup, rollouts.course, rollouts.world, rollouts.state, scratch, Span(begin, end, first, last))
             ended[begin:end] = [last] * (end - begin)
 
     pieces = range(0, blocks, together)

@@ -32,10 +32,10 @@ from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, Z, pulls_at_s
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _STIFFNESS = len(Nonideal._fields)
+# Stiffness of a winch's tendons [N/m]: 1 m/s changes its pull by 1 mN in a millisecond.
 _WINCH = 1.0
-"""Stiffness of a winch's tendons [N/m]: 1 m/s changes its pull by 1 mN in a millisecond."""
+# Steps of a block of wrists between two looks at what the spools do next.
 _CHUNK = 20_000
-"""Steps of a block of wrists between two looks at what the spools do next."""
 
 
 class SpooledWrist(NamedTuple):
@@ -51,12 +51,12 @@ class SpooledWrist(NamedTuple):
 
 
 class Spooled(NamedTuple):
-    """What wrists did, (count, T) each; of a side both tendons together."""
+    """Courses of wrists, (count, T) each; of a side both tendons together."""
 
     theta: Array
     """Bending angle [rad]."""
     given_plus: Array
-    """What the + side has reeled in since it was taut and free of tension on the straight wrist [m]."""
+    """Length that the + side has reeled in since it was taut and free of tension on the straight wrist [m]."""
     given_minus: Array
     spool_plus: Array
     """Pull at the spool [N]."""
@@ -68,11 +68,11 @@ class Spooled(NamedTuple):
     """State of its bristle."""
     z_minus: Array
     friction: Array
-    """What tendons have lost to friction so far [J]: pull at the spool less pull at the wrist, along the path."""
+    """Work that tendons have lost to friction so far [J]: pull at the spool less pull at the wrist, along the path."""
     raw: Array
-    """What the spools have given so far [J]: pull at the spool along the path."""
+    """Work that the spools have given so far [J]: pull at the spool along the path."""
     damped: Array
-    """What the wrist's damping has taken so far [J], by its rates at the ends of steps."""
+    """Work that the wrist's damping has taken so far [J], by its rates at the ends of steps."""
 
 
 class _Timing(NamedTuple):
@@ -95,14 +95,14 @@ _ENDS = 9
 
 
 def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) -> None:
-    segment, own = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
-    zero = zero_like(own[_STIFFNESS])
-    tendons = RealTendons(own[_STIFFNESS], read_nonideal(own), rows_of(lanes.memory))
-    winch, memory, ends, n = own[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
+    segment, values = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
+    zero = zero_like(values[_STIFFNESS])
+    tendons = RealTendons(values[_STIFFNESS], read_nonideal(values), rows_of(lanes.memory))
+    winch, memory, ends, n = values[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
     q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
     alive = 1.0 + zero
     for k in range(driven.shape[0]):
-        at, now = timing.first + k, rows_of(driven[k])
+        tick, now = timing.first + k, rows_of(driven[k])
         path = memory[0], memory[1], memory[2]
         reeled = (
             where(winch > 0.0, now[0] / tendons.stiffness + path[0], now[0]),
@@ -110,10 +110,10 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
         )
         spool_plus, spool_minus = spool_pull(tendons, reeled[0], 0, path[0]), spool_pull(tendons, reeled[1], 1, path[1])
         plus, minus = pulls_at_start(tendons, reeled, path)
-        if at == 0:
+        if tick == 0:
             ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *reeled, spool_plus, spool_minus, plus, minus
-        if at % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
-            row = rows_of(out[at // timing.every])
+        if tick % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
+            row = rows_of(out[tick // timing.every])
             row[0], _ = tip_angle(segment, q, rate)
             row[1], row[2] = 0.5 * (reeled[0] + ends[3]), 0.5 * (reeled[1] + ends[4])
             row[3], row[4] = 0.5 * (spool_plus + ends[5]), 0.5 * (spool_minus + ends[6])
@@ -136,14 +136,14 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
         ends[2] = ends[2] + 0.5 * timing.h * segment.damping * rates
 
 
+# From times (T,) [s] and which wrists (L,) to what drives both sides of each: spools [m], or pulls [N]; (T, 2, L).
 Told = Callable[[Array, NDArray[np.int64]], Array]
-"""From times (T,) [s] and which wrists (L,) to what drives both sides of each: spools [m], or pulls [N]; (T, 2, L)."""
 
 
-def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, every: int = 1) -> Spooled:
+def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, every: int = 1) -> Spooled:
     """Move wrists, all of as many segments, in so many steps of h [s]; every so many of them are in the result.
 
-    `told` is asked for what is held over each step, at its middle. A wrist that bends a segment beyond a full turn
+    `inputs` is asked for what is held over each step, at its middle. A wrist that bends a segment beyond a full turn
     stays where it was.
     """
     count, cut = len(wrists), (0,) * len(wrists[0].begin)
@@ -153,14 +153,14 @@ def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, ev
     stop = Event()
 
     def run(block: int) -> None:
-        own = _Lanes(*(each[block] for each in blocks))
+        block_lanes = _Lanes(*(values[block] for values in blocks))
         for first in range(0, steps, _CHUNK):
             if stop.is_set():
                 return
             last = min(first + _CHUNK, steps)
             middle = h * np.arange(first + 0.5, last)
-            driven = told(middle, which[block]).reshape(last - first, 2, *wide)
-            move(PCC, own, np.ascontiguousarray(driven), _Timing(h, first, every), out[block], cut)
+            driven = inputs(middle, which[block]).reshape(last - first, 2, *wide)
+            move(PCC, block_lanes, np.ascontiguousarray(driven), _Timing(h, first, every), out[block], cut)
 
     with stoppable(cores(), stop) as pool:
         list(pool.map(run, range(len(which))))
@@ -170,26 +170,26 @@ def spooled(wrists: Sequence[SpooledWrist], told: Told, steps: int, h: float, ev
 
 def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
     rows = []
-    for each in wrists:
-        own = nonideal_of(TrueWrist(), each.actuator, TendonFacts(), h)
-        stiffness = _WINCH if each.winch else TENDONS_PER_SIDE * each.actuator.tendon_stiffness
-        path = np.array([*(each.wrist.length - PCC.taut(each.wrist, each.begin)), np.abs(each.begin).sum()])
-        memory = unmoved(np.zeros(2), path, np.zeros(2), each.begin)
-        of_tendons(memory, 2)[:, 0] = each.z
+    for driven in wrists:
+        nonideal = nonideal_of(TrueWrist(), driven.actuator, TendonFacts(), h)
+        stiffness = _WINCH if driven.winch else TENDONS_PER_SIDE * driven.actuator.tendon_stiffness
+        path = np.array([*(driven.wrist.length - PCC.taut(driven.wrist, driven.begin)), np.abs(driven.begin).sum()])
+        memory = unmoved(np.zeros(2), path, np.zeros(2), driven.begin)
+        of_tendons(memory, 2)[:, 0] = driven.z
         rows.append(
             _Lanes(
-                PCC.values(each.wrist, len(each.begin)),
-                np.array([*own, stiffness, float(each.winch)], float),
-                np.concatenate([each.begin, 0.0 * each.begin]),
+                PCC.values(driven.wrist, len(driven.begin)),
+                np.array([*nonideal, stiffness, float(driven.winch)], float),
+                np.concatenate([driven.begin, 0.0 * driven.begin]),
                 memory,
                 np.zeros(_ENDS),
             )
         )
-    return _Lanes(*(to_blocks(np.array(each)) for each in zip(*rows, strict=True)))
+    return _Lanes(*(to_blocks(np.array(column)) for column in zip(*rows, strict=True)))
 
 
+# Step between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off.
 _FINE = math.radians(0.05)
-"""Between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off."""
 
 
 class FrictionCase(NamedTuple):
@@ -202,7 +202,7 @@ class FrictionCase(NamedTuple):
 
 @dataclass(frozen=True)
 class Strokes:
-    """What holds a wrist without friction at each of the angles (G,) [rad]; of a side both tendons together."""
+    """Spools and pulls that hold a wrist without friction at angles (G,) [rad]; of a side both tendons together."""
 
     wrist: WristParameters
     settings: HysteresisSettings
@@ -220,17 +220,17 @@ class Strokes:
         return self.settings.drive == "tensions"
 
     def given(self, angle: Array) -> Array:
-        """What drives both sides at angles (...): spools [m], or pulls of winches [N]; (2, ...)."""
+        """Input of both sides at angles (...): spools [m], or pulls of winches [N]; (2, ...)."""
         course = self.pulls if self.winch else self.reeled
         return np.stack([np.interp(angle, self.angle, side) for side in course.T])
 
     def told(self, angle: Array) -> Array:
-        """The same of angles (T, L), as `spooled` wants it: (T, 2, L)."""
+        """Input of both sides at angles (T, L), as `spooled` takes it: (T, 2, L)."""
         return np.moveaxis(self.given(angle), 0, 1)
 
     def theta_at(self, angle: Array) -> Array:
         """Segments' angles at angles (...), (..., n)."""
-        return np.stack([np.interp(angle, self.angle, each) for each in self.theta.T], axis=-1)
+        return np.stack([np.interp(angle, self.angle, column) for column in self.theta.T], axis=-1)
 
     def lane(self, tendons: FrictionCase, begin: float) -> SpooledWrist:
         """A wrist that rests at this angle [rad] at first."""
@@ -248,20 +248,20 @@ class Strokes:
 
 
 def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
-    """Of all angles of all ranges. Raises UserError where the wrist cannot be held there."""
+    """Strokes over all angles of all ranges. Raises UserError where the wrist cannot be held there."""
     ends = np.radians(settings.ranges_deg)
     angle = np.linspace(ends.min(), ends.max(), 1 + math.ceil(float(np.ptp(ends)) / _FINE))
     if math.degrees(float(np.abs(angle).max())) > wrist.range_deg:
-        what = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
-        raise UserError(what, "hysteresis.ranges_deg", "smaller ranges")
+        problem = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
+        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
     values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
-    found = equilibria_at(values, settings.segments, angle, TENDONS_PER_SIDE * wrist.pretension)
-    if settings.drive == "tensions" and not found.stable.all():
+    balance = equilibria_at(values, settings.segments, angle, TENDONS_PER_SIDE * wrist.pretension)
+    if settings.drive == "tensions" and not balance.stable.all():
         raise UserError("the wrist buckles on held pulls", "hysteresis.drive", "drive: spools, or a lighter hand")
-    most = float(found.pulls.max()) / TENDONS_PER_SIDE
+    most = float(balance.pulls.max()) / TENDONS_PER_SIDE
     if most > wrist.tension_limit:
-        what = f"it takes {most:.3g} N a tendon, above wrist.tension_limit ({wrist.tension_limit:g} N)"
-        raise UserError(what, "hysteresis.ranges_deg", "smaller ranges")
-    taut = terms(values, found.theta, 0.0 * found.theta).tendon_lengths.sum(axis=1)
-    reeled = found.pulls / (TENDONS_PER_SIDE * settings.tendon_stiffness) + wrist.length - taut
-    return Strokes(wrist, settings, angle, found.theta, reeled, found.pulls)
+        problem = f"it takes {most:.3g} N a tendon, above wrist.tension_limit ({wrist.tension_limit:g} N)"
+        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
+    taut = terms(values, balance.theta, 0.0 * balance.theta).tendon_lengths.sum(axis=1)
+    reeled = balance.pulls / (TENDONS_PER_SIDE * settings.tendon_stiffness) + wrist.length - taut
+    return Strokes(wrist, settings, angle, balance.theta, reeled, balance.pulls)

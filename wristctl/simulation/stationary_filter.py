@@ -25,12 +25,12 @@ def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float
     propagate(drive, believed, x, plus + zero, minus + zero, h)
 
 
+# Doublings at most, and a change of a correlation that is none.
 _DOUBLINGS, _ALIKE = 20, 1e-14
-"""Doublings at most, and a change of a correlation that is none."""
 
 
 class Belief(NamedTuple):
-    """What an observer goes by; the period [s] is of control."""
+    """Facts that an observer goes by; the period [s] is of control."""
 
     sensor: Sensor
     actuator: Actuator
@@ -52,8 +52,8 @@ class _GoesBy(NamedTuple):
 
 
 class _Stationary(NamedTuple):
-    """What frames one after another lead to, of each belief: gain (B, 3), covariance behind a frame; transition and
-    noise of a tick, (B, 3, 3)."""
+    """Stationary filter of each belief: gain (B, 3), covariance behind a frame; transition and noise of a tick,
+    (B, 3, 3)."""
 
     gain: Array
     covariance: Array
@@ -63,16 +63,16 @@ class _Stationary(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _stationary(filters: tuple[_GoesBy, ...]) -> _Stationary:
-    models, which = distinct([each[:3] for each in filters])
-    tick = np.array([_linearised(*each) for each in models])[which]
-    numbers = np.array([each[2:] for each in filters])
+    models, which = distinct([basis[:3] for basis in filters])
+    tick = np.array([_linearised(*model) for model in models])[which]
+    numbers = np.array([basis[2:] for basis in filters])
     period, ticks, noise_deg, torque_noise, load_drift = numbers.T
     unknown = tick[:, 1, 2]  # rate gained in one period per unit of torque
     noise = np.zeros_like(tick)
     noise[:, 1, 1], noise[:, 2, 2] = unknown**2 * torque_noise**2 / period, load_drift**2 * period
     frame, between = np.broadcast_to(np.eye(3), tick.shape), np.zeros_like(tick)
-    for done in range(int(ticks.max())):
-        due = (done < ticks)[:, None, None]
+    for age in range(int(ticks.max())):
+        due = (age < ticks)[:, None, None]
         frame = np.where(due, tick @ frame, frame)
         between = np.where(due, tick @ between @ _transposed(tick) + noise, between)
     variance = np.maximum(np.deg2rad(noise_deg) ** 2, 1e-12)
@@ -90,9 +90,9 @@ def _linearised(actuator: Actuator, wrist: WristParameters, period: float) -> Ar
     states = small * np.eye(4, 3)
     for state in states:
         _propagate_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
-    found: Array = (states[:3] - states[3]).T / small
-    found.setflags(write=False)
-    return found
+    transition: Array = (states[:3] - states[3]).T / small
+    transition.setflags(write=False)
+    return transition
 
 
 def _predicted(frame: Array, between: Array, variance: Array) -> Array:
@@ -102,13 +102,13 @@ def _predicted(frame: Array, between: Array, variance: Array) -> Array:
     Of P = F (P - P c c^T P/(c^T P c + R)) F^T + Q by doubling (Anderson, Int. J. Control 28 (1978) 295): step k has
     seen 2^k frames.
     """
-    onward, seen, covariance = _transposed(frame), np.zeros_like(between), between
-    seen[:, 0, 0] = 1.0 / variance
+    onward, information, covariance = _transposed(frame), np.zeros_like(between), between
+    information[:, 0, 0] = 1.0 / variance
     still = np.ones((len(between), 1, 1), bool)
     for _ in range(_DOUBLINGS):
-        shrunk = np.linalg.solve(np.eye(3) + seen @ covariance, np.concatenate([onward, seen], axis=2))
+        shrunk = np.linalg.solve(np.eye(3) + information @ covariance, np.concatenate([onward, information], axis=2))
         grown = covariance + _transposed(onward) @ covariance @ shrunk[:, :, :3]
-        seen = seen + onward @ shrunk[:, :, 3:] @ _transposed(onward)
+        information = information + onward @ shrunk[:, :, 3:] @ _transposed(onward)
         onward = onward @ shrunk[:, :, :3]
         deviation = np.sqrt(np.diagonal(grown, axis1=1, axis2=2))
         change = np.abs(grown - covariance)
@@ -129,9 +129,9 @@ def _ticks_of_a_frame(sensor: Sensor, period: float) -> int:
 
 def stationary_gains(beliefs: Sequence[Belief]) -> Array:
     """The Kalman gains (B, 3) for one frame after another."""
-    filters, which = distinct([_goes_by(each) for each in beliefs])
-    found: Array = _stationary(filters).gain[which]
-    return found
+    filters, which = distinct([_goes_by(belief) for belief in beliefs])
+    gains: Array = _stationary(filters).gain[which]
+    return gains
 
 
 def _goes_by(belief: Belief) -> _GoesBy:
@@ -146,7 +146,7 @@ def expected_error(belief: Belief) -> float:
     That is behind a frame and the prediction from it, on average over the ticks for which it is the last to have
     arrived. Frames that are lost, and all that differs from what is believed, come on top.
     """
-    covariance, tick, noise = (each[0] for each in _stationary((_goes_by(belief),))[1:])
+    covariance, tick, noise = (matrices[0] for matrices in _stationary((_goes_by(belief),))[1:])
     sensor, period = belief.sensor, belief.period
     late, ticks = round(sensor.delay_frames / (sensor.frame_rate * period)), _ticks_of_a_frame(sensor, period)
     variances = []

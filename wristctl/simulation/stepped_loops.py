@@ -54,16 +54,16 @@ GIVEN = Controller(
 
 
 class Sight(NamedTuple):
-    """Of `count` loops at a sample: what their laws see, and what is true."""
+    """Signals of `count` loops at a sample, as their laws see them, and the true angles."""
 
     signals: Array
     """(count, NOW): behind a camera the observer's."""
     theta: Array
     """Bending angle [rad], (count,)."""
     reference: Array
-    """That it should have [rad], (count,)."""
+    """Reference of the bending angle [rad], (count,)."""
     failed: NDArray[np.bool_]
-    """Whose wrist has left its range, (count,); it stays where it was."""
+    """Whether a loop's wrist has left its range, (count,); it stays where it was."""
     limit: Array
     """Bending angle beyond which a wrist has failed [rad], (count,)."""
 
@@ -76,16 +76,16 @@ class SteppedLoops:
     """
 
     def __init__(self, cases: Sequence[Case], wrist: WristParameters, start: Start | None = None) -> None:
-        motions = list({id(each.motion): each.motion for each in cases}.values())
-        numbers = {id(each): number for number, each in enumerate(motions)}
-        which = np.array([numbers[id(each.motion)] for each in cases], np.int64)
-        loops, count = [each.loop for each in cases], len(cases)
-        one = all(each is loops[0] for each in loops)
+        motions = list({id(case.motion): case.motion for case in cases}.values())
+        numbers = {id(followed): number for number, followed in enumerate(motions)}
+        which = np.array([numbers[id(case.motion)] for case in cases], np.int64)
+        loops, count = [case.loop for case in cases], len(cases)
+        one = all(loop is loops[0] for loop in loops)
         worlds, world = worlds_of(loops[0] if one else loops, wrist, count)
-        lanes = Lanes(which, world, [each.stream for each in cases])
+        lanes = Lanes(which, world, [case.stream for case in cases])
         model = PLANTS[loops[0].plant.model]
         self.count, self.sample, self.samples = count, 0, len(motions[0].time)
-        self._loop, self._kinked = loops[0], np.array([has_kinks(each) for each in loops])
+        self._loop, self._kinked = loops[0], np.array([has_kinks(loop) for loop in loops])
         self._run: Callable[..., None] = kernel_of(run_blocks, model)
         self._look: Callable[..., None] = kernel_of(_look_blocks, model)
         self._batch = batch(GIVEN, np.zeros((count, 1)), motions, worlds, lanes, model, start, 0)
@@ -99,12 +99,12 @@ class SteppedLoops:
 
     def step(self, torques: Array) -> None:
         """Hold torques (count,) [N m] until the next sample."""
-        made = self._batch
-        values = made.world.gains.reshape(-1)
+        rollouts = self._batch
+        values = rollouts.world.gains.reshape(-1)
         values[: self.count] = torques
         values[self.count :] = torques[-1]
-        span = Span(0, made.blocks, self.sample, self.sample + 1)
-        self._run(made.setup, made.course, made.world, made.state, self._scratch, span)
+        span = Span(0, rollouts.blocks, self.sample, self.sample + 1)
+        self._run(rollouts.setup, rollouts.course, rollouts.world, rollouts.state, self._scratch, span)
         self.sample += 1
 
     def doubts(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
@@ -114,29 +114,31 @@ class SteppedLoops:
         return in_one_go(outcome, self._kinked)
 
     def look(self) -> Sight:
-        """What laws see now, before they answer, and what is true."""
-        made = self._batch
-        self._look(made.setup, made.course, made.world, made.state, self._scratch, self.sample, self._found)
+        """Signals that laws see now, before they answer, and the true angles."""
+        rollouts = self._batch
+        self._look(
+            rollouts.setup, rollouts.course, rollouts.world, rollouts.state, self._scratch, self.sample, self._found
+        )
         rows = to_rows(self._found, self.count)
         signals = rows[:, : len(NOW)]
         wanted = signals[:, NOW.index("theta_ref")]
         return Sight(signals, rows[:, _TRUE], wanted, rows[:, _WELL] <= 0.0, rows[:, _LIMIT])
 
 
-def _look_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, found: Any) -> None:
-    for block in range(len(found)):
-        _look_block(setup, course, block_of(world, block), block_of(state, block), scratch, sample, found[block])
+def _look_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, output: Any) -> None:
+    for block in range(len(output)):
+        _look_block(setup, course, block_of(world, block), block_of(state, block), scratch, sample, output[block])
 
 
 @spelled_out
-def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, found: Any) -> None:
+def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, output: Any) -> None:
     coordinates, period = setup.coordinates, setup.period
     n = len(coordinates)
     plant = parameters_of(setup.plant, rows_of(world.plant))
     believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
     q, rates = part(rows_of(state.coordinates), 0, coordinates), part(rows_of(state.coordinates), n, coordinates)
-    bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(found)
+    bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(output)
     gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
     angle, rate = tip_angle(plant, q, rates)
     estimate = sense(state.watch, world.schedule, drive, believed, sample * setup.ticks, angle, rate, period)
@@ -149,8 +151,8 @@ def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, s
 
 
 @kernel
-def _reach_along(model: Any, theta: Any, low: float, high: float, found: Any) -> None:
-    believed, angles, out = load_segments(rows_of(model)), rows_of(theta), rows_of(found)
+def _reach_along(model: Any, theta: Any, low: float, high: float, output: Any) -> None:
+    believed, angles, out = load_segments(rows_of(model)), rows_of(theta), rows_of(output)
     for k in range(theta.shape[0]):
         zero = zero_like(angles[k])
         out[2 * k], out[2 * k + 1] = reach(angles[k], believed, low + zero, high + zero)
@@ -159,6 +161,6 @@ def _reach_along(model: Any, theta: Any, low: float, high: float, found: Any) ->
 def largest_torque(wrist: WristParameters) -> float:
     """Largest torque [N m] that the tendons of a wrist can give anywhere in its range, by the one-segment model."""
     angles = np.linspace(-1.0, 1.0, 101) * bending_limit(wrist)
-    found: Array = np.empty(2 * len(angles))
-    _reach_along(segments(wrist, 1), angles, _SIDE * wrist.pretension, _SIDE * wrist.tension_limit, found)
-    return float(np.abs(found).max())
+    torques: Array = np.empty(2 * len(angles))
+    _reach_along(segments(wrist, 1), angles, _SIDE * wrist.pretension, _SIDE * wrist.tension_limit, torques)
+    return float(np.abs(torques).max())

@@ -1,4 +1,4 @@
-"""What is summed up over a rollout, tick by tick, for its metrics.
+"""Sums over a rollout, tick by tick, for its metrics.
 
 e = theta - theta_ref (E12), sampled at the control ticks. The move is the time until the reference rests. Tensions are
 those that act, of one tendon of each side.
@@ -15,12 +15,12 @@ from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import rows_named, rows_of
 from wristctl.simulation.motion import Goals
 
+# Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad].
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "plus", "minus", "alive",
     "until", "step_error",
 )  # fmt: skip
-"""Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]."""
 
 goals_of = rows_named(Goals._fields)
 (

@@ -43,12 +43,12 @@ class SweptLoop(NamedTuple):
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What loops that run as lanes of one batch have in common."""
+        """Properties that loops in the lanes of one batch have in common."""
         return self.law.name, *structure(self.loop), len(self.motion.time), self.at_rest
 
 
 class SweptMetrics(NamedTuple):
-    """Of rollouts, (count,) each."""
+    """Metrics of rollouts, (count,) each."""
 
     metrics: dict[str, Array]
     failed: NDArray[np.bool_]
@@ -68,10 +68,11 @@ def swept_loops(study: Study) -> list[SweptLoop]:
     followed = motion(asked, wrist, chosen.horizon, period, later=True)
     times = chosen.repetitions if is_random(loop) else 1
     scenario = scenario_of(chosen.reference, chosen.direction)
-    loops = loops_of(loop, [draws.plant(each) for each in range(times)])
+    loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
     at_rest, gains = chosen.start == "equilibrium", gains_of(law, chosen.gains)
     return [
-        SweptLoop(law, gains, own, wrist, followed, draws.camera(scenario, k), at_rest) for k, own in enumerate(loops)
+        SweptLoop(law, gains, drawn, wrist, followed, draws.camera(scenario, k), at_rest)
+        for k, drawn in enumerate(loops)
     ]
 
 
@@ -84,15 +85,15 @@ def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
     """Run all loops, those that differ in numbers alone side by side."""
     names, order, judged = swept_metrics(), list[int](), list[Future[SweptMetrics]]()
     with ThreadPoolExecutor(1) as beside:  # judges while the next ones are laid out, which takes one processor
-        for numbers, own in _pieces(loops):
+        for numbers, piece in _pieces(loops):
             order += numbers
-            done = _run(own)
+            results = _run(piece)
             wait(judged[-1:])  # of what is kept of samples there is never more than two batches'
-            judged.append(beside.submit(_judged, names, *done))
-    found = [each.result() for each in judged]
+            judged.append(beside.submit(_judged, names, *results))
+    parts = [future.result() for future in judged]
     back = np.argsort(order, kind="stable")
-    metrics = {name: np.concatenate([each.metrics[name] for each in found])[back] for name in names}
-    failed, until = (np.concatenate(each)[back] for each in zip(*(each[1:] for each in found), strict=True))
+    metrics = {name: np.concatenate([part.metrics[name] for part in parts])[back] for name in names}
+    failed, until = (np.concatenate(columns)[back] for columns in zip(*(columns[1:] for columns in parts), strict=True))
     return SweptMetrics(metrics, failed, until)
 
 
@@ -100,55 +101,55 @@ def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptL
     """Loops that can run as lanes of one batch, with their numbers, as soon as there are enough of a kind."""
     waiting: dict[tuple[object, ...], tuple[list[int], list[SweptLoop]]] = {}
     most = dict[tuple[object, ...], int]()
-    for number, each in enumerate(loops):
-        kind = each.kind
+    for number, loop in enumerate(loops):
+        kind = loop.kind
         if kind not in most:
-            most[kind] = at_most(each.loop, each.motion, "briefly")
-        numbers, own = waiting.setdefault(kind, ([], []))
+            most[kind] = at_most(loop.loop, loop.motion, "briefly")
+        numbers, piece = waiting.setdefault(kind, ([], []))
         numbers.append(number)
-        own.append(each)
-        if len(own) == most[kind]:
+        piece.append(loop)
+        if len(piece) == most[kind]:
             yield waiting.pop(kind)
     yield from waiting.values()
 
 
 def _run(chosen: Sequence[SweptLoop]) -> tuple[Outcome, NDArray[np.int64], float]:
-    """What became of them, which reference each followed, and the time between samples [s]."""
+    """Outcome of loops, which reference each followed, and the time between samples [s]."""
     first = chosen[0]
-    motions = list({id(each.motion.angles): each.motion for each in chosen}.values())  # which may differ in tips
-    numbers = {id(each.angles): number for number, each in enumerate(motions)}
-    which = np.array([numbers[id(each.motion.angles)] for each in chosen])
+    motions = list({id(loop.motion.angles): loop.motion for loop in chosen}.values())  # which may differ in tips
+    numbers = {id(followed.angles): number for number, followed in enumerate(motions)}
+    which = np.array([numbers[id(loop.motion.angles)] for loop in chosen])
     start: Start | None = equilibrium(first.loop) if first.at_rest else None
     outcome = rollout(
-        first.law, np.array([each.gains for each in chosen]).reshape(len(chosen), -1), motions, which,
-        [each.loop for each in chosen], [each.wrist for each in chosen], start, [each.stream for each in chosen],
+        first.law, np.array([loop.gains for loop in chosen]).reshape(len(chosen), -1), motions, which,
+        [loop.loop for loop in chosen], [loop.wrist for loop in chosen], start, [loop.stream for loop in chosen],
         record="briefly",
     )  # fmt: skip
     return outcome, which, float(first.motion.time[1])
 
 
-def fates(loops: Sequence[SweptLoop], found: SweptMetrics) -> list[str]:
+def fates(loops: Sequence[SweptLoop], swept: SweptMetrics) -> list[str]:
     """The marks of each loop, with commas; empty where it is sound. Where its reference never rests it may be short."""
-    metrics, wrists = found.metrics, [each.wrist for each in loops]
-    goals = [each.motion.goals for each in loops]
-    rests = np.array([each.rest <= 0.9 * each.horizon for each in goals])
-    long = np.array([each.rest <= each.horizon - REST for each in goals])
-    moves = np.array([np.abs(each.motion.theta_ref).max() for each in loops])
-    limits = np.array([each.tension_limit for each in wrists])
+    metrics, wrists = swept.metrics, [loop.wrist for loop in loops]
+    goals = [loop.motion.goals for loop in loops]
+    rests = np.array([goal.rest <= 0.9 * goal.horizon for goal in goals])
+    long = np.array([goal.rest <= goal.horizon - REST for goal in goals])
+    moves = np.array([np.abs(loop.motion.theta_ref).max() for loop in loops])
+    limits = np.array([wrist.tension_limit for wrist in wrists])
     holds = (
-        found.failed,
+        swept.failed,
         rests & (metrics["steady_state"] > SHORT * moves),
         long & (metrics["oscillation"] > LIMIT_CYCLE),
-        chatter(metrics["chattering"], [each.tension_range for each in wrists]) > 0.0,
+        chatter(metrics["chattering"], [wrist.tension_range for wrist in wrists]) > 0.0,
         metrics["peak_tension"] > STRAIN * limits,
         metrics["drift"] > 0.0,
     )
     return [
-        MARKS[0] if failed else ", ".join(mark for mark, one in zip(MARKS[1:], others, strict=True) if one)
-        for failed, *others in zip(*holds, strict=True)
+        MARKS[0] if failed else ", ".join(mark for mark, one in zip(MARKS[1:], marks, strict=True) if one)
+        for failed, *marks in zip(*holds, strict=True)
     ]
 
 
 def _judged(names: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> SweptMetrics:
-    known = outcome.metrics | at_once(names, outcome, which, step)
-    return SweptMetrics({name: known[name] for name in names}, outcome.failed, outcome.until)
+    values = outcome.metrics | at_once(names, outcome, which, step)
+    return SweptMetrics({name: values[name] for name in names}, outcome.failed, outcome.until)

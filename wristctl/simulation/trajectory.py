@@ -1,4 +1,4 @@
-"""What one rollout leaves behind, sampled on a grid of about a millisecond."""
+"""Trajectory of one rollout, sampled on a grid of about a millisecond."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Columns of a trajectory's table with unit and meaning; the segments' angles theta_1 ... theta_n [rad] follow.
 COLUMNS: dict[str, tuple[str, str]] = {
     "time": ("s", "time from the start of the move"),
     "theta": ("rad", "bending angle of the last disc"),
@@ -35,7 +36,6 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "acting_plus": ("N", "tension of the + side as it acts on the wrist: late and in steps behind real motors"),
     "acting_minus": ("N", "tension of the - side as it acts on the wrist"),
 }
-"""Columns of a trajectory's table with unit and meaning; the segments' angles theta_1 ... theta_n [rad] follow."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Trajectory:
     substeps: int = 1
     """Integration steps in a control period that it took."""
     drift: float = 0.0
-    """By how much its numbers still change with the integration step [rad]; 0 where they have converged."""
+    """Change of its numbers with the integration step [rad]; 0 where they have converged."""
     outside: float = 0.0
     """Share of the wanted tips outside the domain of the network behind the reference."""
 

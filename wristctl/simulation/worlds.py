@@ -19,8 +19,8 @@ from wristctl.wrist.directions import in_plane
 
 P = TypeVar("P", bound=TrueWrist)
 
+# Angle by which a wrist may pass its range [deg].
 LEEWAY_DEG = 5.0
-"""By how much a wrist may pass its range [deg]."""
 
 
 class World(NamedTuple):
@@ -54,10 +54,10 @@ def bending_limit(wrist: WristParameters, end_stop_deg: float | None = None) -> 
 
 def check_stops(worlds: Sequence[World], references: Array) -> None:
     """UserError where end stops lie inside the range of the references [rad]."""
-    stops = [each.loop.plant.end_stop_deg for each in worlds if each.loop.plant.end_stop_deg is not None]
+    stops = [world.loop.plant.end_stop_deg for world in worlds if world.loop.plant.end_stop_deg is not None]
     if stops and min(stops) <= (most := math.degrees(np.abs(references).max())):
-        what = f"the end stop at {min(stops):g} deg lies inside the reference's range, {most:.4g} deg"
-        raise UserError(what, "loop.plant.end_stop_deg", "a larger one, or a smaller motion")
+        problem = f"the end stop at {min(stops):g} deg lies inside the reference's range, {most:.4g} deg"
+        raise UserError(problem, "loop.plant.end_stop_deg", "a larger one, or a smaller motion")
 
 
 class Mismatch(NamedTuple):
@@ -72,7 +72,7 @@ class Mismatch(NamedTuple):
 
 def mismatches(world: World) -> list[Mismatch]:
     """All that the world of a loop has, and its controller does not know of; spreads are not drawn."""
-    loop, found = world.loop, list[Mismatch]()
+    loop, differences = world.loop, list[Mismatch]()
     sides: dict[str, tuple[Section, Section]] = {
         "": (world.wrist, world.plant),
         "actuator.": (loop.actuator, world.actuator),
@@ -82,38 +82,38 @@ def mismatches(world: World) -> list[Mismatch]:
         for name, field in type(believed).model_fields.items():
             values = getattr(believed, name), getattr(actual, name)
             if values[0] != values[1] and name != "gravity":  # which differs by a tilt, told below
-                found.append(Mismatch(begin + name, *values, unit_of(field)))
+                differences.append(Mismatch(begin + name, *values, unit_of(field)))
     facts = {"": loop.plant, "actuator.": loop.plant.actuator, "sensor.": loop.plant.sensor}
-    for begin, own in facts.items():
-        for name, field in type(own).model_fields.items():
-            given = getattr(own, name)
+    for begin, section in facts.items():
+        for name, field in type(section).model_fields.items():
+            value = getattr(section, name)
             own_fact = is_unsaid(field) and name not in type(sides[begin][0]).model_fields
-            if own_fact and given != field.default and not isinstance(given, Section):
-                found.append(Mismatch(begin + name, field.default, given, unit_of(field)))
-    return found
+            if own_fact and value != field.default and not isinstance(value, Section):
+                differences.append(Mismatch(begin + name, field.default, value, unit_of(field)))
+    return differences
 
 
 def plant_of(wrist: WristParameters, plant: TrueWrist) -> WristParameters:
     """The wrist as it is: with the plant's own leaves, its scales of stiffness and damping, and its payload."""
-    own: WristParameters = plant.of(wrist)
-    return own.model_copy(
+    actual: WristParameters = plant.of(wrist)
+    return actual.model_copy(
         update={
-            "stiffness": own.stiffness * plant.stiffness_scale,
-            "damping": own.damping * plant.damping_scale,
-            "hand_mass": own.hand_mass + plant.payload,
-            "gravity": _leaning(own.gravity, math.radians(plant.tilt_deg)),
+            "stiffness": actual.stiffness * plant.stiffness_scale,
+            "damping": actual.damping * plant.damping_scale,
+            "hand_mass": actual.hand_mass + plant.payload,
+            "gravity": _leaning(actual.gravity, math.radians(plant.tilt_deg)),
         }
     )
 
 
 def facing(wrist: WristParameters, plant: P, direction: str) -> tuple[WristParameters, P]:
     """A wrist as it is known, and the plant that it is, as this direction's bending plane sees them."""
-    own = in_plane(wrist, direction)
-    if own is wrist:
+    believed = in_plane(wrist, direction)
+    if believed is wrist:
         return wrist, plant
-    actual = TrueWrist.between(own, in_plane(plant.of(wrist), direction))
+    actual = TrueWrist.between(believed, in_plane(plant.of(wrist), direction))
     leaves = TrueWrist.model_fields.keys() & WristParameters.model_fields.keys()
-    return own, plant.model_copy(update={name: getattr(actual, name) for name in leaves})
+    return believed, plant.model_copy(update={name: getattr(actual, name) for name in leaves})
 
 
 def _leaning(gravity: tuple[float, float], tilt: float) -> tuple[float, float]:
@@ -142,15 +142,15 @@ def drawn(plant: P, stream: Entropy) -> P:
 
 
 def loop_facing(wrist: WristParameters, loop: Loop, direction: str) -> tuple[WristParameters, Loop]:
-    """The same of a loop."""
-    own, plant = facing(wrist, loop.plant, direction)
-    return own, loop if plant is loop.plant else loop.model_copy(update={"plant": plant})
+    """A wrist as it is known, and the loop around the plant that it is, as this direction's bending plane sees them."""
+    believed, plant = facing(wrist, loop.plant, direction)
+    return believed, loop if plant is loop.plant else loop.model_copy(update={"plant": plant})
 
 
 def loops_of(loop: Loop, streams: Sequence[Entropy]) -> list[Loop]:
     """The loop with its plant drawn by each of the streams."""
-    plants = [drawn(loop.plant, each) for each in streams]
-    return [loop if each is loop.plant else loop.model_copy(update={"plant": each}) for each in plants]
+    plants = [drawn(loop.plant, entropy) for entropy in streams]
+    return [loop if plant is loop.plant else loop.model_copy(update={"plant": plant}) for plant in plants]
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class Draws:
     def names(self, loops: Iterable[Loop], scenarios: Iterable[str]) -> list[str]:
         """The named streams that such loops draw from: what a run notes of them."""
         chosen = list(loops)
-        cameras = [self._camera(each) for each in scenarios] if any(map(sees_noise, chosen)) else []
+        cameras = [self._camera(scenario) for scenario in scenarios] if any(map(sees_noise, chosen)) else []
         return [*dict.fromkeys(cameras), *([self._plant()] if any(map(has_drawn_plant, chosen)) else [])]
 
     def _camera(self, scenario: str) -> str:

@@ -7,8 +7,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import planar, zero_like
 
+# Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end.
 ARC_LIMIT = 2.0 * math.pi
-"""Largest bending angle of one segment [rad]: beyond a full turn the arc closes on itself and the series end."""
 
 
 class Chords(NamedTuple):

@@ -88,7 +88,7 @@ def _point_jacobian_rate(chain: list[Array], point: Array, count: int, mu_rate: 
 
 
 def _masses(chain: list[Array], segment: Segments) -> list[tuple[float, Array, int]]:
-    """Each point mass [kg] with its place and the number of joints that move it."""
+    """Point masses [kg] with their places and the number of joints that move each."""
     n = (len(chain) - 1) // 4
     points = [(segment.mass, chain[4 * k + 2][:2, 2], 4 * k + 2) for k in range(n)]
     hand = chain[-1] @ np.array([segment.hand_offset, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""What a wrist is a chain of: its parts' shape, tendons and springs, which the dynamics take from the parts' type.
+"""Parts of a wrist as a chain: their shape, tendons and springs, which the dynamics take from the parts' type.
 
 A part is bent by a coordinate of its own: its chord, from one disc's centre to the next one's, depends on that and on
 the tangent before it, as an arc's and as two links' with a hinge between them. Masses are at the chords' middles.

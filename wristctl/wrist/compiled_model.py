@@ -70,9 +70,9 @@ def terms(parameters: ArrayLike, theta: ArrayLike, omega: ArrayLike) -> Terms:
     theta, omega = np.broadcast_arrays(np.asarray(theta, float), np.asarray(omega, float))
     *batch, n = theta.shape
     states = np.concatenate([theta, omega], axis=-1).reshape(-1, 2 * n)
-    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
+    blocks, values = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
     out = np.empty((len(blocks), 3 + 5 * n + n * n, *blocks.shape[2:]))
-    _terms(each, blocks, out, (0,) * n)
+    _terms(values, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     tendon = rows[..., 3 + n : 3 + 5 * n].reshape(*batch, n, 2, 2)
     mass = rows[..., 3 + 5 * n :].reshape(*batch, n, n)
@@ -114,9 +114,9 @@ def linearised(
     *batch, n = theta.shape
     pulls = np.broadcast_to(pulls, (*batch, 2))
     states = np.concatenate([theta, omega, acceleration, pulls], axis=-1).astype(float).reshape(-1, 3 * n + 2)
-    blocks, each = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
+    blocks, values = to_blocks(states), spread(np.reshape(parameters, (-1, len(Segments._fields))), len(states))
     out = np.empty((len(blocks), n + 2 * n * n, *blocks.shape[2:]))
-    _linearised(each, blocks, out, (0,) * n)
+    _linearised(values, blocks, out, (0,) * n)
     rows = to_rows(out, len(states)).reshape(*batch, -1)
     r, by_theta, by_rate = np.split(rows, [n, n + n * n], axis=-1)
     return r, by_theta.reshape(*batch, n, n), by_rate.reshape(*batch, n, n)

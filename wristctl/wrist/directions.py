@@ -24,10 +24,10 @@ DIRECTIONS = {
         Direction("extension", "flexion", -1, (1, 4)),
     )
 }
+# Places in the cross-section, +X ulnar and +Y flexion, in units of the tendon offset c.
 TENDONS = {1: (-1, -1), 2: (-1, 1), 3: (0, 0), 4: (1, -1), 5: (1, 1)}
-"""Places in the cross-section, +X ulnar and +Y flexion, in units of the tendon offset c."""
+# Tendons that a motor winds, in the order of the board's axes; the one in the centre bends nothing.
 ACTIVE = tuple(number for number, place in TENDONS.items() if any(place))
-"""Tendons that a motor winds, in the order of the board's axes; the one in the centre bends nothing."""
 
 
 def away_of(plane: str, positive: str) -> tuple[int, ...]:
@@ -42,7 +42,7 @@ def away_of(plane: str, positive: str) -> tuple[int, ...]:
 
 def tendons_of(plane: str) -> tuple[int, int, int, int]:
     """The four tendons as a bending plane (ulnar or flexion) sees them: two of its + side, two of its - side."""
-    plus, minus = (each.tendons for each in DIRECTIONS.values() if each.plane == plane)
+    plus, minus = (direction.tendons for direction in DIRECTIONS.values() if direction.plane == plane)
     return *plus, *minus
 
 

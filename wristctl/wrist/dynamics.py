@@ -34,12 +34,12 @@ def mass_matrix(segment: Any, arc: Any, tangent: Any, mass: Any) -> None:
     for j in range(len(z) - 1, -1, -1):
         q_j = end[j] + turn(dz[j])
         middle = end[j] + -0.5 * z[j]
-        own = 0.5 * segment.mass * dz[j]
-        mass[j, j] = m2 - 2.0 * dot(q_j, m1) + m0 * dot(q_j, q_j) + 0.5 * dot(own, dz[j])
+        half_moment = 0.5 * segment.mass * dz[j]
+        mass[j, j] = m2 - 2.0 * dot(q_j, m1) + m0 * dot(q_j, q_j) + 0.5 * dot(half_moment, dz[j])
         for i in range(j):
             q_i = end[i] + turn(dz[i])
             beyond = m2 - dot(q_i + q_j, m1) + m0 * dot(q_i, q_j)
-            mass[i, j] = beyond + dot(own, turn(middle - q_i))
+            mass[i, j] = beyond + dot(half_moment, turn(middle - q_i))
             mass[j, i] = mass[i, j]
         m0 = m0 + segment.mass
         m1 = m1 + segment.mass * middle

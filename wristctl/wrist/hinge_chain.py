@@ -18,8 +18,8 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _STEP = 1e-3
 _RIM = 1.25
+# Time constant and damping of the tie between hinges that bend alike: two steps, the fastest that MuJoCo holds stable.
 _TIE = "0.002 1"
-"""How soon hinges that bend alike are alike: two steps, the fastest that MuJoCo holds stable."""
 _SIDES = (("plus", 1.0), ("minus", -1.0))
 
 
@@ -30,19 +30,19 @@ class HingeChain:
     segments: int
     alike: int
     length: float
-    """Of a link, from a hinge to the next."""
+    """Length of a link, from a hinge to the next."""
     mass: float
-    """Of a link."""
+    """Mass of a link."""
     hand_mass: float
     beyond: float
     """The hand's mass from the last hinge."""
     gravity: tuple[float, float]
     stiffness: float
-    """Of each hinge."""
+    """Stiffness of each hinge."""
     damping: float
     offset: float
     hole: float
-    """Of the tendons' holes from the hinge, along the link."""
+    """Distance of the tendons' holes from the hinge, along the link."""
     tensions: tuple[float, float]
     """Least and largest tension of a tendon."""
 
@@ -87,21 +87,21 @@ def mjcf(chain: HingeChain, about: str) -> str:
     world = ElementTree.SubElement(root, "worldbody")
     ElementTree.SubElement(world, "light", pos="0.1 0 1", dir="0 0 -1")
     tendons, holes = ElementTree.SubElement(root, "tendon"), dict[str, list[str]]()
-    at = world
-    _link(at, 0, 0.5 * chain.length, chain, holes)
+    body = world
+    _link(body, 0, 0.5 * chain.length, chain, holes)
     for k in range(1, chain.links + 1):
         last = k == chain.links
         place = 0.5 * chain.length if k == 1 else chain.length
-        at = ElementTree.SubElement(at, "body", name=f"link{k}", pos=f"{place!r} 0 0")
+        body = ElementTree.SubElement(body, "body", name=f"link{k}", pos=f"{place!r} 0 0")
         spring = {"stiffness": repr(chain.stiffness), "damping": repr(chain.damping)}
-        ElementTree.SubElement(at, "joint", spring | {"name": f"hinge{k}", "type": "hinge", "axis": "0 0 1"})
+        ElementTree.SubElement(body, "joint", spring | {"name": f"hinge{k}", "type": "hinge", "axis": "0 0 1"})
         mass, ahead = (chain.hand_mass, chain.beyond) if last else (chain.mass, chain.length)
         inertia = {"mass": repr(mass), "pos": f"{ahead!r} 0 0", "diaginertia": "1e-12 1e-12 1e-12"}
-        ElementTree.SubElement(at, "inertial", inertia)
-        _link(at, k, 0.5 * chain.length if last else chain.length, chain, holes)
+        ElementTree.SubElement(body, "inertial", inertia)
+        _link(body, k, 0.5 * chain.length if last else chain.length, chain, holes)
         if last:
-            ElementTree.SubElement(at, "site", name="tip", pos=f"{0.5 * chain.length!r} 0 0", size="0.003")
-            ElementTree.SubElement(at, "geom", type="sphere", size="0.02", pos=f"{chain.beyond!r} 0 0", mass="0")
+            ElementTree.SubElement(body, "site", name="tip", pos=f"{0.5 * chain.length!r} 0 0", size="0.003")
+            ElementTree.SubElement(body, "geom", type="sphere", size="0.02", pos=f"{chain.beyond!r} 0 0", mass="0")
     alike = ElementTree.SubElement(root, "equality")
     for k in range(1, chain.links + 1):
         first = chain.alike * ((k - 1) // chain.alike) + 1
@@ -125,7 +125,7 @@ def mjcf(chain: HingeChain, about: str) -> str:
 
 
 def _link(body: ElementTree.Element, k: int, length: float, chain: HingeChain, holes: dict[str, list[str]]) -> None:
-    """What is drawn of link k, and its tendons' holes: after the hinge before it, and before the next one."""
+    """Draw link k and its tendons' holes: after the hinge before it, and before the next one."""
     ElementTree.SubElement(
         body,
         "geom",
@@ -200,6 +200,6 @@ def matlab(chain: HingeChain, about: str) -> str:
     """The chain's equations of motion as a function of base MATLAB (or Octave), without toolboxes."""
     gx, gy = chain.gravity
     low, high = chain.tensions
-    known = asdict(chain)
+    fields = asdict(chain)
     more = {"after": chain.segments + 1, "links": chain.links, "per_side": TENDONS_PER_SIDE, "about": about}
-    return _MATLAB.format(**known, gx=gx, gy=gy, low=low, high=high, **more)
+    return _MATLAB.format(**fields, gx=gx, gy=gy, low=low, high=high, **more)

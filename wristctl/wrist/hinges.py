@@ -39,8 +39,8 @@ from wristctl.wrist.statics import settled
 from wristctl.wrist.tendon_mechanics import travel
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Angle of a hinge [rad] at which a part lies on the one before it.
 FOLDED = math.pi
-"""Angle of a hinge [rad] at which a part lies on the one before it."""
 
 
 class Hinges(NamedTuple):
@@ -54,7 +54,7 @@ class Hinges(NamedTuple):
     gravity_y: Any
     tendon_offset: Any
     stiffness: Any
-    """Of the hinge nearest to the base."""
+    """Stiffness of the hinge nearest to the base."""
     damping: Any
     force_x: Any
     force_y: Any
@@ -157,11 +157,11 @@ def values(wrist: WristParameters, n: int) -> Array:
 
     From the base to the tip the stiffness falls (taper > 1) by the same factor from hinge to hinge.
     """
-    own = dict(zip(Segments._fields, segments(wrist, n).tolist(), strict=True))
-    del own["spans"]
+    named = dict(zip(Segments._fields, segments(wrist, n).tolist(), strict=True))
+    del named["spans"]
     softening = wrist.taper ** (-1.0 / max(n - 1, 1))
-    own["stiffness"] *= float(np.mean(softening ** -np.arange(n, dtype=float)))
-    return np.array(Hinges(**own, softening=softening))
+    named["stiffness"] *= float(np.mean(softening ** -np.arange(n, dtype=float)))
+    return np.array(Hinges(**named, softening=softening))
 
 
 def _links(wrist: WristParameters, q: Array) -> tuple[float, Array]:
@@ -182,10 +182,10 @@ def _taut(wrist: WristParameters, q: Array) -> Array:
     return np.array([(middle - bending).sum(), (middle + bending).sum()])
 
 
-def _backbone(wrist: WristParameters, q: Array, at: Array) -> tuple[Planar, Planar]:
+def _backbone(wrist: WristParameters, q: Array, places: Array) -> tuple[Planar, Planar]:
     half, along = _links(wrist, q)
     ends = np.array([0.0, *(half * np.arange(1, 2 * len(q), 2)), wrist.length])
-    passed = np.clip(at[:, None] - ends[:-1], 0.0, np.diff(ends))
+    passed = np.clip(places[:, None] - ends[:-1], 0.0, np.diff(ends))
     straight = np.maximum((passed > 0.0).sum(axis=1) - 1, 0)
     return (passed * along).sum(axis=1), along[straight]
 
@@ -210,10 +210,10 @@ def _balance(parameters: Any, state: Any, out: Any, cut: Any) -> None:
 
 def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
     """Angles of the hinges (n,) [rad] at rest under tensions [N per tendon, + and - side]; UserError if it buckles."""
-    own, pulls, out = values(wrist, n), TENDONS_PER_SIDE * np.asarray(tensions), np.empty(n + n * n)
+    parameters, pulls, out = values(wrist, n), TENDONS_PER_SIDE * np.asarray(tensions), np.empty(n + n * n)
 
     def balance(q: Array) -> tuple[Array, Array]:
-        _balance(own, np.concatenate([q, np.zeros(n), pulls]), out, (0,) * n)
+        _balance(parameters, np.concatenate([q, np.zeros(n), pulls]), out, (0,) * n)
         return out[:n].copy(), out[n:].reshape(n, n).copy()
 
     return settled(balance, n, tensions)

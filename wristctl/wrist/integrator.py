@@ -146,7 +146,7 @@ def step(segment: Any, theta: Any, omega: Any, spool_input: Any, tendons: Any, h
     a0, a, pull, slope = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k1, l1, k2, l2 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
     k3, l3, k4, l4 = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
-    at, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
+    angle, rate, r_theta, r_rate = lanes_like(theta), lanes_like(theta), lanes_like(theta), lanes_like(theta)
 
     tangent = chords(segment, theta, arc)
     path = path_before(tendons, segment, theta)
@@ -176,18 +176,18 @@ def step(segment: Any, theta: Any, omega: Any, spool_input: Any, tendons: Any, h
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k2, l2)
 
     for i in range(n):
-        at[i] = theta[i] + 2.0 * k1[i]
+        angle[i] = theta[i] + 2.0 * k1[i]
         rate[i] = omega[i] + 2.0 * l1[i]
-    _accelerations(segment, at, rate, spool_input, tendons, other_mass, a)
+    _accelerations(segment, angle, rate, spool_input, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i])
     _stage(mass, by_theta, lu, hg, r_theta, r_rate, k3, l3)
 
     for i in range(n):
-        at[i] = at[i] + k3[i]
+        angle[i] = angle[i] + k3[i]
         rate[i] = rate[i] + l3[i]
-    _accelerations(segment, at, rate, spool_input, tendons, other_mass, a)
+    _accelerations(segment, angle, rate, spool_input, tendons, other_mass, a)
     for i in range(n):
         r_theta[i] = rate[i] + per_h * (k1[i] - k2[i] - 8.0 / 3.0 * k3[i])
         r_rate[i] = -a[i] + per_h * (l1[i] - l2[i] - 8.0 / 3.0 * l3[i])
@@ -195,7 +195,7 @@ def step(segment: Any, theta: Any, omega: Any, spool_input: Any, tendons: Any, h
     _stage(mass, by_theta, lu, hg, k4, l4, k1, l1)
     of_bend, of_rate = zero_like(h), zero_like(h)
     for i in range(n):
-        theta[i] = at[i] + k4[i]
+        theta[i] = angle[i] + k4[i]
         omega[i] = rate[i] + l4[i]
         of_bend = of_bend + k1[i]
         of_rate = of_rate + l1[i]

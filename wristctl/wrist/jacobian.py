@@ -63,15 +63,15 @@ def residual_jacobians(
     beyond = m0 * (a + planar(-spin * spin, spin_rate) * hand - weight) - load
     for j in range(n - 1, -1, -1):
         half = 0.5 * dz[j]
-        own = segment.mass * half
+        half_moment = segment.mass * half
         moment_j = turn(m1 - m0 * pivot[j])
         # all masses from segment j on, seen by theta_j: for columns of segments nearer the base
-        whole = moment_j + own
-        circling = stretch - dot(pivot[j], momentum) + dot(own, turn(velocity[j]))
+        moment_with_half = moment_j + half_moment
+        circling = stretch - dot(pivot[j], momentum) + dot(half_moment, turn(velocity[j]))
         tip_turned = dot(turn(p - pivot[j]), turn(load))
         for i in range(j):
-            by_theta[j, i] = dot(whole, field[i]) + tip_turned
-            by_rate[j, i] = 2.0 * (circling + dot(whole, sweep[i]))
+            by_theta[j, i] = dot(moment_with_half, field[i]) + tip_turned
+            by_rate[j, i] = 2.0 * (circling + dot(moment_with_half, sweep[i]))
             # row i, column j: segment j lies beyond segment i
             moment = turn(m1 - m0 * pivot[i])
             reach = 0.5 * segment.mass * turn(middle[j] - pivot[i])
@@ -81,9 +81,9 @@ def residual_jacobians(
             turned = stretch - dot(pivot[i], momentum)
             by_rate[i, j] = 2.0 * (turned + dot(moment, sweep[j]) + dot(reach, own_sweep[j]))
         curved = dot(d2z[j], beyond + 0.5 * force[j]) - dot(turn(dz[j]), beyond)
-        inertial = dot(moment_j, field[j]) + 0.5 * dot(own, own_field[j])
+        inertial = dot(moment_j, field[j]) + 0.5 * dot(half_moment, own_field[j])
         by_theta[j, j] = curved + inertial + tip_turned + spring(segment, j) - slope[j]
-        turned = stretch - dot(pivot[j], momentum) + dot(moment_j, sweep[j]) + 0.5 * dot(own, own_sweep[j])
+        turned = stretch - dot(pivot[j], momentum) + dot(moment_j, sweep[j]) + 0.5 * dot(half_moment, own_sweep[j])
         by_rate[j, j] = 2.0 * turned + segment.damping
         m0 = m0 + segment.mass
         m1 = m1 + segment.mass * middle[j]

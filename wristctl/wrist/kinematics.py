@@ -37,8 +37,8 @@ class AnglePath:
     """(T,) true where the tip lies outside the inverse's domain, so that its angle means nothing"""
 
 
+# Network from tip positions to bending angles.
 Inverse = Callable[[TipPath], AnglePath]
-"""From tip positions to bending angles: a network."""
 
 
 def arc_tip(theta: Array, length: Array | float) -> Array:
@@ -88,13 +88,13 @@ def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
     By Gauss-Legendre quadrature: to rounding for |theta| <= 2 pi, and nothing special at 0.
     """
     nodes, weights = _gauss_legendre()
-    found = np.zeros((3, len(theta)), complex)
+    tips = np.zeros((3, len(theta)), complex)
     for node, weight in zip(nodes, weights, strict=True):  # a matrix product sums in an order of the processor's own
         wave = weight * np.exp(1j * theta * node)
         for k in range(3):
-            found[k] += wave
+            tips[k] += wave
             wave = wave * (1j * node)
-    return tuple(np.stack([v.real, v.imag], axis=-1) for v in found)  # type: ignore[return-value]
+    return tuple(np.stack([v.real, v.imag], axis=-1) for v in tips)  # type: ignore[return-value]
 
 
 @cache
@@ -105,15 +105,15 @@ def _gauss_legendre() -> tuple[Array, Array]:
 
 
 Planar = NDArray[np.complex128]
+# A plant's points and unit tangents, (m,) each, at its coordinates (q,) and the arc lengths (m,) [m].
 Backbone = Callable[[WristParameters, Array, Array], tuple[Planar, Planar]]
-"""A plant's points and unit tangents, (m,) each, at its coordinates (q,) and the arc lengths (m,) [m]."""
 
 
-def arcs_backbone(wrist: WristParameters, segment_theta: Array, at: Array) -> tuple[Planar, Planar]:
-    """Points and unit tangents of a chain of equal arcs at the arc lengths `at` (m,) [m]; each (m,)."""
-    each = wrist.length / len(segment_theta)
-    along = np.clip(at[:, None] - each * np.arange(len(segment_theta)), 0.0, each)
-    bent = segment_theta * along / each
+def arcs_backbone(wrist: WristParameters, segment_theta: Array, lengths: Array) -> tuple[Planar, Planar]:
+    """Points and unit tangents of a chain of equal arcs at the arc lengths `lengths` (m,) [m]; each (m,)."""
+    arc_length = wrist.length / len(segment_theta)
+    along = np.clip(lengths[:, None] - arc_length * np.arange(len(segment_theta)), 0.0, arc_length)
+    bent = segment_theta * along / arc_length
     before = np.cumsum(segment_theta) - segment_theta
     arcs = arc_tip(bent, along)
     points = ((arcs[..., 0] + 1j * arcs[..., 1]) * np.exp(1j * before)).sum(axis=1)

@@ -1,4 +1,4 @@
-"""What bends the wrist across the plane in which it moves: small bends, of constant curvature."""
+"""Bending of the wrist across the plane in which it moves: small bends, of constant curvature."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,15 +16,15 @@ class Across(NamedTuple):
     """Springs, less what upright gravity takes [N m/rad]."""
     damping: float
     inertia: float
-    """Of the straight wrist with its hand [kg m^2]."""
+    """Inertia of the straight wrist with its hand [kg m^2]."""
     moment: float
-    """Of gravity across the straight wrist [N m]."""
+    """Moment of gravity across the straight wrist [N m]."""
     levers: Array
     """(4,) by axis: what a tendon's pull bends by, and what the bend takes off its path [m]."""
 
 
 def across_of(wrist: WristParameters, away: Sequence[int]) -> Across:
-    """Of a wrist as its other plane knows it; `away` says to which side each axis pulls (`away_of`).
+    """Values across of a wrist as its other plane knows it; `away` says to which side each axis pulls (`away_of`).
 
     A bend b of constant curvature moves the point s by s^2 b/(2 L) aside and lowers it by s^3 b^2/(6 L^2); the hand,
     h beyond the tip, by (L/2 + h) b and (L/6 + h/2) b^2. That plane's + side is the last tendon's, 5.

@@ -45,9 +45,9 @@ def _values(wrist: WristParameters, n: int) -> Array:
 
 
 def _taut(wrist: WristParameters, theta: Array) -> Array:
-    own = terms(segments(wrist, len(theta)), theta, 0.0 * theta)
-    both: Array = own.tendon_lengths.sum(axis=0)
-    return both
+    at_theta = terms(segments(wrist, len(theta)), theta, 0.0 * theta)
+    lengths: Array = at_theta.tendon_lengths.sum(axis=0)
+    return lengths
 
 
 PCC = PlantModel(

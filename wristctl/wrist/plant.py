@@ -1,4 +1,4 @@
-"""What every plant is: the contract behind which rollouts, the emulated bench and identification move a wrist.
+"""Contract of every plant, behind which rollouts, the emulated bench and identification move a wrist.
 
 A plant is one file: the NamedTuple of its parameters, and functions of lanes on them and on its coordinates q with
 their rates. Compiled code is handed a PlantModel, reads its parameters by `parameters_of`, and calls the functions
@@ -140,14 +140,14 @@ def tip_angle(plant: Any, q: Any, rate: Any) -> Any:
 
 @by_type
 def travel(plant: Any, q: Any) -> Any:
-    """By how much the paths of the + and the - side's tendons are shorter than on the straight wrist [m], and the bend
+    """Shortening of the + and the - side's tendon paths from the straight wrist [m], and the bend
     that they are wrapped by [rad]."""
     raise NotImplementedError("compiled code only")
 
 
 @by_type
 def within(plant: Any, q: Any) -> Any:
-    """Where the coordinates are ones that the plant can have."""
+    """Lanes in which the coordinates are ones that the plant can have."""
     raise NotImplementedError("compiled code only")
 
 
@@ -236,7 +236,7 @@ def _poses(model: Any, values: Any, states: Any, out: Any, cut: Any) -> None:
 
 
 def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
-    """Where the last disc is at coordinates q (B, q) of a wrist cut into n segments."""
+    """Pose of the last disc at coordinates q (B, q) of a wrist cut into n segments."""
     count, k = q.shape
     states = to_blocks(np.concatenate([q, np.zeros((count, k))], axis=1))
     out = np.empty((len(states), 3 + 3 * k, *states.shape[2:]))

@@ -26,8 +26,8 @@ class Segments(NamedTuple):
     force_y: Any
 
 
+# Segments of lanes from rows of lanes, in compiled code.
 load_segments = tuple_of(Segments)
-"""Segments of lanes from rows of lanes, in compiled code."""
 
 
 def segments(wrist: WristParameters, n: int, force: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float64]:

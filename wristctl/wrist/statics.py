@@ -53,7 +53,7 @@ def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -
 
 
 def settled(balance: Callable[[Array], tuple[Array, Array]], n: int, tensions: tuple[float, float]) -> Array:
-    """Where a balance of n torques, which gives itself and its derivative, is none and stable, by Newton's method."""
+    """Angles of a stable rest, where a `balance` of n torques, given with its derivative, is 0; by Newton's method."""
     theta = np.zeros(n)
     for _ in range(100):
         r, tangent = balance(theta)
@@ -86,8 +86,8 @@ def equilibria_at(parameters: Array, n: int, angle: Array, pretension: float) ->
         side = np.where(difference >= 0.0, 1.0, -1.0)  # the pull that grows: r is linear in it
         more = linearised(parameters, theta, still, still, _pulls(difference + side, pretension))[0]
         bordered[:, :n, :n], bordered[:, :n, n] = tangent, (more - r) * side[:, None]
-        rest = np.concatenate([r, theta.sum(axis=1, keepdims=True) - angle[:, None]], axis=1)
-        change = np.linalg.solve(bordered, -rest[..., None])[..., 0]
+        residual = np.concatenate([r, theta.sum(axis=1, keepdims=True) - angle[:, None]], axis=1)
+        change = np.linalg.solve(bordered, -residual[..., None])[..., 0]
         theta, difference = theta + change[:, :n], difference + change[:, n]
         if np.abs(change[:, :n]).max() < 1e-12 and np.abs(change[:, n]).max() < 1e-9:
             break
@@ -102,12 +102,12 @@ def _pulls(difference: Array, pretension: float) -> Array:
     return pretension + np.stack([difference.clip(0.0), (-difference).clip(0.0)], axis=-1)
 
 
+# Number of angles at which a range of bending is looked at.
 _ANGLES = 2001
-"""At which a range of bending is looked at."""
 
 
 class Balance(NamedTuple):
-    """What holds one arc at some angles, (T,) each."""
+    """Torques that hold one arc at some angles, (T,) each."""
 
     asked: Array
     """Torque that holds it there [N m]."""
@@ -120,7 +120,7 @@ class Balance(NamedTuple):
 
 
 class Shortfall(NamedTuple):
-    """Where the tendons fall short by most, and what would hold the wrist there."""
+    """Angle at which the tendons fall short by most, and what would hold the wrist there."""
 
     theta: float
     """Bending angle [rad]."""
@@ -129,7 +129,7 @@ class Shortfall(NamedTuple):
     given: float
     """The tendons' torque nearest to that [N m]."""
     angle: float
-    """How far toward theta they hold it, from straight [rad]; nan where they do not hold it straight."""
+    """Angle toward theta to which they hold it, from straight [rad]; nan where they do not hold it straight."""
     tension_limit: float
     """Least limit of each tendon's tension that would do [N]."""
     tendon_radius: float
@@ -137,29 +137,29 @@ class Shortfall(NamedTuple):
 
 
 def balance(wrist: WristParameters, theta: Array, force: float = 0.0) -> Balance:
-    """What holds the wrist at angles (T,) [rad] under a force at the tip, across the straight wrist [N]."""
-    here = terms(segments(wrist, 1, (0.0, force)), theta[:, None], 0.0 * theta[:, None])
-    plus, minus = here.moment_arms[:, 0].T
+    """Torques that hold the wrist at angles (T,) [rad] under a force at the tip, across the straight wrist [N]."""
+    at_theta = terms(segments(wrist, 1, (0.0, force)), theta[:, None], 0.0 * theta[:, None])
+    plus, minus = at_theta.moment_arms[:, 0].T
     low, high = TENDONS_PER_SIDE * wrist.pretension, TENDONS_PER_SIDE * wrist.tension_limit
-    asked = here.bias[:, 0] + wrist.stiffness * theta
+    asked = at_theta.bias[:, 0] + wrist.stiffness * theta
     return Balance(asked, plus * low + minus * high, plus * high + minus * low, plus, minus)
 
 
 def shortfall(wrist: WristParameters, low: float, high: float, force: float = 0.0) -> Shortfall | None:
-    """Where between two bending angles [rad] the tendons cannot hold the wrist; None where they can everywhere.
+    """Largest shortfall of the tendons between two bending angles [rad]; None where they hold the wrist everywhere.
 
     `force` is a constant one at the tip, across the straight wrist [N].
     """
     theta = np.linspace(low, high, _ANGLES)
-    found = balance(wrist, theta, force)
-    beyond = np.maximum(found.asked - found.most, found.least - found.asked)
+    torques = balance(wrist, theta, force)
+    beyond = np.maximum(torques.asked - torques.most, torques.least - torques.asked)
     worst = int(beyond.argmax())
     if beyond[worst] <= 0.0:
         return None
-    asked, least, most, plus, minus = (float(each[worst]) for each in found)
+    asked, least, most, plus, minus = (float(column[worst]) for column in torques)
     ahead = asked > most
-    pulls, other = (plus, minus) if ahead else (minus, plus)
-    limit = (asked / TENDONS_PER_SIDE - other * wrist.pretension) / pulls
+    pulls, arm_opposite = (plus, minus) if ahead else (minus, plus)
+    limit = (asked / TENDONS_PER_SIDE - arm_opposite * wrist.pretension) / pulls
     squeezed = 0.5 * (plus + minus) * (wrist.tension_limit + wrist.pretension)
     per_radius = 0.5 * (plus - minus) * (wrist.tension_limit - wrist.pretension) / wrist.tendon_radius
     radius = abs(asked / TENDONS_PER_SIDE - squeezed) / per_radius
@@ -169,8 +169,8 @@ def shortfall(wrist: WristParameters, low: float, high: float, force: float = 0.
 
 def _held_to(wrist: WristParameters, theta: float, force: float) -> float:
     way = np.linspace(0.0, theta, _ANGLES)
-    found = balance(wrist, way, force)
-    spare = np.minimum(found.asked - found.least, found.most - found.asked)
+    torques = balance(wrist, way, force)
+    spare = np.minimum(torques.asked - torques.least, torques.most - torques.asked)
     first = int((spare < 0.0).argmax())
     if first == 0:
         return math.nan
@@ -178,18 +178,18 @@ def _held_to(wrist: WristParameters, theta: float, force: float) -> float:
     return float(way[first - 1] + share * (way[first] - way[first - 1]))
 
 
+# States of the + and the - side's bristle.
 FROM_BELOW, FROM_ABOVE, UNBENT = (1.0, -1.0), (-1.0, 1.0), (0.0, 0.0)
-"""States of the + and the - side's bristle."""
 
 
 class HeldTendons(NamedTuple):
-    """Both sides' tendons of wrists at rest, one value a wrist (B,)."""
+    """Tendons of both sides of wrists at rest, one value a wrist (B,)."""
 
     given: Array
     """(B, 2) what both sides have reeled in since they were taut and free of tension on the straight wrist [m]; pulls
     at the spools [N] where these are held."""
     stiffness: Array
-    """Of a side's tendons together [N/m]; 0 where pulls are held."""
+    """Stiffness of a side's tendons together [N/m]; 0 where pulls are held."""
     friction: Array
     sheath: Array
     """[rad]"""
@@ -205,15 +205,15 @@ def at_rest_with(parameters: Array, tendons: HeldTendons, z: tuple[float, float]
     length = parameters[:, Segments._fields.index("length")] * theta.shape[1]
     springy, held = tendons.stiffness[:, None] > 0.0, tendons.stiffness[:, None] <= 0.0
     for _ in range(100):
-        own = terms(parameters, theta, still)
-        stretch = tendons.given - (length[:, None] - own.tendon_lengths.sum(axis=1))
+        at_theta = terms(parameters, theta, still)
+        stretch = tendons.given - (length[:, None] - at_theta.tendon_lengths.sum(axis=1))
         at_spool = np.where(held, tendons.given, tendons.stiffness[:, None] * stretch.clip(0.0))
         wrapped = tendons.sheath + np.abs(theta).sum(axis=1)
         left = np.exp(-tendons.friction[:, None] * wrapped[:, None] * side)
         pulls = at_spool * left
         r, tangent, _ = linearised(parameters, theta, still, still, pulls)
         stiff = np.where(springy & (stretch > 0.0), tendons.stiffness[:, None] * left, 0.0)
-        arms = own.moment_arms
+        arms = at_theta.moment_arms
         softer = (tendons.friction[:, None] * side * pulls)[:, None, :] * np.sign(theta)[:, :, None]
         slope = stiff[:, None, :] * arms + softer
         tangent = tangent + np.einsum("bis,bjs->bij", arms, slope)

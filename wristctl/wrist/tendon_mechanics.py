@@ -41,7 +41,7 @@ def bristle_slope(z: Any, speed: Any, slope: Any) -> Any:
 
 
 class Nonideal(NamedTuple):
-    """What a real wrist has; lanes, SI units. All of it at 0 (`stop` inf) gives the ideal's bits."""
+    """Imperfections of a real wrist; lanes, SI units. All of it at 0 (`stop` inf) gives the ideal's bits."""
 
     friction: Any
     sheath: Any
@@ -70,13 +70,13 @@ class Nonideal(NamedTuple):
     """Length of an electrical turn, four full steps [m]."""
 
 
+# A Nonideal of lanes from rows of lanes, in compiled code.
 read_nonideal = tuple_of(Nonideal)
-"""A Nonideal of lanes from rows of lanes, in compiled code."""
 
+# Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in
+# the backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows comes the path, x of both
+# sides [m] and the bend [rad], after them the springs' psi [rad].
 OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped")
-"""Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in the
-backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows comes the path, x of both sides
-[m] and the bend [rad], after them the springs' psi [rad]."""
 _OWN, PATH = len(OF_A_TENDON), 3
 Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
 
@@ -150,7 +150,7 @@ def row_of(t: int, which: int) -> int:
 
 @compiled
 def travel(segment: Any, theta: Any) -> Any:
-    """By how much both sides' paths are shorter than on the straight wrist [m], and the bend [rad]."""
+    """Shortening of both sides' paths from the straight wrist [m], and the bend [rad]."""
     zero = zero_like(segment.length)
     plus, minus, bend = zero, zero, zero
     for k in range(len(theta)):
@@ -232,7 +232,7 @@ def _stuck_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
 
 @by_type
 def _slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
-    """By how much one tendon's pull falls with its path's shortening at the start of a step [N/m]."""
+    """Fall of one tendon's pull with its path's shortening at the start of a step [N/m]."""
     raise NotImplementedError("compiled code only")
 
 
@@ -299,8 +299,8 @@ def _update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> No
 def _update_springs(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     state = tendons.state
     for k in range(len(theta)):
-        at = row_of(len(spool_input), PATH) + k
-        state[at] = theta[k] + tendons.nonideal.spring_keep * (state[at] - theta[k])
+        row = row_of(len(spool_input), PATH) + k
+        state[row] = theta[k] + tendons.nonideal.spring_keep * (state[row] - theta[k])
 
 
 @implements(update_memory, RealTendons)
@@ -308,8 +308,8 @@ def _update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
     nonideal, state = tendons.nonideal, tendons.state
     for t in range(len(reeled)):
         state[row_of(t, Z)] = _slid(nonideal, state, t, path[t % 2])
-        stretch, at = maximum(0.0, reeled[t] - path[t % 2]), row_of(t, _CREPT)
-        state[at] = stretch + nonideal.tendon_keep * (state[at] - stretch)
+        stretch, crept = maximum(0.0, reeled[t] - path[t % 2]), row_of(t, _CREPT)
+        state[crept] = stretch + nonideal.tendon_keep * (state[crept] - stretch)
     for i in range(PATH):
         state[i] = path[i]
     _update_springs(tendons, theta, reeled, path)

@@ -10,8 +10,8 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel, clip
 from wristctl.lanes.lane import where
 
+# Every one of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5).
 TENDONS_PER_SIDE = 2
-"""Each of the four directions is pulled by two tendons with equal tension (paper: 1+2, 4+5, 1+4, 2+5)."""
 
 
 @compiled
