@@ -109,7 +109,7 @@ def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
 
 
 def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Path, data: str) -> None:
-    file = code / "wristctl" / "studies" / "gen_data.py"
+    file = code / "wristctl" / "commands" / "gen_data" / "command.py"
     text = file.read_text()
     file.write_text(text.replace("count = len(samples.theta)", "count = len(samples.theta) + 1"))
     status, found = _verdict(wristctl, data)

@@ -57,6 +57,7 @@ def apply(diff: str, folder: Path) -> list[Path]:
                 content = content.replace(line, "") if mark == "-" else content
             else:
                 content, at = content[:at] + line + content[at:], at + len(line)
+        file.parent.mkdir(exist_ok=True)
         file.write_text(content)
         touched.append(file)
     return touched

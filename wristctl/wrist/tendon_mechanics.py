@@ -5,9 +5,9 @@ RealTendons the lengths [m] that spools have reeled in. Either is the step's `sp
 a side, or of RealTendons twice that of two alike.
 
 Where a path is shorter by x a tendon of stiffness k that has reeled in l is stretched by e = l - x, pulls
-k max(e - f psi, 0) at its spool, never pushes, and pulls less at the wrist by its friction (tendon_friction). psi is
+k max(e - f psi, 0) at its spool, never pushes, and pulls less at the wrist by its friction. psi is
 the creep of one Maxwell branch: it follows e with a time constant, so that the share f of the stiffness relaxes.
-Springs creep alike (yielding).
+Springs creep alike.
 """
 
 from typing import Any, NamedTuple
