@@ -58,7 +58,7 @@ class WristCalibration:
         else:
             board.home(position)
             return
-        fix = "leave out positions: table, and zero is found anew; senses of turning are kept"
+        fix = "leave out positions: stored, and zero is found anew; senses of turning are kept"
         raise BoardError("host", problem, board.transport.name, fix)
 
 
