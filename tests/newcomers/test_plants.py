@@ -21,7 +21,7 @@ from wristctl.config.plant import Actuator, Disturbances, Plant, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
-from wristctl.lanes.compiled import sources
+from wristctl.lanes.compiled import _BODIES, sources
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -148,16 +148,19 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
 
 
 def _reached(functions: Iterable[CPUDispatcher]) -> set[Path]:
-    """Files of these compiled functions and of all that they call, as numba finds them: by name where they stand."""
-    seen, waiting = set[CPUDispatcher](), list(functions)
+    """Files of these compiled functions and of all that they call, as numba finds them: by name where they stand.
+
+    A function that is declared by type is followed into all of its bodies.
+    """
+    seen, waiting = set[Any](), [function.py_func for function in functions]
     while waiting:
         function = waiting.pop()
         if function not in seen:
             seen.add(function)
-            code, names = function.py_func.__code__, function.py_func.__globals__
-            called = [names.get(name) for name in code.co_names]
-            waiting += [value for value in called if isinstance(value, CPUDispatcher)]
-    return {Path(function.py_func.__code__.co_filename) for function in seen}
+            called = [function.__globals__.get(name) for name in function.__code__.co_names]
+            waiting += [value.py_func for value in called if isinstance(value, CPUDispatcher)]
+            waiting += [body for (declared, _), body in _BODIES.items() if declared in called]
+    return {Path(function.__code__.co_filename) for function in seen}
 
 
 def test_every_plant_is_registered_and_its_kernels_go_by_all_that_they_call(model: PlantModel) -> None:

@@ -198,15 +198,20 @@ class Size(NamedTuple):
     @property
     def steps(self) -> float:
         """Integration steps of all, where none needs a shorter step."""
-        steps = [self.horizon / loop.control_period * loop.steps for loop in self.loops]
+        steps = [_steps(loop, self.horizon) for loop in self.loops]
         return self.rollouts * sum(steps) / len(steps)
+
+
+def _steps(loop: Loop, horizon: float) -> float:
+    """Integration steps of one rollout over `horizon` [s]."""
+    return horizon / loop.control_period * loop.steps
 
 
 def check_size(size: Size) -> None:
     """UserError, with the most that there is room for, where rollouts ask for too much one by one or together."""
     horizon = size.horizon
     for loop in size.loops:
-        steps = horizon / loop.control_period * loop.steps
+        steps = _steps(loop, horizon)
         if steps > MOST_STEPS:
             most, problem = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"
             fix = f"at most {most:.3g} s with this control_period and substeps, or a longer control_period"

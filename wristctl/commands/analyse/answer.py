@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from wristctl.commands.printed_table import Table, number
 from wristctl.commands.results import Findings
@@ -214,28 +214,25 @@ def margins_of(angle: float, analysis: LoopAnalysis) -> dict[str, float]:
     return dict(zip(_MARGINS, values, strict=True))
 
 
-def write(
-    findings: Findings, angles: Sequence[float], analyses: Sequence[LoopAnalysis], locus: RootLocus | None,
-    portrait: PhasePortrait | None,
-) -> None:  # fmt: skip
-    """Write the worst margins of all resting angles as metrics, and all results as tables.
+class LoopResults(NamedTuple):
+    """Results of the analysis of one loop."""
 
-    Parameters
-    ----------
-    findings
-        Destination of metrics and tables.
-    angles
-        Resting angles [deg].
-    analyses
-        Analysis at each resting angle.
-    locus
-        Root locus at the last angle; None where nothing is fed back.
-    portrait
-        Phase portrait of a sliding law; None of another law.
-    """
+    angles: Sequence[float]
+    """Resting angles [deg]."""
+    analyses: Sequence[LoopAnalysis]
+    """Analysis at each resting angle."""
+    locus: RootLocus | None
+    """Root locus at the last angle; None where nothing is fed back."""
+    portrait: PhasePortrait | None
+    """Phase portrait of a sliding law; None of another law."""
+
+
+def write(findings: Findings, results: LoopResults) -> None:
+    """Write the worst margins of all resting angles as metrics, and all results as tables."""
     import numpy as np
     import pandas as pd
 
+    angles, analyses, locus, portrait = results
     rows = pd.DataFrame([margins_of(*row) for row in zip(angles, analyses, strict=True)])
     worst: dict[str, tuple[Literal["lower", "higher"], float]] = {
         "gain_most": ("higher", rows["gain_most"].min()), "gain_least": ("lower", rows["gain_least"].max()),
@@ -290,29 +287,11 @@ def write(
         findings.table("data/portrait.csv", pd.concat(courses), portrait_units, {"sigma": "0 on the sliding surface"})
 
 
-def draw(
-    findings: Findings, label: str, angles: Sequence[float], analyses: Sequence[LoopAnalysis], locus: RootLocus | None,
-    portrait: PhasePortrait | None,
-) -> None:  # fmt: skip
-    """Draw the Bode plot first; of a loop that feeds nothing back, the plant's.
-
-    Parameters
-    ----------
-    findings
-        Destination of the figures.
-    label
-        Name of the law and its gains.
-    angles
-        Resting angles [deg].
-    analyses
-        Analysis at each resting angle.
-    locus
-        Root locus at the last angle; None where nothing is fed back.
-    portrait
-        Phase portrait of a sliding law; None of another law.
-    """
+def draw(findings: Findings, label: str, results: LoopResults) -> None:
+    """Draw the Bode plot first; of a loop that feeds nothing back, the plant's. `label` names the law and its gains."""
     from wristctl.commands.analyse import figures
 
+    angles, analyses, locus, portrait = results
     heading = f"{label}: the plant, angle per torque" if locus is None else f"{label}: loop transfer"
     findings.figure("bode", figures.bode, analyses, angles, heading)
     if any(analysis.margins.stable for analysis in analyses):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.analyse.answer import (
     CUTS,
+    LoopResults,
     answer,
     draw,
     limit_table,
@@ -139,9 +140,10 @@ def analyse(session: Session) -> Analysed:
     label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}"
     sentence = answer(label, analyses, angles)
     findings.summary(f"**{sentence}**\n\n![Bode plot](figures/bode.png)")
-    write(findings, angles, analyses, locus, portrait)
+    results = LoopResults(angles, analyses, locus, portrait)
+    write(findings, results)
     with session.progress("drawing"):
-        draw(findings, label, angles, analyses, locus, portrait)
+        draw(findings, label, results)
     tables = [margin_table(sentence, analyses, angles), step_table(analyses, angles)]
     if locus is not None:
         value = None if settings.over == "loop" else row.gains[settings.over]
