@@ -18,13 +18,13 @@ _FUNCTIONS = {
 
 @dataclass(frozen=True)
 class Argument:
-    """What a command is given by name: `--network RUN` or `--newer 2d`, in Python `network=...` or `newer='2d'`."""
+    """An argument of a command by name: `--network RUN` or `--newer 2d`, in Python `network=...` or `newer='2d'`."""
 
     name: str
     value: str | None = None
     """None: any"""
     metavar: str = "RUN"
-    """what the command line writes where any value may stand; empty: nothing"""
+    """Word of the command line for any value, such as RUN; empty: none."""
     positional: bool = False
     """whether the command line takes it without its name"""
     quoted: bool = False
@@ -70,7 +70,7 @@ class Call:
     """A command with what it is given: `wristctl gen-data --run latest:simulate`, or the function of that name."""
 
     command: str
-    """its words: train, runs ls, hw calibrate camera"""
+    """Words of the command: train, runs ls, hw calibrate camera."""
     file: str = ""
     """a study file"""
     arguments: tuple[Argument, ...] = ()
@@ -95,7 +95,7 @@ class Call:
 OUT = Argument("out", metavar="")
 """The folder of run directories, whichever it may be."""
 FILE, TO = Argument("file", metavar=""), Argument("to", metavar="")
-"""Where a command writes to that makes no run."""
+"""Arguments that name where a command writes that makes no run."""
 
 Phrase = str | Argument | Setting | Call | tuple["Phrase", ...]
 """Text with such parts in it: `("give ", Argument("table1"))`."""
@@ -136,11 +136,11 @@ class UserError(Exception):
 
     @property
     def fix(self) -> str:
-        """What to do about it."""
+        """Advice on how to mend the error."""
         return worded(self._fix, self.in_python)
 
     def at(self, where: Phrase) -> UserError:
-        """The same error at a place that is better known."""
+        """Copy of the error that names a more exact place."""
         return UserError(self.what, where, self._fix, self.exit_code)
 
     def __str__(self) -> str:
@@ -174,7 +174,7 @@ def nearest(word: str, choices: Iterable[str]) -> str | None:
 
 
 def meant(word: str, choices: Iterable[str]) -> str:
-    """How to fix an unknown `word`: the nearest choice, else all of them, or the first of very many."""
+    """Advice on an unknown `word`: the nearest choice, else all of them, or the first of very many."""
     known = sorted(choices)
     best = nearest(word, known)
     more = f" and {len(known) - _TOLD} more" if len(known) > _TOLD else ""
@@ -211,7 +211,7 @@ _FIXES: dict[int, Phrase] = {
     errno.EBUSY: "leave the folder alone meanwhile, and try again",
     errno.EXDEV: _ELSEWHERE,
 }
-"""What helps where the system refuses, by errno."""
+"""Advice where the system refuses, by errno."""
 
 _TO_READ: dict[int, Phrase] = {
     errno.ENOENT: "check the path",
@@ -223,7 +223,7 @@ _TO_READ: dict[int, Phrase] = {
     errno.EIO: "check the disk that it is on, or bring a copy",
     errno.ESTALE: "check the disk that it is on, or bring a copy",
 }
-"""What helps where a file cannot be read, where it is another thing than where one cannot be written."""
+"""Advice where a file cannot be read, where it differs from that on writing, by errno."""
 
 _WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
@@ -240,13 +240,13 @@ def error_of_the_system(error: BaseException, place: Path | str = "") -> UserErr
 
 
 def fix_of(error: OSError, by: Phrase = OUT) -> Phrase:
-    """What helps where something could not be written; `by` is the argument that names another place."""
+    """Advice where something could not be written; `by` is the argument that names another place."""
     fix = _FIXES.get(error.errno or 0, _ELSEWHERE)
     return tuple(by if part is OUT else part for part in fix) if isinstance(fix, tuple) else fix
 
 
 def fix_to_read(error: OSError) -> Phrase:
-    """What helps where something could not be read."""
+    """Advice where something could not be read."""
     return _TO_READ.get(error.errno or 0) or _FIXES.get(error.errno or 0, "bring a copy that can be read")
 
 

@@ -59,7 +59,7 @@ OBSERVED = (
     Observed("torque_high", "N m", "largest torque that the tendons can give here", 100.0),
     Observed("load", "N m", "load torque as the observer estimates it; 0 where sensors are ideal", 100.0),
 )
-"""What an observation holds, in its order."""
+"""Signals of an observation, in their order."""
 
 SCALE = math.radians(10.0)
 """Error [rad] at which a step costs 1."""
@@ -122,7 +122,7 @@ class _Episodes:
         return self._seen()
 
     def truth(self, theta: Array, failed: Any) -> dict[str, Any]:
-        """What `info` has of each; at an episode's end also whether its integration step is in doubt."""
+        """Entries of `info`, (count,) each; at an episode's end also whether its integration step is in doubt."""
         told = {"theta": theta, "failed": failed}
         if self.loops is None or not self.loops.done:
             return told
@@ -190,7 +190,7 @@ class WristEnv(gymnasium.Env[Array, Array]):
 
     @property
     def torque(self) -> float:
-        """What an action of 1 is [N m]: the power of two above all that the tendons can give, which divides exactly."""
+        """Torque of an action of 1 [N m]: the power of two above all that the tendons give, so that it divides exactly."""
         return self._episodes.torque
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -234,7 +234,7 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
 
     @property
     def torque(self) -> float:
-        """What an action of 1 is [N m], as WristEnv's."""
+        """Torque of an action of 1 [N m], as WristEnv's."""
         return self._episodes.torque
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:

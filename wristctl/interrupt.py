@@ -36,7 +36,7 @@ class Interrupts:
 
 
 _around: list[Interrupts] = []
-"""Of the main thread's blocks that are entered, the innermost last."""
+"""Blocks that the main thread has entered, the innermost last."""
 
 
 @contextmanager
@@ -106,7 +106,7 @@ def undisturbed() -> Any:
 
 
 def again(told: sys.UnraisableHookArgs) -> None:
-    """What `sys.unraisablehook` does within `interrupts`."""
+    """Raise again, later, an interrupt that a finaliser swallowed: `sys.unraisablehook` within `interrupts`."""
     if told.exc_type is KeyboardInterrupt:
         signal.setitimer(signal.ITIMER_REAL, _SOON)
     else:
