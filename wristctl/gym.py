@@ -190,7 +190,7 @@ class WristEnv(gymnasium.Env[Array, Array]):
 
     @property
     def torque(self) -> float:
-        """Torque of an action of 1 [N m]: the power of two above all that the tendons give, so that it divides exactly."""
+        """Torque of an action of 1 [N m]: the power of two above all that tendons give, so that it divides exactly."""
         return self._episodes.torque
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:

@@ -150,7 +150,7 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
 def _reached(functions: Iterable[CPUDispatcher]) -> set[Path]:
     """Files of these compiled functions and of all that they call, as numba finds them: by name where they stand.
 
-    A function that is declared by type is followed into all of its bodies.
+    A function that is declared by type is followed into all of its bodies within the package.
     """
     seen, waiting = set[Any](), [function.py_func for function in functions]
     while waiting:
@@ -159,7 +159,8 @@ def _reached(functions: Iterable[CPUDispatcher]) -> set[Path]:
             seen.add(function)
             called = [function.__globals__.get(name) for name in function.__code__.co_names]
             waiting += [value.py_func for value in called if isinstance(value, CPUDispatcher)]
-            waiting += [body for (declared, _), body in _BODIES.items() if declared in called]
+            bodies = [body for (declared, _), body in _BODIES.items() if declared in called]
+            waiting += [body for body in bodies if body.__module__.startswith("wristctl.")]
     return {Path(function.__code__.co_filename) for function in seen}
 
 
