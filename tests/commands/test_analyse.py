@@ -37,10 +37,10 @@ def test_the_answer_is_the_least_margin_of_all_angles() -> None:
     assert done.metrics["gain_most"] == table["gain_most"].min() < table["gain_most"].max()
     assert done.metrics["delay_margin"] == table["delay_margin"].min()
     least, delay = done.metrics["gain_most"], done.metrics["delay_margin"]
-    assert f"gain margin {20.0 * math.log10(least):.3g} dB" in done.answer and f"{least:.3g} times" in done.answer
-    assert f"delay margin {1e3 * delay:.3g} ms" in done.answer and "stable at 0, 15 and 30 deg" in done.answer
-    assert f"settles in {1e3 * table['settling'].max():.3g} ms" in done.answer
-    assert done.tables[0].title == done.answer and str(done).startswith(done.answer)
+    assert f"gain margin {20.0 * math.log10(least):.3g} dB" in done.sentence and f"{least:.3g} times" in done.sentence
+    assert f"delay margin {1e3 * delay:.3g} ms" in done.sentence and "stable at 0, 15 and 30 deg" in done.sentence
+    assert f"settles in {1e3 * table['settling'].max():.3g} ms" in done.sentence
+    assert done.tables[0].title == done.sentence and str(done).startswith(done.sentence)
     assert list(done.figures) == ["bode", "step", "sensitivity", "locus"] and done.portrait is None
     assert known_of(done.findings, "gain_most", "delay_margin") == [("", "higher", 3), ("s", "higher", 3)]
 
@@ -49,7 +49,7 @@ def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> N
     done = analyse("simulate={controller: smc-tracking, gains: default, horizon: 0.5}", "analyse.over=k", out=tmp_path)
     assert done.run is not None
     text = (done.run.path / "README.md").read_text(encoding="utf-8")
-    assert text.index(done.answer) < text.index("figures/bode.png") < text.index("least factor")
+    assert text.index(done.sentence) < text.index("figures/bode.png") < text.index("least factor")
     assert columns_of(done.run, "data/margins.csv")["delay_margin"][0] == "s"
     assert set(columns_of(done.run, "data/response.csv")) == {
         "angle_deg", "frequency", "gain", "phase", "plant_gain", "plant_phase",
@@ -111,14 +111,14 @@ def test_over_a_gain_the_table_tells_its_values() -> None:
 
 def test_a_loop_that_feeds_nothing_back_says_so_and_shows_the_plant() -> None:
     done = analyse(ALONE)
-    assert "feeds nothing back" in done.answer and "UNSTABLE" not in done.answer and done.locus is None
+    assert "feeds nothing back" in done.sentence and "UNSTABLE" not in done.sentence and done.locus is None
     assert list(done.figures) == ["bode", "step"] and done.fault is None and math.isnan(done.metrics["gain_most"])
     assert "angle per torque" in done.figures["bode"].axes[0].get_title("left")
 
 
 def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault() -> None:
     done = analyse("simulate={gains: exchanged, horizon: 1.1}")
-    assert "smc/exchanged is UNSTABLE at 0, 15 and 30 deg" in done.answer and "stable up to" in done.answer
+    assert "smc/exchanged is UNSTABLE at 0, 15 and 30 deg" in done.sentence and "stable up to" in done.sentence
     assert done.fault is not None and done.fault.exit_code == 3 and "0, 15 and 30 deg" in done.fault.what
     assert math.isnan(done.metrics["delay_margin"]) and done.metrics["growth"] > 1e3
     assert "step" not in done.figures and done.figures["locus"].axes
@@ -128,14 +128,16 @@ def test_a_wrist_that_buckles_needs_some_gain_to_stay(caplog: pytest.LogCaptureF
     with caplog.at_level(logging.WARNING):
         done = analyse(PID, "wrist.hand_mass=0.9", STRAIGHT)
     assert done.fault is None and 0.0 < done.metrics["gain_least"] < 0.1 and "buckles" in caplog.text
-    assert ", and at 0.0" in done.answer
+    assert ", and at 0.0" in done.sentence
     alone = analyse("simulate={controller: feedforward, gains: default}", "wrist.hand_mass=0.9", STRAIGHT)
-    assert "and it is UNSTABLE" in alone.answer and alone.fault is not None
+    assert "and it is UNSTABLE" in alone.sentence and alone.fault is not None
 
 
 def test_behind_camera_and_tendons_it_is_said_for_which_swings_it_holds() -> None:
     done = analyse(CAMERA, "simulate={controller: smc-tracking, gains: stepper, horizon: 0.2}", STRAIGHT)
-    assert done.answer.endswith("for swings above 0.116 deg (a motor's microstep) and below 0.405 deg (a slack tendon)")
+    assert done.sentence.endswith(
+        "for swings above 0.116 deg (a motor's microstep) and below 0.405 deg (a slack tendon)"
+    )
     last = next(table for table in done.tables if table.title.startswith("Where linearisation"))
     assert "the camera's frames" in last.title
     told = {row[0]: row[1] for row in last.rows}
@@ -147,7 +149,9 @@ def test_behind_camera_and_tendons_it_is_said_for_which_swings_it_holds() -> Non
 def test_no_swing_is_linear_where_the_limits_cross() -> None:
     slow = "simulate.loop.plant={actuator: {step_acceleration: x0.2}}"
     done = analyse(CAMERA, slow, "simulate={controller: super-twisting, gains: stepper, horizon: 0.1}", STRAIGHT)
-    assert "no swing is linear, which it would be above 0.081 deg (friction that sticks) and below 0.02" in done.answer
+    assert (
+        "no swing is linear, which it would be above 0.081 deg (friction that sticks) and below 0.02" in done.sentence
+    )
 
 
 def test_angles_count_toward_the_direction_and_a_sine_ends_at_its_farthest() -> None:

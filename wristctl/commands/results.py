@@ -11,6 +11,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.config.study import Study
 from wristctl.errors import UserError
@@ -223,10 +224,14 @@ class StudyResult(ABC):
         return None
 
     @property
+    def answer(self) -> Answer | None:
+        """The answer for one screen; None where the tables are the answer."""
+        return None
+
+    @property
     def summary(self) -> Sequence[str]:
-        """Answer in a few lines of at most 100 columns; empty where the tables are the answer."""
-        answer = getattr(self, "answer", ())
-        return answer if isinstance(answer, list) else ()
+        """The answer in lines of at most 100 columns; empty where the tables are the answer."""
+        return self.answer.lines() if self.answer is not None else ()
 
     @property
     def marks(self) -> list[str]:

@@ -55,11 +55,11 @@ _CURVED = 0.05
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Analysed(StudyResult):
-    """One loop about each of its resting angles [deg]; `answer` is what it comes to."""
+    """One loop about each of its resting angles [deg]; `sentence` is what it comes to."""
 
     kind = "analyse"
 
-    answer: str
+    sentence: str
     angles: Sequence[float]
     found: Sequence[LoopAnalysis]
     """Analysis at each resting angle."""

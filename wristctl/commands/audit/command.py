@@ -39,7 +39,7 @@ class Audited(StudyResult):
     """Verdicts of each claim over the box of unknowns; empty where the study names no box."""
 
     @property
-    def answer(self) -> list[str]:
+    def summary(self) -> list[str]:
         """Verdicts on the paper's claims, in a few lines."""
         from wristctl.commands.audit.answer import answer_of
 

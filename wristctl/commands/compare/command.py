@@ -156,7 +156,7 @@ class Compared(StudyResult):
         return UserError(reason, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
 
     @property
-    def answer(self) -> list[str]:
+    def summary(self) -> list[str]:
         """Best row in each class of conditions, in words."""
         return answer_lines(self.standings)
 

@@ -122,7 +122,7 @@ class Studied(StudyResult):
 
     kind = "study"
 
-    answer: list[str]
+    sentences: list[str]
     """Law for each rig, gain of each term, and reliability of the order: lines of 100 columns."""
     rankings: dict[str, WorldRanking]
     """Rankings by family."""
@@ -131,6 +131,11 @@ class Studied(StudyResult):
     shifts: list[OrderShift]
     poisoned: list[Poisoned]
     """Units that failed on every worker: their rows are left out."""
+
+    @property
+    def summary(self) -> list[str]:
+        """`sentences`."""
+        return self.sentences
 
     @property
     def fault(self) -> UserError | None:

@@ -1,0 +1,34 @@
+"""The answer of a study for one screen: a sentence, a table, what follows from it, and where more is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wristctl.commands.printed_table import COLUMNS, Table, in_lines
+
+# Lines of a terminal that an answer may take.
+LINES = 24
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a study found, in the order in which a person reads it. Angles are in degrees."""
+
+    sentence: str
+    """The answer in one or two plain sentences."""
+    table: Table | None = None
+    """Figures behind the sentence, with units in the heads: at most COLUMNS wide."""
+    notes: Sequence[str] = ()
+    """What not to use and why, and what to do next: a paragraph each. Begun with `$ `, a command, which is not broken."""
+    more: str = ""
+    """Where more is."""
+
+    def lines(self) -> list[str]:
+        """The answer in lines of at most COLUMNS columns; a table and each paragraph stand apart by an empty line."""
+        blocks = [in_lines(self.sentence)]
+        if self.table is not None:
+            blocks.append(self.table.text(COLUMNS).split("\n"))
+        blocks += [[note[2:]] if note.startswith("$ ") else in_lines(note) for note in self.notes]
+        blocks += [in_lines(self.more)] * bool(self.more)
+        return [line for k, block in enumerate(blocks) for line in [*[""] * bool(k), *block]]
