@@ -20,7 +20,7 @@ class Answer:
     table: Table | None = None
     """Figures behind the sentence, with units in the heads: at most COLUMNS wide."""
     notes: Sequence[str] = ()
-    """What not to use and why, and what to do next: a paragraph each. Begun with `$ `, a command, which is not broken."""
+    """What not to use and why, and what to do next: a paragraph each; after `$ ` a command."""
     more: str = ""
     """Where more is."""
 
