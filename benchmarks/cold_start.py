@@ -22,7 +22,7 @@ STUDY = """\
 gen-data: {samples: 1000}
 train: {epochs: 20}
 tune: {controllers: [smc], candidates: 8, iterations: 2}
-compare: {rows: [{controller: smc, gains: initial}], inverses: [closed-form]}
+compare: {controllers: [{controller: smc, gains: initial}], inverses: [closed-form]}
 """
 COMMANDS: dict[str, list[str]] = {
     "--help": [],

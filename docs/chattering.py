@@ -28,10 +28,10 @@ RIG = {"control_period": 5e-3, "actuator": {"level": "tendon"}, "sensor": {"leve
 ON = {
     "exact": LOOPS["exact"],
     "sampled": LOOPS["sampled"],
-    "default": LOOPS["default"],
+    "four-segments": LOOPS["four-segments"],
     "camera": Loop.model_validate({"sensor": {"level": "camera"}}),
     "5 ms, lagged": Loop.model_validate({"control_period": 5e-3, "actuator": {"level": "lagged"}}),
-    "rig": Loop.model_validate(RIG),
+    "motors, tendons, camera": Loop.model_validate(RIG),
 }
 REFERENCES = (Reference(kind="step"), Reference(), Reference(kind="sine"))
 NEAR = 0.5, 1.1

@@ -27,9 +27,10 @@ HERE = Path(__file__).parent
 SCENARIOS = HERE.parent / "experiments" / "scenarios"
 WORLDS, SHEATHS = 40, (0.0, 1.0, 3.0)
 BEHIND_TENDONS = (
-    "ct-dob/stepper", "mpc/stepper", "smc-dob/stepper", "pid-dob/stepper", "pid-ff/stepper", "pd-ff/stepper",
-    "lqi/stepper", "adrc/stepper", "nn-mrac/stepper", "smc-tracking/camera", "super-twisting/stepper", "mrac/stepper",
-    "nc/stepper", "gvsc/default", "computed-torque/default", "smc/stepper", "feedforward/default",
+    "ct-dob/hardware", "mpc/hardware", "smc-dob/hardware", "pid-dob/hardware", "pid-ff/hardware", "pd-ff/hardware",
+    "lqi/hardware", "adrc/hardware", "nn-mrac/hardware", "smc-tracking/camera", "super-twisting/hardware",
+    "mrac/hardware",
+    "nc/hardware", "gvsc/default", "computed-torque/default", "smc/hardware", "feedforward/default",
 )  # fmt: skip
 AS_COMMANDED = (
     "ct-dob/default", "mpc/default", "smc-dob/default", "pid-dob/default", "pid-ff/default", "pd-ff/default",
@@ -37,7 +38,7 @@ AS_COMMANDED = (
     "nc/default", "gvsc/default", "computed-torque/default", "smc/exchanged", "pid/printed", "feedforward/default",
 )  # fmt: skip
 RANKED = {"ideal": AS_COMMANDED, "camera": BEHIND_TENDONS, "uneven": BEHIND_TENDONS, "steps": BEHIND_TENDONS}
-BEST, BESIDE = ("ct-dob/stepper", "mpc/stepper", "smc-dob/stepper", "pid-ff/stepper"), "smc-tracking/camera"
+BEST, BESIDE = ("ct-dob/hardware", "mpc/hardware", "smc-dob/hardware", "pid-ff/hardware"), "smc-tracking/camera"
 
 
 def _ranking(study: Study, family: str) -> list[str]:

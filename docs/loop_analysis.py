@@ -89,9 +89,9 @@ ROWS = (
     Judged("gvsc", "default", Loop()),
     Judged("computed-torque", "default", Loop(actuator=LAGGED)),
     Judged("computed-torque", "default", Loop(actuator=LAGGED, sensor=CAMERA)),
-    Judged("nc", "stepper", Loop(actuator=LAGGED, sensor=CAMERA)),
-    Judged("smc-tracking", "stepper", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA), 0.3),
-    Judged("super-twisting", "stepper", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA), 0.3),
+    Judged("nc", "hardware", Loop(actuator=LAGGED, sensor=CAMERA)),
+    Judged("smc-tracking", "hardware", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA), 0.3),
+    Judged("super-twisting", "hardware", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA), 0.3),
     Judged("smc", "initial", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA), 3.0),
 )
 

@@ -32,7 +32,7 @@ SPLITS = 10
 TIP_NOISE = 1e-4
 TARGETS = (15.0, 30.0)
 """Angles [deg] at whose tips, as measured, a trial is to end."""
-LAW = "rows=[{controller: pid-ff, gains: stepper}]"
+LAW = "controllers=[{controller: pid-ff, gains: hardware}]"
 HW_RUN = ("hw-run", "--optics", "latest:calibrate-camera", "--set", LAW, "--set", "directions=[ulnar, radial]")
 SINE = "reference={kind: two-sided-sine, angle_deg: 40, frequency: 0.2}"
 DAILY = "reference={kind: 'adl:all-deviation'}"

@@ -25,7 +25,7 @@ TASKS = (
     "all-deviation",
 )  # fmt: skip
 """Those within the wrist's range of +-50 deg: combing and every task in flexion are not."""
-LAWS = ("ct-dob/stepper", "pid-ff/stepper", "smc-tracking/camera", "smc/stepper", "feedforward/default")
+LAWS = ("ct-dob/hardware", "pid-ff/hardware", "smc-tracking/camera", "smc/hardware", "feedforward/default")
 BEGIN, END = "<!-- table by docs/motions.py -->\n", "<!-- end -->"
 HORIZON = 8.0
 

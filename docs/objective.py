@@ -24,7 +24,7 @@ from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
 
 HERE = Path(__file__).parent
-LAWS = {"smc-tracking": "camera", "pid-ff": "stepper", "ct-dob": "stepper"}
+LAWS = {"smc-tracking": "camera", "pid-ff": "hardware", "ct-dob": "hardware"}
 FAMILIES = ("ideal", "camera")
 GAINS, TUNED_ON, JUDGED_ON = 500, (8, 16), 24
 OBJECTIVES = {

@@ -65,8 +65,8 @@ def page(results: list[ComparedRow]) -> str:
 # The paper's gains on three loops
 
 Made by `python docs/pictures.py`; the angle is given directly (no network). Loops: `exact` is the model as its own
-plant, torque held for a microsecond, no limits; `sampled` the same at 1 kHz with 60 N tendons; `default` a four-segment
-plant under the one-segment model. An RMSE with {MARK} changes with the integration step, however short:
+plant, torque held for a microsecond, no limits; `sampled` the same at 1 kHz with 60 N tendons; `four-segments`
+a four-segment plant under the one-segment model. An RMSE with {MARK} changes with the integration step, however short:
 [convergence](convergence.md).
 
 {table(results)}
@@ -139,10 +139,10 @@ def main() -> None:
     camera()
     hysteresis()
     answer()
-    study = load_study([], [f"rows={ROWS}", "inverses=[none]"], "compare")
+    study = load_study([], [f"controllers={ROWS}", "inverses=[none]"], "compare")
     results = compare(study)
     shown = ("smc/exchanged", "smc/initial", "pid/printed", "computed-torque/default")
-    for loop in ("exact", "default"):
+    for loop in ("exact", "four-segments"):
         courses = [
             r.simulation.trajectory
             for r in results

@@ -22,7 +22,7 @@ from wristctl.control.table import CONTROLLERS
 
 HERE = Path(__file__).parent
 SEEDS, FEW, SHEATHS, WORKERS = 20, 3, (1.0, 3.0), 2
-DEFAULT = ("smc-tracking", "stepper")
+DEFAULT = ("smc-tracking", "hardware")
 BOUNDS = {"RMSE [rad]": 0.0015, "settling [s]": 1.0, "pushed: RMSE [rad]": 0.002}
 """Of the default trial's medians: springs 30 % weaker than believed, 30 deg in 1 s, pushed with 2 N."""
 
@@ -37,7 +37,7 @@ class Rig(NamedTuple):
 
 def allowed() -> list[tuple[str, str]]:
     """Laws with a preset for motors and a camera."""
-    return [(name, "stepper") for name, law in CONTROLLERS.items() if "stepper" in law.presets]
+    return [(name, "hardware") for name, law in CONTROLLERS.items() if "hardware" in law.presets]
 
 
 def tried(rig: Rig) -> dict[str, float] | str:

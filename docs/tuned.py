@@ -32,7 +32,7 @@ EXPERIMENTS = HERE.parent / "experiments"
 TEST_WORLDS = 240
 CHANCE = 0.05
 """That any tuned gains which are no worse are called so: of each row its share (Bonferroni)."""
-CONDITIONS = {"ideal": ("default", "exchanged", "printed"), "camera": ("stepper", "camera", "default")}
+CONDITIONS = {"ideal": ("default", "exchanged", "printed"), "camera": ("hardware", "camera", "default")}
 """The presets that a family is within the conditions of, the one for the hardest first; by family."""
 
 

@@ -37,7 +37,7 @@ compare:
   loops: {fast: {plant_segments: 1}}
   references: [{duration: 0.1}]
   inverses: [network]
-  rows: [{controller: pid, gains: tuned}]
+  controllers: [{controller: pid, gains: tuned}]
 simulate: {horizon: 0.2}
 """
 """As README's study, in a moment."""

@@ -239,7 +239,7 @@ def test_pages_give_the_models_error_at_60_newtons() -> None:
     assert done.unconverged.all() and left < 0.05
     told = re.search(rf"({_NUMBER}) rad\b", (ROOT / CORRECTED).read_text(encoding="utf-8"))
     assert told is not None and float(told[1]) == pytest.approx(rmse, rel=0.05)
-    table = cell("results.md", ["smc/exchanged"], "default, minimum jerk 1 s 30 deg").rstrip("*")
+    table = cell("results.md", ["smc/exchanged"], "four-segments, minimum jerk 1 s 30 deg").rstrip("*")
     assert float(table) == pytest.approx(rmse, rel=0.05)
     best = re.search(rf"({_NUMBER}) rad ideal", (DOCS / "best_case.md").read_text(encoding="utf-8"))
     longer = float(ran([DEFAULT], horizon=6.0).metrics["rmse"][0])

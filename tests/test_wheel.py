@@ -115,4 +115,4 @@ def test_an_installed_wristctl_makes_sealed_runs_of_the_same_code_as_the_clone(i
         each for each in code_state()[2].splitlines() if "/build/" not in each
     ]  # the firmware's compiler leaves some
     assert (run / "code.txt").read_text(encoding="utf-8").splitlines() == made
-    assert (tmp_path / "study" / "experiments" / "laws" / "lqr.py").is_file()
+    assert (tmp_path / "study" / "experiments" / "own_controllers" / "lqr.py").is_file()

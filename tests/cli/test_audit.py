@@ -74,7 +74,7 @@ def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, 
         assert judged[f"T2-{law}-settling"]["sampled_verdict"] == "not specified enough"
     assert judged["X-soft-springs-smc"]["sampled_verdict"] == "does not hold", "what was there before is no gain"
     shown = json.loads((run.path / "evidence.json").read_text())
-    assert list(shown)[:3] == ["exact", "sampled", "default"]
+    assert list(shown)[:3] == ["exact", "sampled", "four-segments"]
     assert all(open_run(each).kind == "compare" for each in shown.values())
     pictures = [each.relative_to(run.path).as_posix() for each in (tmp_path / "results").resolve().rglob("*.png")]
     assert pictures == ["figures/ledger.png"], "one; others are drawn when somebody asks for them"

@@ -88,7 +88,7 @@ def test_a_dry_run_says_which_values_a_leaf_may_have(call: Call) -> None:
 
 def test_a_dry_run_of_compare_counts_the_directions_too(call: Call) -> None:
     code, out, _ = call("compare", "--dry-run", "--set", "directions=[ulnar, radial, flexion, extension]",
-                        "--set", "inverses=[none]", "--set", "rows=[{controller: feedforward}]")  # fmt: skip
+                        "--set", "inverses=[none]", "--set", "controllers=[{controller: feedforward}]")  # fmt: skip
     assert code == 0 and "# 36 rollouts of 5 s\n" in out
 
 
@@ -102,7 +102,7 @@ def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call: Call) -> None
         "--set",
         search,
         "--set",
-        "rows=[{controller: smc, gains: tuned}]",
+        "controllers=[{controller: smc, gains: tuned}]",
     )
     assert code == 0 and "# a search first: 30 rollouts of 0.2 s for each of smc, pid\n" in out
 
@@ -114,7 +114,7 @@ def test_a_dry_run_counts_repetitions_where_they_can_differ(call: Call) -> None:
         ("simulate", f"loop={seen}", "# 8 rollouts of 5 s"),
         ("simulate", f"loop={one}", "# one rollout of 5 s"),
         ("compare", f"compare={{inverses: [none], loops: {{a: {one}, b: {seen}}}}}", "# 27 rollouts of 5 s"),
-        ("tune", f"loops={{default: {seen}}}", "# 38400 rollouts of 5 s for each of smc"),
+        ("tune", f"loops={{four-segments: {seen}}}", "# 38400 rollouts of 5 s for each of smc"),
     ):
         code, out, _ = call(command, "--dry-run", "--set", "repetitions=8", "--set", more)
         assert code == 0 and f"{said}\n" in out

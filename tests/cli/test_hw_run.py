@@ -36,7 +36,7 @@ HOMING = "homing={move: 1.0e-4, rest: 0.15, frames: 2, slack: 5.0e-4, let_go: 1.
 QUICK = (
     "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.5", "--set", "back=0.3",
     "--set", "reference={duration: 0.4, angle_deg: 10.0}", "--set", HOMING,
-    "--set", "rows=[{controller: smc-tracking, gains: stepper}]",
+    "--set", "controllers=[{controller: smc-tracking, gains: hardware}]",
 )  # fmt: skip
 
 
@@ -221,7 +221,7 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--set", "rows=[{controller: smc-trackin, gains: stepper}]"), "did you mean 'smc-tracking'?"),
+        (("--set", "controllers=[{controller: smc-trackin, gains: hardware}]"), "did you mean 'smc-tracking'?"),
         (("--set", "safety.late=0.2"), "must be below watchdog (0.1 s)"),
         (("--set", "safety.late=0.095"), "hw-run - fix: safety.late below 0.095, or a longer safety.watchdog"),
         ((*SLOW, "--set", "control_period=0.04"), "fix: control_period below 0.04, or safety.watchdog above 0.1"),
@@ -240,9 +240,9 @@ def test_what_the_user_got_wrong_is_one_line_before_anything_moves(
 
 
 def test_a_controller_that_is_none_is_told_by_its_row_before_there_is_a_run(call: Call) -> None:
-    rows = "rows=[{controller: smc-tracking, gains: stepper}, {controller: smcc}]"
+    rows = "controllers=[{controller: smc-tracking, gains: hardware}, {controller: smcc}]"
     code, _, err = call("hw-run", "--set", rows)
-    assert code == 2 and f"--set {rows}: hw-run.rows.1.controller" in err and not Path("results").exists()
+    assert code == 2 and f"--set {rows}: hw-run.controllers.1.controller" in err and not Path("results").exists()
 
 
 def _columns(run: Path, name: str) -> list[dict[str, str]]:

@@ -24,7 +24,8 @@ pytestmark = pytest.mark.skipif(not THOROUGH, reason="WRISTCTL_THOROUGH=1 (make 
 ROOT = Path(__file__).parents[2]
 TRIAL = (
     "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=1.0", "--set", "back=0.3",
-    "--set", "reference={duration: 0.8, angle_deg: 5.0}", "--set", "rows=[{controller: smc-tracking, gains: stepper}]",
+    "--set", "reference={duration: 0.8, angle_deg: 5.0}",
+    "--set", "controllers=[{controller: smc-tracking, gains: hardware}]",
     "--set", "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}",
 )  # fmt: skip
 PATIENT = (

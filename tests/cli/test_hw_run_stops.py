@@ -36,7 +36,7 @@ STAGGER = 0.02
 TRIAL = (
     "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.6", "--set", "back=0.2",
     "--set", "rest=0.1", "--set", "reference={duration: 0.5, angle_deg: 20.0}",
-    "--set", "rows=[{controller: smc-tracking, gains: stepper}]", "--set", "bench.motors.slack=[0, 0, 0, 0]",
+    "--set", "controllers=[{controller: smc-tracking, gains: hardware}]", "--set", "bench.motors.slack=[0, 0, 0, 0]",
     "--set", "homing={frames: 1, rest: 0.1, let_go: 1.0}", "--set", "bench.person.takes=0.5",
 )  # fmt: skip
 RAMP = {"STOP": 1.0 / 50_000, "life": 1.0 / 50_000, "reset": 0.0}

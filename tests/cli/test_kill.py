@@ -33,7 +33,7 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     "simulate": (("--set", "horizon=0.5"),),
     "analyse": (("--controller", "gvsc", "--gains", "default"),),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
-    "study": (("scenarios/ideal", "--set", "laws=[pd-ff]", "--set", f"budgets.small={BUDGET}"),),
+    "study": (("scenarios/ideal", "--set", "controllers=[pd-ff]", "--set", f"budgets.small={BUDGET}"),),
     "hysteresis": (LOOPS,),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip

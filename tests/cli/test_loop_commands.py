@@ -29,7 +29,7 @@ TUNE = (
 )  # fmt: skip
 COMPARE = (
     "compare", *LOOP, "--set", "inverses=[none, closed-form]", "--set", f"references=[{MOVE % 30}, {{kind: step}}]",
-    "--set", "rows=[{controller: smc, gains: exchanged}, {controller: computed-torque, gains: default}]",
+    "--set", "controllers=[{controller: smc, gains: exchanged}, {controller: computed-torque, gains: default}]",
 )  # fmt: skip
 
 
@@ -98,7 +98,7 @@ def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     best = tuned.data("finalists-smc").iloc[0]
     assert {name: best[name] for name in gains["smc"]} == gains["smc"] and len(history) == 12
     assert best["objective"] == best["validated"] <= history["objective"].min()  # nothing is random here
-    code, out, _ = call(*COMPARE, "--set", "rows=[{controller: pid, gains: tuned}]", "--tuned", "latest:tune")
+    code, out, _ = call(*COMPARE, "--set", "controllers=[{controller: pid, gains: tuned}]", "--tuned", "latest:tune")
     assert code == 0 and "1. pid" in out
     compared = open_run("latest:compare")
     assert [entry["run"] for entry in compared.manifest.model_dump()["inputs"]] == [tuned.id]
@@ -147,8 +147,8 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> 
         (("analyse", "--gains", "initial", "--set", "wrist.tension_limit=3.0"), "in a tendon that bears 3"),
         (("tune", "--set", "controllers=[feedforward]"), "no gains to tune"),
         (("tune", "--set", "optimiser=differential-evolution", "--candidates", "2"), "at least 3 candidates, not 2"),
-        (("tune", "--set", "scenarios=[{loop: defalt}]"), "did you mean 'default'?"),
-        (("compare", "--set", "rows=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
+        (("tune", "--set", "scenarios=[{loop: four-segmets}]"), "did you mean 'four-segments'?"),
+        (("compare", "--set", "controllers=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
         (("compare",), "--network RUN"),
     ],
 )
@@ -166,7 +166,7 @@ def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call: Call
     rows = (
         ("--gains", "tuned")
         if command in ("simulate", "analyse")
-        else ("--set", "rows=[{controller: smc, gains: tuned}]")
+        else ("--set", "controllers=[{controller: smc, gains: tuned}]")
     )
     code, _, err = call(command, *rows)
     assert code == 2 and "no tuned gains of smc" in err and "--tuned RUN" in err and not list(tmp_path.iterdir())
@@ -186,7 +186,7 @@ def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call
     low, high = known["interval"]
     assert every["rmse"].min() <= low < known["value"] < high <= every["rmse"].max()
 
-    rows = "rows=[{controller: smc-tracking, gains: camera}]"
+    rows = "controllers=[{controller: smc-tracking, gains: camera}]"
     code, out, _ = call("compare", "--horizon", "0.3", *CAMERA, f"loops={{seen: {{{loop[6:]}}}", "--set", rows,
                         "--set", "references=[{duration: 0.2}]", "--set", "inverses=[none]", "--all")  # fmt: skip
     run = open_run("latest:compare")
@@ -245,10 +245,10 @@ def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
     name = "judged camera: step 30 deg, ulnar"
     assert open_run("latest:simulate").manifest.streams == {name: stream(3, name)}
     call("compare", "--horizon", "0.1", "--set", "loops={a: {plant_segments: 1, plant: {stiffness_spread: 0.1}}}",
-         "--set", "rows=[{controller: smc, gains: exchanged}]", "--set", "inverses=[none]")  # fmt: skip
+         "--set", "controllers=[{controller: smc, gains: exchanged}]", "--set", "inverses=[none]")  # fmt: skip
     assert set(open_run("latest:compare").manifest.streams) == {"judged plant"}
     call("tune", "--set", "controllers=[smc]", "--set", "horizon=0.1", "--set", "candidates=2", "--set", "iterations=1",
-         "--set", f"loops={{default: {seen}}}")  # fmt: skip
+         "--set", f"loops={{four-segments: {seen}}}")  # fmt: skip
     drawn = open_run("latest:tune").manifest.streams
     assert "search smc" in drawn and any(each.startswith("tuning camera: ") for each in drawn)
 
@@ -277,7 +277,7 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
     assert "decades beside feedforward" in out and "found by" in out
     tuned = open_run("latest:tune")
     assert len(tuned.data("history-ct-dob")) == 24 and tuned.config.families["soft"].about == "springs"
-    rows = "rows=[{controller: ct-dob, gains: tuned}, {controller: pd-ff}]"
+    rows = "controllers=[{controller: ct-dob, gains: tuned}, {controller: pd-ff}]"
     code, out, err = call(
         "compare", *SOFT, "--set", "worlds={family: soft, draws: 12}", "--set", rows, "--tuned", tuned.id
     )
@@ -327,7 +327,7 @@ def test_worlds_that_cannot_be_drawn_are_said(call: Call, arguments: tuple[str, 
 
 def test_where_every_law_fails_or_swings_the_answer_says_so_and_the_table_stays(call: Call) -> None:
     wild = "families={wild: {loop: {disturbances: {load: 30.0}}, horizon: 1.5}}"
-    rows = "rows=[{controller: pd-ff}, {controller: feedforward}]"
+    rows = "controllers=[{controller: pd-ff}, {controller: feedforward}]"
     hard = ("--set", wild, "--set", "worlds={family: wild, draws: 8}", "--set", rows)
     code, out, _ = call("compare", *hard)
     assert "nothing has a place" in out and "fails: pd-ff, feedforward" in out and code == 3

@@ -68,7 +68,7 @@ def test_a_repetition_is_identical_to_the_byte(wristctl: Command, data: str) -> 
 
 
 LOOP = ("--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.4")
-ROW = "rows=[{controller: smc, gains: tuned}, {controller: feedforward, gains: default}]"
+ROW = "controllers=[{controller: smc, gains: tuned}, {controller: feedforward, gains: default}]"
 SEARCH = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
 CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
 CHAIN = (

@@ -19,7 +19,7 @@ from wristctl.records import open_run
 COMPARE = (
     "compare", "--set", "loops={fast: {plant_segments: 1}}", "--set", "horizon=0.4", "--set", "inverses=[none]",
     "--set", "references=[{kind: minimum-jerk, duration: 0.2}, {kind: step, angle_deg: 10}]",
-    "--set", "rows=[{controller: computed-torque}, {controller: feedforward}]", "--label", "small",
+    "--set", "controllers=[{controller: computed-torque}, {controller: feedforward}]", "--label", "small",
 )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ SMALL = (
     "tune={controllers: [smc, pid], candidates: 2, iterations: 2, horizon: 0.3, loops: {fast: {plant_segments: 1}}, "
     "scenarios: [{loop: fast, reference: {kind: step, angle_deg: 20.0}}]}",
     "compare={horizon: 0.3, loops: {fast: {plant_segments: 1}}, references: [{duration: 0.2}], inverses: [network], "
-    "rows: [{controller: smc, gains: tuned}, {controller: feedforward}]}",
+    "controllers: [{controller: smc, gains: tuned}, {controller: feedforward}]}",
     "simulate={horizon: 0.3, gains: tuned, loop: {plant_segments: 1}, reference: {duration: 0.2, inverse: network}}",
     "hysteresis={ranges_deg: [[0.0, 10.0]], frequencies: [2.0, 5.0], sheaths: [1.0], angles_deg: [5.0], ramp: 0.2}",
     "audit={horizon: 0.1, claims: [{id: C2, says: a sign, evidence: text, verdict: contradicted, reason: by hand}, "

@@ -65,7 +65,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 def trials(tmp_path: Path) -> Run:
     """One trial of the paper's law on the emulated rig."""
-    row = {"controller": "smc", "gains": "stepper", "outcome": "ok", "push": 0.0, "rmse": 2.5}
+    row = {"controller": "smc", "gains": "hardware", "outcome": "ok", "push": 0.0, "rmse": 2.5}
     with start_run("hw-run", wristctl.load_study(None), "", tmp_path) as live:
         live.table("data/trials.csv", pd.DataFrame([row]))
     return Run(live.path)
@@ -134,7 +134,7 @@ def test_trials_judge_the_experiment_and_say_that_the_rig_was_emulated(tmp_path:
     done = audit(CLAIMS, hardware=trials(tmp_path))
     (found,) = [j for j in done.judgements if j.claim.id == "H"]
     assert found.verdict == "reproduced" and found.found[""].mark == "emulated"
-    assert found.reason == "needs a rig; mean of 1 trials of smc/stepper on an emulated rig"
+    assert found.reason == "needs a rig; mean of 1 trials of smc/hardware on an emulated rig"
 
 
 def test_each_loop_is_compared_once_with_what_claims_ask_for(asked: list[Any]) -> None:

@@ -72,16 +72,16 @@ def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
     assert "(a guess of ours) on all loops" in everywhere and "(a guess of ours) on no loop" in nowhere
     assert "its PID with the printed gains on all loops" in everywhere
     assert "its PID with the printed gains on no loop" in nowhere
-    some = said({"exact": there, "sampled": loop({"smc/printed": 1.0}, {}), "default": away})
+    some = said({"exact": there, "sampled": loop({"smc/printed": 1.0}, {}), "four-segments": away})
     assert "(SMC) with the printed gains on exact alone" in some
     assert "(a guess of ours) on exact and sampled" in some
 
 
 def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_strength_it_says_so() -> None:
     off = dict.fromkeys(NOTHING, 0.5)
-    mixed = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, {}), "default": loop({}, off)})
+    mixed = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, {}), "four-segments": loop({}, off)})
     assert "for SMC as printed on exact and sampled (on exact with tensions that no tendon" in mixed
-    alone = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, off), "default": loop({}, off)})
+    alone = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, off), "four-segments": loop({}, off)})
     assert "for PID as printed on exact alone (with tensions that no tendon" in alone
     sound = said(dict.fromkeys(LOOPS, loop({}, {})))
     assert "for PID as printed on all loops." in sound and "no tendon" not in sound
@@ -95,12 +95,12 @@ def test_the_ranking_is_that_of_the_numbers() -> None:
     )
     assert "cannot be judged" in said(printed) and "it holds on all loops." in said(printed)
     turned = loop({}, {"pid/printed": 1e-5})
-    found = said({**printed, "default": turned})
+    found = said({**printed, "four-segments": turned})
     assert "as printed on exact and sampled; with" in found and "it holds on exact and sampled." in found
     one_link = loop({}, {"gvsc/default": 0.09})
     assert "it holds on no loop." in said(dict.fromkeys(LOOPS, one_link)), "GVSC above NC alone breaks it"
     alike = said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": 1.5e-3})))
-    assert "as printed on no loop, as much as it on exact, sampled and default" in alike
+    assert "as printed on no loop, as much as it on exact, sampled and four-segments" in alike
 
 
 def test_the_networks_are_told_by_the_ways_to_train_them() -> None:
@@ -176,7 +176,7 @@ def test_what_the_box_says_comes_with_what_must_be_known_of_it() -> None:
 def test_with_a_box_the_screen_still_says_what_cannot_be_told_and_what_is_contradicted() -> None:
     strips = [strip("arrival", label, 0.615, 17) for label in ROWS[:3]]
     strips += [strip("together", "smc/exchanged", 0.02, 9), strip("together", "pid/printed", 0.0, 12)]
-    mixed = {"exact": loop({"smc/printed": 1.0}, {}, 1e5), "sampled": loop({}, {}), "default": loop(NOTHING, {})}
+    mixed = {"exact": loop({"smc/printed": 1.0}, {}, 1e5), "sampled": loop({}, {}), "four-segments": loop(NOTHING, {})}
     found = said(mixed, trained(dead=set(CELLS)), strips)
     places = [
         found.index(each) for each in ("are reached", "RMSE comes out", "Cannot be told", "Contradicted", "Of 200")

@@ -20,13 +20,12 @@ def test_what_arrives_in_an_audit_arrives_in_a_comparison(monkeypatch: pytest.Mo
     audited = wristctl.audit(wristctl.load_study(None, f"audit={{horizon: 3.0, claims: [{CLAIMS}]}}"))
     rows = ", ".join(f"{{controller: {a}, gains: {b}}}" for a, b in (label.split("/") for label in ROWS))
     moves = "[{duration: 1.0}, {duration: 2.0}]"
-    study = (
-        f"compare={{rows: [{rows}], loops: {{sampled: {{}}, default: {{}}}}, references: {moves}, inverses: [none], "
-    )
+    loops = "{sampled: {}, four-segments: {}}"
+    study = f"compare={{controllers: [{rows}], loops: {loops}, references: {moves}, inverses: [none], "
     compared = wristctl.compare(wristctl.load_study(None, f"{study}horizon: 3.0}}"))
     verdicts = set()
     for judged in audited.judgements:
-        assert set(judged.found) == {"sampled", "default"}
+        assert set(judged.found) == {"sampled", "four-segments"}
         for loop, finding in judged.found.items():
             own = [each for each in compared.rows if (each.label, each.loop) == (judged.claim.label, loop)]
             there = [each.repeated.arrives for each in own]

@@ -24,7 +24,7 @@ from wristctl.records.manifest import read_overview
 from wristctl.simulation.metrics import METRICS
 
 MOVE, STEP = "minimum jerk 1 s 30 deg", "step 30 deg"
-ROWS = "rows: [{controller: pid, gains: printed}, {controller: feedforward}]"
+ROWS = "controllers: [{controller: pid, gains: printed}, {controller: feedforward}]"
 Compare = Callable[..., Compared]
 
 
@@ -176,10 +176,12 @@ def test_a_plan_counts_rollouts_and_names_the_row_that_cannot_be() -> None:
     study = wristctl.load_study(None, f"compare={{{two}, {ROWS}}}")
     references = len(study.compare.references)
     assert COMPARE.plan(study, Inputs()) == f"{2 * 2 * references} rollouts of 2.5 s"
-    wrong = wristctl.load_study(None, "compare.rows=[{controller: feedforward}, {controller: pid, gains: tuned}]")
+    wrong = wristctl.load_study(
+        None, "compare.controllers=[{controller: feedforward}, {controller: pid, gains: tuned}]"
+    )
     with pytest.raises(UserError) as caught:
         COMPARE.plan(wrong, Inputs())
-    assert caught.value.what == "no tuned gains of pid" and "compare.rows.1.gains" in str(caught.value)
+    assert caught.value.what == "no tuned gains of pid" and "compare.controllers.1.gains" in str(caught.value)
 
 
 def test_gains_that_a_search_of_the_comparison_itself_finds_are_not_asked_for() -> None:
@@ -188,7 +190,7 @@ def test_gains_that_a_search_of_the_comparison_itself_finds_are_not_asked_for() 
         "loops: {slow: {plant_segments: 2}}, scenarios: [{loop: slow, reference: {kind: step, angle_deg: 7.0}}]}"
     )
     study, other = (
-        wristctl.load_study(None, f"compare={{rows: [{{controller: {name}, gains: tuned}}], {tuning}}}")
+        wristctl.load_study(None, f"compare={{controllers: [{{controller: {name}, gains: tuned}}], {tuning}}}")
         for name in ("pid", "smc")
     )
     planned = COMPARE.plan(study, Inputs()).splitlines()

@@ -33,7 +33,7 @@ families:
     references: [{duration: 0.3}, {kind: sine, frequency: 1.0}]
     horizon: 1.0
 study:
-  laws: [pd-ff, pid-ff]
+  controllers: [pd-ff, pid-ff]
   presets: [{controller: feedforward}]
   terms: {feedback: [feedforward/default, pd-ff/tuned], an integral: [pd-ff/tuned, pid-ff/tuned]}
   variants:
@@ -192,8 +192,8 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
     "override, told",
     [
         ("study.families=[rigs]", r"unknown family of worlds 'rigs' - study.families - fix: did you mean 'rig'"),
-        ("study.laws=[pd-ff, feedforward]", r"feedforward has no gains to tune - study.laws.1"),
-        ("study.laws=[pd-ff, pd-ff]", r"pd-ff is among the laws twice"),
+        ("study.controllers=[pd-ff, feedforward]", r"feedforward has no gains to tune - study.controllers.1"),
+        ("study.controllers=[pd-ff, pd-ff]", r"pd-ff is named twice"),
         ("study.budget=ful", r"unknown budget 'ful' - study.budget - fix: one of small"),
         ("study.presets=[{controller: smc, gains: tuned}]", r"no tuned gains of smc - study.presets.0"),
         ("study.terms={x: [pd-ff/tuned, pid-ff/tunes]}", r"no row 'pid-ff/tunes' is judged - study.terms.x - fix: did"),

@@ -23,7 +23,7 @@ from wristctl.records import start_run
 from wristctl.simulation.repetitions import Simulation
 from wristctl.trial.trials import Trial
 
-ROWS = "rows: [{controller: smc, gains: printed}, {controller: pid, gains: printed}]"
+ROWS = "controllers: [{controller: smc, gains: printed}, {controller: pid, gains: printed}]"
 FACTS = [
     ("ulnar", 0.0, "smc", "ok"), ("radial", 0.0, "smc", "ok"), ("ulnar", 0.0, "smc", "stopped"),
     ("ulnar", 5.0, "smc", "ok"), ("ulnar", 0.0, "pid", "ok"), ("ulnar", 0.0, "smc", "ok"),
@@ -148,7 +148,7 @@ def test_one_row_of_controllers_needs_no_name_in_its_metrics(tmp_path: Path, ask
     with pytest.MonkeyPatch.context() as during:
         alone = trials()[lambda table: table["controller"] == "smc"]
         during.setitem(globals(), "trials", lambda: alone)
-        _, findings, _ = tables(tmp_path, "rows: [{controller: smc, gains: printed}]")
+        _, findings, _ = tables(tmp_path, "controllers: [{controller: smc, gains: printed}]")
     assert {"rmse", "pushed_rmse", "pushed_recovery"} <= set(findings.metrics) and "recovery" not in findings.metrics
 
 

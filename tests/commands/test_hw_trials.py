@@ -32,7 +32,7 @@ from wristctl.wrist.directions import ACTIVE
 
 SETTINGS = (
     "seed=4", "hw-run={directions: [ulnar], horizon: 1.0, control_period: 0.01, push: {force: 0.0}, repetitions: 3, "
-    "reference: {duration: 0.5, angle_deg: 5.5432}, rows: [{controller: pid, gains: printed}]}",
+    "reference: {duration: 0.5, angle_deg: 5.5432}, controllers: [{controller: pid, gains: printed}]}",
 )  # fmt: skip
 LATE = [1e-3 * k for k in range(101)]
 

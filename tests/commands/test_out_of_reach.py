@@ -118,7 +118,7 @@ def test_gains_are_not_searched_where_none_can_help() -> None:
 def test_a_loop_beyond_its_tendons_is_warned_of_before_and_no_gains_are_advised(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    once = repeated("ct-dob/stepper")
+    once = repeated("ct-dob/hardware")
     course = once.first.trajectory
     half = replace(course, theta=0.5 * course.theta)
     short = replace(once, first=replace(once.first, trajectory=half))

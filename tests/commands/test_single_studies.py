@@ -41,7 +41,7 @@ def test_an_audit_compares_in_memory_too_and_says_where_it_is_shown(
     monkeypatch.chdir(tmp_path)
     claim = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
     audited = wristctl.audit(wristctl.load_study(None, f"audit={{horizon: 0.02, claims: [{claim}]}}"))
-    assert set(audited.comparisons) == {"exact", "sampled", "default"} and not list(tmp_path.iterdir())
+    assert set(audited.comparisons) == {"exact", "sampled", "four-segments"} and not list(tmp_path.iterdir())
     (judged,) = audited.judgements
     lows = {loop: each.frame()["rmse"][1:].min() for loop, each in audited.comparisons.items()}
     assert {loop: found.low for loop, found in judged.found.items()} == lows
@@ -54,11 +54,12 @@ def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
         "loops": "{fast: {plant_segments: 1}, two: {plant_segments: 1, control_period: 2.0e-3}}",
         "references": "[{duration: 0.01}, {kind: step, angle_deg: 5.0}]",
         "inverses": "[none, exact]",
-        "rows": "[{controller: pid, gains: printed}, {controller: smc, gains: printed}, {controller: feedforward}]",
+        "controllers": "[{controller: pid, gains: printed}, {controller: smc, gains: printed}, "
+        "{controller: feedforward}]",
     }
     one = {
         "directions": "[radial]", "loops": "{fast: {plant_segments: 1}}", "references": "[{duration: 0.01}]",
-        "inverses": "[none]", "rows": "[{controller: feedforward}]",
+        "inverses": "[none]", "controllers": "[{controller: feedforward}]",
     }  # fmt: skip
     for left_out in (*axes, ""):
         chosen = ", ".join(f"{name}: {one[name] if name == left_out else several}" for name, several in axes.items())

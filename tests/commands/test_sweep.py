@@ -17,7 +17,7 @@ from wristctl.simulation import swept_loops
 from wristctl.simulation.oscillation import LIMIT_CYCLE
 
 FAST = (
-    "simulate.controller=pid-ff", "simulate.gains=stepper", "simulate.loop.plant_segments=1", "simulate.horizon=0.6",
+    "simulate.controller=pid-ff", "simulate.gains=hardware", "simulate.loop.plant_segments=1", "simulate.horizon=0.6",
     "simulate.reference.duration=0.3",
 )  # fmt: skip
 CAMERA = ("simulate.loop.sensor.level=camera", "simulate.loop.control_period=5e-3", "simulate.repetitions=2")
@@ -167,7 +167,7 @@ def test_a_search_and_a_comparison_are_done_at_every_point() -> None:
     base = wristctl.load_study(
         None, "tune.controllers=[pd-ff]", "tune.candidates=2", "tune.horizon=0.3",
         "tune.loops={fast: {plant_segments: 1}}", "tune.scenarios=[{loop: fast, reference: {duration: 0.2}}]",
-        "compare.rows=[{controller: pd-ff}]", "compare.loops={fast: {plant_segments: 1}}", "compare.horizon=0.3",
+        "compare.controllers=[{controller: pd-ff}]", "compare.loops={fast: {plant_segments: 1}}", "compare.horizon=0.3",
         "compare.references=[{duration: 0.2}]", "compare.inverses=[none]",
     )  # fmt: skip
     tuned = wristctl.tune(swept(base, "tune.iterations=1,4")).frame()

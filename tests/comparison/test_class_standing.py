@@ -26,7 +26,7 @@ RIG = {"actuator": {"level": "tendon"}, "sensor": {"level": "camera"}}
     [
         (LOOPS["exact"], "ideal"),
         (LOOPS["sampled"], "sampled"),
-        (LOOPS["default"], "sampled"),
+        (LOOPS["four-segments"], "sampled"),
         (Loop(plant_segments=1, limits=False), "sampled"),
         (Loop(plant_segments=1, control_period=1e-6), "sampled"),
         (Loop(plant_segments=4, limits=False, control_period=1e-6), "sampled"),

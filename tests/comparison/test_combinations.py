@@ -25,8 +25,9 @@ def study(*settings: str) -> Study:
 
 
 BOTH = (
-    f"rows=[{SOFTER}, {SMC}, {PID}]", "loops={four: {}, one: {plant_segments: 1}}", "inverses=[closed-form, none]",
-    "references=[{kind: step, angle_deg: 10}, {duration: 0.1}]", "directions=[flexion, radial]",
+    f"controllers=[{SOFTER}, {SMC}, {PID}]", "loops={four: {}, one: {plant_segments: 1}}",
+    "inverses=[closed-form, none]", "references=[{kind: step, angle_deg: 10}, {duration: 0.1}]",
+    "directions=[flexion, radial]",
 )  # fmt: skip
 
 
@@ -64,7 +65,7 @@ def test_each_row_is_the_closed_loop_of_its_own_settings(both: list[ComparedRow]
 
 def test_the_number_of_rollouts_counts_repetitions_only_where_something_is_drawn() -> None:
     assert count_rollouts(study(*BOTH).compare) == 3 * 2 * 2 * 2 * 2
-    drawn = study(f"loops={{still: {{}}, drawn: {DRAWN}}}", "repetitions=7", f"rows=[{PID}, {SMC}]",
+    drawn = study(f"loops={{still: {{}}, drawn: {DRAWN}}}", "repetitions=7", f"controllers=[{PID}, {SMC}]",
                   "inverses=[none]", "references=[{}, {kind: step}, {duration: 2.0}]")  # fmt: skip
     assert count_rollouts(drawn.compare) == 2 * 3 * (1 + 7)
 
@@ -96,7 +97,7 @@ def test_a_loops_own_period_samples_its_references() -> None:
 
 
 def test_repetitions_meet_another_plant_each_and_the_same_for_every_row() -> None:
-    drawn = study(f"loops={{drawn: {DRAWN}}}", "repetitions=3", f"rows=[{PID}, {SOFTER}]",
+    drawn = study(f"loops={{drawn: {DRAWN}}}", "repetitions=3", f"controllers=[{PID}, {SOFTER}]",
                   "inverses=[none, closed-form]", "references=[{duration: 0.1}]")  # fmt: skip
     found = compare(drawn)
     assert len(found) == 4 and all(len(set(row.repeated.metrics["rmse"])) == 3 for row in found)
@@ -108,7 +109,7 @@ def test_repetitions_meet_another_plant_each_and_the_same_for_every_row() -> Non
 
 def test_progress_goes_from_nothing_to_all_in_shares_of_the_whole() -> None:
     seen: list[float] = []
-    compare(study("loops={one: {plant_segments: 1}, other: {}}", f"rows=[{PID}, {SMC}]", "inverses=[none]"),
+    compare(study("loops={one: {plant_segments: 1}, other: {}}", f"controllers=[{PID}, {SMC}]", "inverses=[none]"),
             progress=seen.append)  # fmt: skip
     assert seen == sorted(seen) and seen[-1] == pytest.approx(1.0) and 0.0 <= seen[0] <= 0.25
     assert {0.25, 0.5, 0.75, 1.0} <= {round(each, 9) for each in seen}, "two loops by two controllers"
@@ -131,13 +132,13 @@ def test_a_network_and_tuned_gains_are_asked_for_before_anything_runs() -> None:
     seen: list[float] = []
     with pytest.raises(UserError, match="network"):
         compare(study("inverses=[none, network]"), progress=seen.append)
-    tuned = study("rows=[{controller: pid, gains: tuned}]", "inverses=[none]", "loops={one: {plant_segments: 1}}",
-                  "references=[{duration: 0.1}]")  # fmt: skip
+    tuned = study("controllers=[{controller: pid, gains: tuned}]", "inverses=[none]",
+                  "loops={one: {plant_segments: 1}}", "references=[{duration: 0.1}]")  # fmt: skip
     with pytest.raises(UserError, match="no tuned gains of pid"):
         compare(tuned, progress=seen.append)
     assert not seen
     found = compare(tuned, tuned={"pid": {"Kp": 30.0, "Ki": 10.0, "Kd": 0.5}})
-    given = compare(study(f"rows=[{PID}]", "inverses=[none]", "loops={one: {plant_segments: 1}}",
+    given = compare(study(f"controllers=[{PID}]", "inverses=[none]", "loops={one: {plant_segments: 1}}",
                           "references=[{duration: 0.1}]"))  # fmt: skip
     assert found[0].label == "pid/tuned" and found[0].simulation.metrics == given[0].simulation.metrics
 

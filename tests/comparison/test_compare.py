@@ -30,7 +30,7 @@ SOFT: dict[str, object] = {"plant": {"stiffness_scale": 0.8}}
 
 
 def results(rows: str) -> list[ComparedRow]:
-    return compare(load_study([], [*SETTINGS, f"rows={rows}"], "compare"))
+    return compare(load_study([], [*SETTINGS, f"controllers={rows}"], "compare"))
 
 
 def test_rows_come_in_the_studys_order_and_do_not_depend_on_it() -> None:

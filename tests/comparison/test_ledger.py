@@ -56,9 +56,9 @@ def test_each_loop_has_its_own_verdict_and_where_they_differ_the_loop_decides() 
     holds, fails, precise = moves(1.5, 5.0), moves(10.0, np.nan), moves(1e-6, 1e-6)
     both = judge(claim(reason="C5"), grounds({"exact": holds, "sampled": holds}))
     assert both.verdict == "reproduced" and both.shown_by == ("exact", "sampled") and both.reason == "C5"
-    found = judge(claim(), grounds({"exact": holds, "sampled": fails, "default": precise}))
+    found = judge(claim(), grounds({"exact": holds, "sampled": fails, "four-segments": precise}))
     assert {loop: each.verdict for loop, each in found.found.items()} == {
-        "exact": "reproduced", "sampled": WORSE, "default": BETTER,
+        "exact": "reproduced", "sampled": WORSE, "four-segments": BETTER,
     }  # fmt: skip
     assert found.verdict == OPEN and found.reason == "the loop decides"
     assert (found.found["sampled"].low, found.found["sampled"].high) == (10.0, 10.0)
@@ -81,9 +81,9 @@ def test_what_the_equations_as_they_stand_do_not_give_they_contradict() -> None:
 
 
 def test_what_fails_on_every_loop_is_one_verdict() -> None:
-    found = judge(claim(derived=True), grounds({"exact": moves(9.0, 9.0), "default": moves(9.0, 9.0)}))
+    found = judge(claim(derived=True), grounds({"exact": moves(9.0, 9.0), "four-segments": moves(9.0, 9.0)}))
     assert found.verdict == "contradicted" and "the loop decides" not in found.reason
-    one = judge(claim(derived=True), grounds({"exact": moves(9.0, 9.0), "default": moves(2.0, 2.0)}))
+    one = judge(claim(derived=True), grounds({"exact": moves(9.0, 9.0), "four-segments": moves(2.0, 2.0)}))
     assert one.verdict == OPEN and one.reason.startswith("the loop decides")
 
 
@@ -132,9 +132,9 @@ def test_a_statement_is_judged_by_its_parts() -> None:
 
 def test_parts_on_loops_are_judged_loop_by_loop() -> None:
     parts = [claim(2.0, id="A", part_of="W"), claim(9.0, id="B", part_of="W")]
-    shown = grounds({"exact": moves(2.0, 2.0), "default": moves(50.0, 50.0)})
+    shown = grounds({"exact": moves(2.0, 2.0), "four-segments": moves(50.0, 50.0)})
     (whole, *_) = judge_all([claim(None, id="W", evidence="parts"), *parts], shown)
-    assert {loop: each.verdict for loop, each in whole.found.items()} == {"exact": OPEN, "default": WORSE}
+    assert {loop: each.verdict for loop, each in whole.found.items()} == {"exact": OPEN, "four-segments": WORSE}
     assert whole.verdict == OPEN
 
 
@@ -179,15 +179,15 @@ def test_settling_counts_from_the_end_of_each_motion() -> None:
 def test_soft_springs_are_judged_by_what_they_add() -> None:
     """An error that is there with stiff springs too is none of theirs."""
     asked = claim(0.157, stiffness_scale=0.7)
-    loops = {("default", 1.0): moves(0.11, 0.11), ("default", 0.7): moves(0.12, 0.12)}
-    assert judge(asked, Grounds(loops)).found["default"].verdict == FAILS, "they explain too little, not better"
-    loops[("default", 0.7)] = moves(0.11 + 0.157, 0.11 + 0.157)
-    assert judge(asked, Grounds(loops)).found["default"].verdict == "reproduced"
-    loops[("default", 0.7)] = moves(0.9, 0.9)
+    loops = {("four-segments", 1.0): moves(0.11, 0.11), ("four-segments", 0.7): moves(0.12, 0.12)}
+    assert judge(asked, Grounds(loops)).found["four-segments"].verdict == FAILS, "they explain too little, not better"
+    loops[("four-segments", 0.7)] = moves(0.11 + 0.157, 0.11 + 0.157)
+    assert judge(asked, Grounds(loops)).found["four-segments"].verdict == "reproduced"
+    loops[("four-segments", 0.7)] = moves(0.9, 0.9)
     much = judge(asked, Grounds(loops))
-    assert much.verdict == FAILS and much.reason == "default: explains too much"
-    loops[("default", 0.7)] = moves(0.1, 0.1)
-    assert judge(asked, Grounds(loops)).found["default"].high == 0.0
+    assert much.verdict == FAILS and much.reason == "four-segments: explains too much"
+    loops[("four-segments", 0.7)] = moves(0.1, 0.1)
+    assert judge(asked, Grounds(loops)).found["four-segments"].high == 0.0
 
 
 def test_what_was_not_run_is_open() -> None:
@@ -245,7 +245,7 @@ def test_a_training_is_judged_by_its_median_and_the_interval_of_that() -> None:
 
 
 def trials(rmse: float, **more: Any) -> pd.DataFrame:
-    row = {"controller": "smc", "gains": "stepper", "outcome": "ok", "push": 0.0, "direction": "radial", "rmse": rmse}
+    row = {"controller": "smc", "gains": "hardware", "outcome": "ok", "push": 0.0, "direction": "radial", "rmse": rmse}
     return pd.DataFrame([row | more])
 
 
@@ -288,8 +288,8 @@ def test_the_evidence_is_what_the_claims_need_under_one_condition_and_no_more() 
     assert conditions_of(soft)[3:] == [(name, 0.7) for name in LOOPS]
     assert [row.label for row in rows_of(soft, 0.7)] == ["pid-ff/default"]
     assert "pid-ff/default" in [row.label for row in rows_of(soft, 1.0)], "what they add is over the same, stiff"
-    loops = evidence_study(study, soft, ("default", 0.7)).compare.loops
-    assert loops["default"].plant.stiffness_scale == 0.7
+    loops = evidence_study(study, soft, ("four-segments", 0.7)).compare.loops
+    assert loops["four-segments"].plant.stiffness_scale == 0.7
     assert conditions_of([claim(evidence="table1")]) == []
 
 

@@ -86,7 +86,7 @@ SETTINGS = (
     "families={soft: {loop: {control_period: 5e-3}, draw: {plant.stiffness: x0.6..1.4, reference.angle_deg: 10..40},"
     " references: [{duration: 0.3}, {duration: 0.5}], horizon: 2.6}}",
     "compare.worlds={family: soft, draws: 10}",
-    "compare.rows=[{controller: ct-dob}, {controller: computed-torque},"
+    "compare.controllers=[{controller: ct-dob}, {controller: computed-torque},"
     " {controller: smc, gains: exchanged}]",
 )  # fmt: skip
 
@@ -112,11 +112,11 @@ def test_a_row_that_chatters_in_a_world_stands_with_those_that_swing_and_is_name
     study = load_study([], [
         "families={long: {draw: {plant.stiffness: x0.9..1.1}, references: [{duration: 0.5}], horizon: 2.6}}",
         "wrist.length=0.12", "compare.worlds={family: long, draws: 3}",
-        "compare.rows=[{controller: super-twisting}, {controller: ct-dob, gains: stepper}]",
+        "compare.controllers=[{controller: super-twisting}, {controller: ct-dob, gains: hardware}]",
     ])  # fmt: skip
     (found,) = rank(study)
     known = of_ranking(found)
-    slams, sound = known.labels.index("super-twisting/default"), known.labels.index("ct-dob/stepper")
+    slams, sound = known.labels.index("super-twisting/default"), known.labels.index("ct-dob/hardware")
     assert found.rows[slams].swings.all() and not found.rows[sound].swings.any()
     assert found.standing.fate(slams) == "unreliable" and 300.0 < known.chatter[slams] < 600.0
     assert known.unsound["chatters"][[slams, sound]].tolist() == [3, 0] and known.chatter[sound] == 0.0
@@ -150,7 +150,7 @@ def test_steps_are_ranked_apart_from_smooth_motions() -> None:
         "families={mixed: {references: [{kind: step}, {duration: 0.5}, {duration: 0.4}], horizon: 1.6,"
         " draw: {plant.stiffness: x0.9..1.1, reference.angle_deg: 10..30}}}",
         "compare.worlds={family: mixed, draws: 8}",
-        "compare.rows=[{controller: ct-dob}]",
+        "compare.controllers=[{controller: ct-dob}]",
     ]
     smooth, steps = rank(load_study([], settings))
     assert (smooth.name, smooth.jumps, smooth.motions) == ("mixed", False, 2)
@@ -206,6 +206,6 @@ def test_errors_that_nobody_can_measure_are_said_to_be_less() -> None:
 
 def test_the_same_worlds_give_the_same_ranking_whatever_stands_beside_a_row() -> None:
     study = load_study([], list(SETTINGS))
-    alone = load_study([], [*SETTINGS, "compare.rows=[{controller: computed-torque}]"])
+    alone = load_study([], [*SETTINGS, "compare.controllers=[{controller: computed-torque}]"])
     ours = [next(r for r in rank(each)[0].rows if r.label == "computed-torque/default") for each in (study, alone)]
     assert np.array_equal(ours[0].rmse, ours[1].rmse)

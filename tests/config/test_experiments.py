@@ -195,6 +195,7 @@ def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_
 
 def test_mappings_of_every_kind_are_among_those_that_refuse_a_key() -> None:
     assert {
-        "", "wrist", "compare.rows", "compare.rows.gains", "compare.loops", "compare.loops.*.plant", "train.rows",
+        "", "wrist", "compare.controllers", "compare.controllers.gains", "compare.loops", "compare.loops.*.plant",
+        "train.rows",
         "compare.tuning.objective", "compare.tuning.loops.*.sensor", "tune.scenarios.reference", "simulate.gains",
     } <= set(MAPPINGS)  # fmt: skip

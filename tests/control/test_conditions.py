@@ -60,8 +60,8 @@ def test_a_preset_without_conditions_swings_there(margins: ModuleType) -> None:
 @pytest.mark.parametrize(
     ("row", "loop", "told"),
     [
-        (("mrac", "stepper"), {"control_period": 5e-3}, None),
-        (("mrac", "stepper"), {"control_period": 1e-2}, "made for periods of 1 to 5 ms, not 10"),
+        (("mrac", "hardware"), {"control_period": 5e-3}, None),
+        (("mrac", "hardware"), {"control_period": 1e-2}, "made for periods of 1 to 5 ms, not 10"),
         (("nc", "default"), {"control_period": 5e-3, "stiffness": 1e4}, "tendons of 20 to 100 kN/m, not 10"),
         (("smc-tracking", "default"), {}, "not made for elastic tendons behind a camera"),
         (("smc-tracking", "default"), {"sensor": "ideal"}, None),
@@ -83,7 +83,7 @@ def test_a_command_warns_outside_them(
 
 
 def test_real_motors_do_not_move_by_gains_that_may_swing_unless_told_to(capsys: pytest.CaptureFixture[str]) -> None:
-    study = load_study([], ["hw-run.port=/dev/null", "hw-run.rows=[{controller: smc-tracking, gains: default}]"])
+    study = load_study([], ["hw-run.port=/dev/null", "hw-run.controllers=[{controller: smc-tracking, gains: default}]"])
     for operator in (Unattended(), TerminalOperator(Terminal(), True, frozenset({"yes"}))):
         with pytest.raises(UserError, match="not made for elastic tendons behind a camera") as refused:
             hw_run(Session(study, Inputs(), Findings(study.seed, None), watched(None), operator))

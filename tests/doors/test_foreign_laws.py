@@ -30,7 +30,10 @@ QUICK = "horizon: 0.3, loop: {plant_segments: 1}"
 
 def named(folder: Path, name: str, command: str = "simulate", **laws: Any) -> Study:
     """A study that names a law of a folder."""
-    data: dict[str, Any] = {"simulate": {"controller": f"{folder}/{name}", "gains": "default"}, "laws": laws}
+    data: dict[str, Any] = {
+        "simulate": {"controller": f"{folder}/{name}", "gains": "default"},
+        "controller-settings": laws,
+    }
     return adopted(Study.model_validate(data), command).study
 
 
@@ -72,7 +75,7 @@ compare:
   loops: {{fast: {{plant_segments: 1}}}}
   references: [{{duration: 0.1}}]
   inverses: [none]
-  rows: [{{controller: ../strange.py:STRANGE, gains: tuned}}, {{controller: pid, gains: printed}}]
+  controllers: [{{controller: ../strange.py:STRANGE, gains: tuned}}, {{controller: pid, gains: printed}}]
 """
     )
     study = face.load_study(stranger / "inner" / "study.yaml")
@@ -307,20 +310,24 @@ def test_a_laws_own_section_has_units_decides_what_it_is_and_is_sealed_in_full(t
     study = tmp_path / "study.yaml"
     found = []
     for laws in ("{}", "{springy: {spring: 3.0}}"):
-        study.write_text(f"laws: {laws}\nsimulate: {{controller: springy.py:SPRINGY, gains: default, {QUICK}}}")
+        study.write_text(
+            f"controller-settings: {laws}\nsimulate: {{controller: springy.py:SPRINGY, gains: default, {QUICK}}}"
+        )
         own = adopted(load_study([study]), "simulate").study
         found.append(answer(own.simulate.controller))
         said = wristctl(tmp_path, "simulate", "study.yaml", "--dry-run").stdout
-        assert f"    spring: {own.laws['springy']['spring']}  # [N m/rad] how stiff" in said
+        assert f"    spring: {own.controller_settings['springy']['spring']}  # [N m/rad] how stiff" in said
     np.testing.assert_allclose(found[1], 1.5 * found[0], rtol=1e-14)
     for laws, told in (
         ("springy: {sprong: 3.0}", "did you mean 'spring'?"),
         ("sprngy: {}", "did you mean 'springy'?"),
     ):
-        study.write_text(f"laws: {{{laws}}}\nsimulate: {{controller: springy.py:SPRINGY, gains: default}}")
+        study.write_text(
+            f"controller-settings: {{{laws}}}\nsimulate: {{controller: springy.py:SPRINGY, gains: default}}"
+        )
         with pytest.raises(UserError) as refused:
             adopted(load_study([study]), "simulate")
-        assert told in str(refused.value) and refused.value.where.startswith("laws.")
+        assert told in str(refused.value) and refused.value.where.startswith("controller-settings.")
 
 
 def test_a_runs_configuration_holds_every_setting_of_its_laws(tmp_path: Path) -> None:
@@ -329,7 +336,7 @@ def test_a_runs_configuration_holds_every_setting_of_its_laws(tmp_path: Path) ->
     done = face.simulate(face.load_study(tmp_path / "study.yaml"), out=tmp_path / "results")
     assert done.run is not None
     text = (done.run.path / "config.yaml").read_text()
-    assert re.search(r"^laws:.*\n  springy:\n    spring: 2.0", text, re.MULTILINE)
+    assert re.search(r"^controller-settings:.*\n  springy:\n    spring: 2.0", text, re.MULTILINE)
 
 
 ENDINGS = ("SystemExit", "GeneratorExit", "KeyboardInterrupt", "type('Odd', (BaseException,), {})")

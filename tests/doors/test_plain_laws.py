@@ -191,7 +191,7 @@ def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_mpc_of_the_worked_example_follows_and_pulls_as_hard_as_it_may_and_no_harder() -> None:
     pytest.importorskip("osqp")
-    design: Any = CONTROLLERS[f"{ROOT}/experiments/laws/mpc_osqp.py:MPC"]
+    design: Any = CONTROLLERS[f"{ROOT}/experiments/own_controllers/mpc_osqp.py:MPC"]
     law, loop = design.made({"horizon": 30.0}), Loop(plant_segments=1)
     assert run(law, np.zeros((1, 0)), loop).metrics["rmse"][0] < 1e-3
     weak = WRIST.model_copy(update={"tension_limit": WRIST.pretension + 2.0})
@@ -207,7 +207,7 @@ def test_the_lqr_of_the_worked_example_solves_its_riccati_equation() -> None:
 
     from wristctl.control.vetting import call_law
 
-    law = CONTROLLERS[f"{ROOT}/experiments/laws/lqr.py:LQR"]
+    law = CONTROLLERS[f"{ROOT}/experiments/own_controllers/lqr.py:LQR"]
     q, qd = 4.0e4, 100.0
     cost = solve_continuous_are(
         np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), np.diag([q, qd]), np.eye(1)
@@ -231,4 +231,4 @@ def _segments() -> Any:
 def test_the_files_of_the_worked_examples_are_shown_in_the_page() -> None:
     page = (ROOT / "docs" / "your-own-controller.md").read_text(encoding="utf-8")
     for name in ("lqr", "mpc_osqp"):
-        assert (ROOT / "experiments" / "laws" / f"{name}.py").read_text(encoding="utf-8") in page
+        assert (ROOT / "experiments" / "own_controllers" / f"{name}.py").read_text(encoding="utf-8") in page

@@ -31,7 +31,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "tune": ("tune", *FAST, "--candidates", "4", "--iterations", "2", "--set", SCENARIO),
     "compare": (
         "compare", *FAST, "--horizon", "0.1", "--set", "inverses=[none]", "--set", f"references=[{MOVE}]",
-        "--set", "rows=[{controller: smc, gains: initial}]",
+        "--set", "controllers=[{controller: smc, gains: initial}]",
     ),
     "simulate": ("simulate", "--set", "horizon=0.1"),
     "analyse": ("analyse", "--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}"),
@@ -43,7 +43,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "hw-run": (
         "hw-run", "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.2", "--set", "back=0.1",
         "--set", "reference={duration: 0.1, angle_deg: 1.0}",
-        "--set", "rows=[{controller: smc-tracking, gains: stepper}]",
+        "--set", "controllers=[{controller: smc-tracking, gains: hardware}]",
         "--set", "homing={move: 1.0e-4, rest: 0.06, frames: 2, slack: 5.0e-4, let_go: 1.0}",
     ),
 }  # fmt: skip

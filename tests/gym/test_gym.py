@@ -46,7 +46,7 @@ families:
 @pytest.fixture(params=LOOPS)
 def study(request: pytest.FixtureRequest) -> Study:
     """A study of a loop without and with motors, tendons, a camera and drawn plants."""
-    return load_study([], [*LOOPS[request.param], "seed=4", "simulate.controller=pid-ff", "simulate.gains=stepper"])
+    return load_study([], [*LOOPS[request.param], "seed=4", "simulate.controller=pid-ff", "simulate.gains=hardware"])
 
 
 def driven(env: WristEnv, actions: Array, seed: int | None = None) -> dict[str, Array]:

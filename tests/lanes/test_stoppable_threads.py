@@ -40,7 +40,7 @@ def test_all_is_done_where_nothing_is_wrong() -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_rollout_that_is_told_to_stop_ends_before_its_wrist_has_moved(threads: int) -> None:
     law, wrist = controller("smc-tracking"), WristParameters()
-    gains = np.tile(gains_of(law, "stepper"), (40, 1))
+    gains = np.tile(gains_of(law, "hardware"), (40, 1))
     followed = motion(Reference(), wrist, 1.0, 1e-3)
 
     def until(stop: Event) -> np.ndarray:

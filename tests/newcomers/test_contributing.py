@@ -20,7 +20,7 @@ KINDS = ("controller", "reference", "metric", "optimiser", "disturbance", "plant
 STUDY = """\
 compare:
   horizon: 0.5
-  rows: [{controller: pd, gains: tuned}, {controller: pd}]
+  controllers: [{controller: pd, gains: tuned}, {controller: pd}]
   references: [{kind: approach, angle_deg: 10, time_constant: 0.1}]
   inverses: [none]
   loops: {still: {plant: {model: hinge}}, shaken: {plant: {model: hinge}, disturbances: {tremor: 5.0}}}

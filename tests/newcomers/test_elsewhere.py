@@ -25,7 +25,7 @@ tune:
   scenarios: [{reference: {kind: sweep, angle_deg: 8, end_frequency: 1.5}}]
 compare:
   horizon: 1.0
-  rows: [{controller: lqr, gains: tuned}, {controller: lqr, gains: default}]
+  controllers: [{controller: lqr, gains: tuned}, {controller: lqr, gains: default}]
   references: [{kind: sweep, angle_deg: 10, end_frequency: 1.5}]
   inverses: [none]
   loops: {shaken: {plant_segments: 1, disturbances: {tremor: 0.5}}, hinged: {plant: {model: hinge}}}

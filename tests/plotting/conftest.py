@@ -64,7 +64,7 @@ def result(row: str, reference: str, rmse: float, failed: bool = False) -> Compa
     controller, gains = row.split("/")
     metrics = {"rmse": np.nan if failed else rmse, "chattering": 1e6 * rmse}
     done = Simulation(course(row, 1.0, failed), metrics, failed, 0.5)
-    return ComparedRow("default", reference, "closed-form", controller, gains, Repeated.once(done))
+    return ComparedRow("four-segments", reference, "closed-form", controller, gains, Repeated.once(done))
 
 
 def results() -> list[ComparedRow]:
@@ -75,7 +75,7 @@ def results() -> list[ComparedRow]:
 
 def standings() -> list[ClassStanding]:
     """Of the same rows: what diverged cannot be relied on."""
-    study = load_study(None, "compare.loops={default: {}}")
+    study = load_study(None, "compare.loops={four-segments: {}}")
     return class_standings([each for each in results() if each.controller != "nc"], study.compare, study.wrist)
 
 
@@ -138,7 +138,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
         pushed(), "disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0}
     ),
     "variation": lambda: variation_dots(results(), "Loop default"),
-    "sliding": lambda: sliding(course("smc/stepper"), SURFACE, SMC.presets["stepper"]),
+    "sliding": lambda: sliding(course("smc/hardware"), SURFACE, SMC.presets["hardware"]),
     "sensitivity of gains": lambda: gain_sensitivity("pid", ["Kp", "Ki"], 1.5, np.array([1.0, 1.5, 0.9, 1.2, 1.1])),
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),

@@ -126,7 +126,7 @@ def compared(tmp_path: Path, results: list[ComparedRow], study: Study) -> dict[s
 def test_courses_of_a_comparison_are_grouped_by_loop_and_reference(
     tmp_path: Path, results: list[ComparedRow], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = wristctl.load_study(None, "compare.loops={default: {}, rods: {}}")
+    study = wristctl.load_study(None, "compare.loops={four-segments: {}, rods: {}}")
     loops = study.compare.loops | {"rods": rods(study.compare.loops["rods"])}
     bent = study.model_copy(update={"compare": study.compare.model_copy(update={"loops": loops})})
     monkeypatch.setattr(Run, "config", bent)
@@ -134,8 +134,8 @@ def test_courses_of_a_comparison_are_grouped_by_loop_and_reference(
     found = compared(tmp_path / "one", rows, study)
     assert found is not None
     assert [(each["group"], each["name"], each["colour"]) for each in found["courses"]] == [
-        ("default, step 30 deg", "smc/printed", colour("smc")),
-        ("default, step 30 deg", "pid/tuned", colour("pid")),
+        ("four-segments, step 30 deg", "smc/printed", colour("smc")),
+        ("four-segments, step 30 deg", "pid/tuned", colour("pid")),
     ], "what is no chain of arcs is left out"
     theta = results[9].simulation.trajectory.segment_theta[:: round(0.04 / 0.025)]
     np.testing.assert_allclose(found["courses"][1]["theta"], 1e4 * theta, atol=0.51)
@@ -143,8 +143,8 @@ def test_courses_of_a_comparison_are_grouped_by_loop_and_reference(
     both = compared(tmp_path / "two", [results[0], replace(results[0], inverse="network")], study)
     assert both is not None
     assert [each["group"] for each in both["courses"]] == [
-        "default, step 30 deg, closed-form inverse",
-        "default, step 30 deg, network inverse",
+        "four-segments, step 30 deg, closed-form inverse",
+        "four-segments, step 30 deg, network inverse",
     ]
 
 

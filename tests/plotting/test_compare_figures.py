@@ -95,7 +95,7 @@ def test_loops_may_be_the_columns_of_one_reference(results: list[ComparedRow]) -
     one = [each for each in results if each.reference == "step 30 deg"]
     stiff = [dataclasses.replace(each, loop="stiff") for each in one]
     ours = rmse_map([*one, *stiff], across="loop").axes[0]
-    assert [label.get_text() for label in ours.get_xticklabels()] == ["default", "stiff"]
+    assert [label.get_text() for label in ours.get_xticklabels()] == ["four-\nsegments", "stiff"]
 
 
 def test_figures_grow_with_their_rows_and_columns(results: list[ComparedRow]) -> None:

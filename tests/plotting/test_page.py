@@ -144,7 +144,7 @@ def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, c
     browser.open(compared.file("report.html"), 1280, False)
     groups = browser.run("return [...document.getElementById('group').options].map(option => option.value)")
     references = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
-    assert groups == [f"default, {name}" for name in references]
+    assert groups == [f"four-segments, {name}" for name in references]
     read = "return [...document.querySelectorAll('#wrists > div')].map(panel => panel.lastChild.textContent)"
     seek = "const s = document.getElementById('instant'); s.value = 1000; s.dispatchEvent(new Event('input'));"
     panels = browser.run(seek + read)

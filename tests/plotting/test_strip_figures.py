@@ -45,7 +45,9 @@ def test_every_draw_stands_at_its_ratio_and_what_fails_at_the_edge() -> None:
 
 
 def test_the_ledgers_ranges_are_ratios_to_the_papers_number() -> None:
-    judged = Judgement(CLAIM, {"exact": Finding("reproduced", 1.0, 4.0), "default": Finding("worse than the paper")})
+    judged = Judgement(
+        CLAIM, {"exact": Finding("reproduced", 1.0, 4.0), "four-segments": Finding("worse than the paper")}
+    )
     (panel,) = ours_over_the_papers([judged]).axes
     assert [np.asarray(line.get_xdata(), float).tolist() for line in panel.lines] == [[0.5, 2.0], [1e5, 1e5]]
 

@@ -94,7 +94,7 @@ def test_the_configuration_of_an_earlier_run_is_fed_back(call: Call, earlier: Pa
 
 SHORT = ("--set", "horizon=0.05")
 MOVE = "references=[{kind: minimum-jerk, duration: 0.02}]"
-ONE_ROW = ("--set", "rows=[{controller: smc, gains: tuned}]", "--set", MOVE, "--set", "inverses=[network]")
+ONE_ROW = ("--set", "controllers=[{controller: smc, gains: tuned}]", "--set", MOVE, "--set", "inverses=[network]")
 USES = {
     "data of train": (("train", "--epochs", "1", "--seeds", "1", "--set", "hidden=[4]"), {"data": "gen-data"}),
     "network of simulate": (("simulate", *SHORT, "--set", "reference.inverse=network"), {"network": "train"}),

@@ -41,7 +41,7 @@ def missing_deg(outcome: Outcome) -> float:
 def test_exchanged_gains_move_the_front_pages_wrist_and_no_step_a_tick_says_so(side: float) -> None:
     """58 N, four segments, 1 kHz: one integration step a tick leaves the wrist where it was."""
     coarse = run("smc", "exchanged", Loop(substeps=1), 58.0, side)
-    found = run("smc", "exchanged", LOOPS["default"], 58.0, side)
+    found = run("smc", "exchanged", LOOPS["four-segments"], 58.0, side)
     fine = run("smc", "exchanged", Loop(substeps=20), 58.0, side)
     assert missing_deg(coarse) > 29.0 and coarse.unconverged.all()
     assert missing_deg(found) < 0.05 and found.steps[0] > 1 and not found.unconverged.any()
@@ -50,7 +50,7 @@ def test_exchanged_gains_move_the_front_pages_wrist_and_no_step_a_tick_says_so(s
 
 def test_at_60_newtons_they_arrive_at_every_step_but_one_and_their_rmse_is_marked() -> None:
     found = [run("smc", "exchanged", Loop(substeps=steps)) for steps in (4, 8, 16)]
-    own = run("smc", "exchanged", LOOPS["default"])
+    own = run("smc", "exchanged", LOOPS["four-segments"])
     assert max(map(missing_deg, [*found, own])) < 0.05
     assert own.unconverged.all() and own.steps == 64 and 0.0 < own.drift[0] < 0.05 * own.metrics["rmse"][0]
     assert own.metrics["rmse"] == pytest.approx(found[0].metrics["rmse"], rel=0.05)
@@ -58,14 +58,14 @@ def test_at_60_newtons_they_arrive_at_every_step_but_one_and_their_rmse_is_marke
 
 def test_beyond_the_threshold_they_move_nothing_at_any_step() -> None:
     for limit in (61.0, 80.0):
-        found = run("smc", "exchanged", LOOPS["default"], limit)
+        found = run("smc", "exchanged", LOOPS["four-segments"], limit)
         fine = run("smc", "exchanged", Loop(substeps=20), limit)
         assert missing_deg(found) > 29.0 and missing_deg(fine) > 29.0 and not found.unconverged.any()
 
 
 @pytest.mark.parametrize("law", ["ct-dob", "pid-ff", "feedforward"])
 def test_a_smooth_loop_keeps_its_one_step_to_the_bit(law: str) -> None:
-    found, one = run(law, "default", LOOPS["default"]), run(law, "default", Loop(substeps=1))
+    found, one = run(law, "default", LOOPS["four-segments"]), run(law, "default", Loop(substeps=1))
     assert found.steps == 1 and not found.unconverged.any() and not one.unconverged.any()
     assert found.column("theta", 0).tobytes() == one.column("theta", 0).tobytes()
 
@@ -110,7 +110,7 @@ def test_an_rmse_is_that_of_twenty_times_the_steps_or_marked(row: tuple[str, str
 
 def test_friction_and_slack_are_no_reason_to_doubt_a_quiet_loop_and_a_swing_is() -> None:
     rig = {"control_period": 5e-3, "actuator": {"level": "tendon", "friction": 0.1}, "sensor": {"level": "camera"}}
-    quiet, swinging = (run(*row, Loop.model_validate(rig)) for row in (("ct-dob", "stepper"), ("pid", "printed")))
+    quiet, swinging = (run(*row, Loop.model_validate(rig)) for row in (("ct-dob", "hardware"), ("pid", "printed")))
     assert quiet.steps == 5 and not in_doubt(quiet, np.array([True])).any()
     quick = swinging.metrics["chattering"]
     assert in_doubt(swinging, np.array([True])).all()
@@ -134,7 +134,7 @@ def test_rollouts_that_differ_beyond_the_tolerance_do_not_agree() -> None:
 
 
 def test_the_best_gains_of_a_search_are_what_they_are_at_a_step_that_is_short_enough() -> None:
-    chosen = ["tune.controllers=[pid]", "tune.scenarios=[{loop: default}]", "tune.horizon=3"]
+    chosen = ["tune.controllers=[pid]", "tune.scenarios=[{loop: four-segments}]", "tune.horizon=3"]
     study, law = load_study([], chosen, "tune"), controller("pid")
     judge = Judge(tuning_cases(study)[0], study.wrist, study.tune.objective)
     gains = 10.0 ** np.random.default_rng(1).uniform([1.0, 0.0, -1.0], [3.5, 2.0, 1.5], (24, 3))

@@ -51,7 +51,7 @@ def cameras(record: How) -> Outcome:
         Loop(control_period=5e-3, sensor=Sensor(level="camera", frame_rate=rate)) for rate in (60.0, 30.0, 60.0, 30.0)
     ]
     law, wrist = controller("pid-ff"), WristParameters()
-    gains = np.tile(gains_of(law, "stepper"), (4, 1)) * np.array([1.0, 1.0, 0.9, 0.9])[:, None]
+    gains = np.tile(gains_of(law, "hardware"), (4, 1)) * np.array([1.0, 1.0, 0.9, 0.9])[:, None]
     followed = motion(Reference(), wrist, 0.5, 5e-3)
     streams = [(each,) for each in range(4)]
     return rollout(law, gains, [followed], np.zeros(4, np.int64), loops, wrist, streams=streams, record=record)

@@ -202,7 +202,7 @@ def test_laws_that_slam_the_tendons_of_a_longer_wrist_are_marked(law: str, direc
 
 
 def test_what_chattered_by_its_integration_step_alone_does_not_chatter() -> None:
-    row = ["simulate.controller=ct-dob", "simulate.gains=stepper", "wrist.length=0.12"]
+    row = ["simulate.controller=ct-dob", "simulate.gains=hardware", "wrist.length=0.12"]
     assert simulate(load_study([], row)).marks == []
     assert simulate(load_study([], [*row, "simulate.loop.substeps=1"])).marks == ["chatters", "not converged"]
 

@@ -39,7 +39,7 @@ PRINTED, EXCHANGED = (0.001, 1000.0, 1000.0), (1000.0, 0.001, 1000.0)
 
 
 def test_printed_gains_move_less_than_a_tenth_of_a_milliradian_in_five_seconds() -> None:
-    for loop in (LOOPS["sampled"], LOOPS["default"]):
+    for loop in (LOOPS["sampled"], LOOPS["four-segments"]):
         moved = run("smc", [PRINTED], loop, STEP).column("theta", 0)
         assert 1e-6 < np.abs(moved).max() < 1e-4
 
@@ -49,7 +49,7 @@ def test_exchanged_gains_give_the_papers_rmse_on_an_exact_model_in_nearly_contin
     assert exact == pytest.approx([4.8e-4, 2.1e-4], rel=0.02)
     sampled = run("smc", [EXCHANGED], LOOPS["sampled"], *MOVES).metrics
     assert (sampled["rmse"] > 1.5 * exact).all() and (sampled["saturation"] > 0.9).all()
-    default = run("smc", [EXCHANGED], LOOPS["default"], *MOVES).metrics
+    default = run("smc", [EXCHANGED], LOOPS["four-segments"], *MOVES).metrics
     assert default["rmse"] == pytest.approx([0.156, 0.082], rel=0.02)
     assert (default["chattering"] > 1e4).all() and (default["steady_state"] < np.deg2rad(0.1)).all()
 
@@ -74,7 +74,7 @@ def test_a_lane_has_the_same_bytes_alone_in_a_batch_and_on_two_threads(segments_
 
 def test_rollout_agrees_with_an_independent_implicit_solver() -> None:
     """Four segments under the feedforward torque held over each millisecond, by SciPy's Radau."""
-    loop, horizon = LOOPS["default"], 0.3 if os.environ.get("WRISTCTL_THOROUGH") else 0.08
+    loop, horizon = LOOPS["four-segments"], 0.3 if os.environ.get("WRISTCTL_THOROUGH") else 0.08
     outcome = run("feedforward", [()], loop, STEP, horizon=horizon)
     plus, minus = (2 * float(outcome.column(f"tension_{side}", 0)[0]) for side in ("plus", "minus"))
     values, n = segments(WRIST, 4), 4
@@ -108,14 +108,16 @@ def test_a_wrist_that_bends_beyond_a_full_turn_is_a_failure_and_spoils_no_other_
 
 
 def test_the_loop_is_left_right_symmetric() -> None:
-    right, left = (run("smc", [(30.0, 0.3, 10.0)], LOOPS["default"], Reference(angle_deg=a)) for a in (25.0, -25.0))
+    right, left = (
+        run("smc", [(30.0, 0.3, 10.0)], LOOPS["four-segments"], Reference(angle_deg=a)) for a in (25.0, -25.0)
+    )
     np.testing.assert_allclose(right.column("theta", 0), -left.column("theta", 0), rtol=0, atol=1e-12)
     assert right.metrics["rmse"] == pytest.approx(left.metrics["rmse"], rel=1e-9)
     assert right.metrics["settling"] == pytest.approx(left.metrics["settling"])
 
 
 def test_substeps_change_the_result_by_less_than_a_microradian() -> None:
-    coarse = run("computed-torque", [(50.0, 1.0)], LOOPS["default"], MOVES[0])
+    coarse = run("computed-torque", [(50.0, 1.0)], LOOPS["four-segments"], MOVES[0])
     fine = run("computed-torque", [(50.0, 1.0)], Loop(substeps=10), MOVES[0])
     assert np.abs(coarse.column("theta", 0) - fine.column("theta", 0)).max() < 1e-6
 

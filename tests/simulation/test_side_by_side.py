@@ -25,7 +25,7 @@ LOOP = Loop(control_period=5e-3, actuator=TENDON, sensor=Sensor(level="camera", 
 def run(loops: list[Loop], wrists: list[WristParameters]) -> Outcome:
     """Of the same gains, noise and motion."""
     law, count = controller("smc-tracking"), len(loops)
-    gains = np.tile(gains_of(law, "stepper"), (count, 1)) * 3.0
+    gains = np.tile(gains_of(law, "hardware"), (count, 1)) * 3.0
     followed = motion(Reference(duration=0.3), WRIST, 0.6, 5e-3)
     streams = [(7,)] * count
     return rollout(law, gains, [followed], np.zeros(count, np.int64), loops, wrists, streams=streams, record=True)

@@ -59,7 +59,7 @@ def test_rollouts_that_are_too_many_together_are_refused_with_steps_time_and_wha
 
 
 def test_steps_of_all_loops_count_and_not_the_last_ones() -> None:
-    both = Size([LOOPS["exact"], LOOPS["default"]], 5.0, 10.0)
+    both = Size([LOOPS["exact"], LOOPS["four-segments"]], 5.0, 10.0)
     assert both.steps == 5.0 * (Size(both.loops[:1], 5.0).steps + Size(both.loops[1:], 5.0).steps)
 
 

@@ -75,7 +75,8 @@ def test_loops_of_another_structure_are_refused_in_one_batch() -> None:
 def study(*overrides: str) -> Study:
     """Behind a camera, with a plant of its own in each repetition."""
     return load_study([], [
-        "compare.rows=[{controller: smc-tracking, gains: camera}, {controller: pid, gains: {Kp: 20, Ki: 5, Kd: 0.5}}]",
+        "compare.controllers=[{controller: smc-tracking, gains: camera}, "
+        "{controller: pid, gains: {Kp: 20, Ki: 5, Kd: 0.5}}]",
         "compare.references=[{kind: step}, {kind: minimum-jerk, duration: 0.3}]",
         "compare.loops={camera: {sensor: {level: camera}, plant: {stiffness_spread: 0.2}}}",
         "compare.inverses=[none]", "compare.horizon=0.5", "compare.repetitions=3", *overrides,
@@ -94,8 +95,9 @@ def bytes_of(results: list[ComparedRow]) -> dict[tuple[str, ...], bytes]:
 def test_another_row_loop_or_reference_changes_no_byte_of_those_that_were_there() -> None:
     before = bytes_of(compare(study()))
     more = bytes_of(compare(study(
-        "compare.rows=[{controller: feedforward, gains: default}, {controller: pid, gains: {Kp: 20, Ki: 5, Kd: 0.5}}, "
-        "{controller: smc-tracking, gains: stepper}, {controller: smc-tracking, gains: camera}]",
+        "compare.controllers=[{controller: feedforward, gains: default}, "
+        "{controller: pid, gains: {Kp: 20, Ki: 5, Kd: 0.5}}, "
+        "{controller: smc-tracking, gains: hardware}, {controller: smc-tracking, gains: camera}]",
         "compare.references=[{kind: step, angle_deg: 10}, {kind: minimum-jerk, duration: 0.3}, {kind: step}]",
         "compare.loops={soft: {sensor: {level: camera}, plant: {stiffness_scale: 0.7}}, "
         "camera: {sensor: {level: camera}, plant: {stiffness_spread: 0.2}}}",
@@ -114,7 +116,7 @@ def test_fewer_repetitions_are_the_first_of_more() -> None:
 def test_in_a_repetition_all_rows_meet_the_same_noise_and_plant() -> None:
     """Two rows with equal gains are equal in each repetition, though no two repetitions are."""
     gains = ("{Kp: 20, Ki: 5, Kd: 0.5}", "{Kp: 20, Kd: 0.5, Ki: 5}")
-    twice = study(f"compare.rows=[{', '.join(f'{{controller: pid, gains: {each}}}' for each in gains)}]")
+    twice = study(f"compare.controllers=[{', '.join(f'{{controller: pid, gains: {each}}}' for each in gains)}]")
     first, second = (each.repeated for each in compare(twice) if each.reference.startswith("step"))
     assert first.errors.tobytes() == second.errors.tobytes()
     assert len({each.tobytes() for each in first.errors}) == 3

@@ -55,7 +55,7 @@ def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
 
 
 def test_limits_of_motors_scale_with_what_the_motors_are() -> None:
-    gains = "stepper"
+    gains = "hardware"
     plain = _limits(row("smc-tracking", gains, BEHIND))
     fine = _limits(
         row("smc-tracking", gains, BEHIND.model_copy(update={"actuator": TENDON.model_copy(update={"microstep": 32})}))
@@ -85,7 +85,7 @@ def test_a_controller_sees_as_much_of_a_swing_whatever_stands_behind_its_motors(
     """With pulleys of twice the size a loop begins to swing at half the gain, and its motors turn for it as before."""
     limits = []
     for pulley in ("x1", "x2"):
-        found = _limits(row("smc-tracking", "stepper", _with(BEHIND, actuator={"pulley_radius": pulley})))
+        found = _limits(row("smc-tracking", "hardware", _with(BEHIND, actuator={"pulley_radius": pulley})))
         limits.append(
             [found[each].swing for each in ("saturation", "the stepper's acceleration", "a motor's microstep")]
         )
@@ -93,18 +93,18 @@ def test_a_controller_sees_as_much_of_a_swing_whatever_stands_behind_its_motors(
 
 
 def test_a_tendon_goes_slack_where_a_turn_takes_up_its_stretch() -> None:
-    own = row("smc-tracking", "stepper", BEHIND)
+    own = row("smc-tracking", "hardware", BEHIND)
     stretch = own.wrist.pretension / TENDON.tendon_stiffness
     assert _limits(own)["a slack tendon"].swing == pytest.approx(stretch / own.wrist.tendon_offset, rel=1e-6)
 
 
 def test_friction_is_read_one_way_and_felt_the_other() -> None:
     turned = TENDON.presliding / row("pid", PID, BEHIND).wrist.tendon_offset
-    sliding, stuck = (_limits(row("smc-tracking", "stepper", BEHIND, each)) for each in ("slipping", "stuck"))
+    sliding, stuck = (_limits(row("smc-tracking", "hardware", BEHIND, each)) for each in ("slipping", "stuck"))
     assert (sliding["friction that sticks"].above, stuck["friction that slips"].above) == (False, True)
     assert sliding["friction that sticks"].swing == stuck["friction that slips"].swing == pytest.approx(turned)
     smooth = BEHIND.model_copy(update={"actuator": TENDON.model_copy(update={"friction": 0.0})})
-    assert not any("friction" in each for each in _limits(row("smc-tracking", "stepper", smooth)))
+    assert not any("friction" in each for each in _limits(row("smc-tracking", "hardware", smooth)))
 
 
 def test_what_happens_at_times_is_listed_as_left_out() -> None:
@@ -112,14 +112,14 @@ def test_what_happens_at_times_is_listed_as_left_out() -> None:
     loop = loop.model_copy(
         update={"disturbances": Disturbances(push=Push(force=1.0)), "sensor": Sensor(level="camera")}
     )
-    found = _limits(row("smc-tracking", "stepper", loop), 10.0)
+    found = _limits(row("smc-tracking", "hardware", loop), 10.0)
     assert found["the end stops"].swing == pytest.approx(math.radians(30.0))
     assert found["backlash"].swing == pytest.approx(1e-4 / row("pid", PID, loop).wrist.tendon_offset)
     assert math.degrees(found["the camera's noise"].swing) == pytest.approx(0.1)
     for name in ("a person's push", "a tendon that breaks", "a motor that stalls"):
         assert found[name].read_as == "left out" and math.isnan(found[name].swing)
     assert "a spool that slips" not in found
-    assert not TrueActuator().backlash and "backlash" not in _limits(row("smc-tracking", "stepper", BEHIND))
+    assert not TrueActuator().backlash and "backlash" not in _limits(row("smc-tracking", "hardware", BEHIND))
 
 
 def test_lagged_motors_have_steps_and_a_speed() -> None:

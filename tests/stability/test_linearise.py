@@ -84,9 +84,9 @@ COURSES: dict[str, tuple[str, str | dict[str, float], Loop]] = {
         "computed-torque", {"w": 20.0, "zeta": 1.0},
         BEHIND.model_copy(update={"sensor": CAMERA.model_copy(update={"delay_frames": 0.0, "frame_rate": 100.0})}),
     ),
-    "tendon, camera": ("smc-tracking", "stepper", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA)),
+    "tendon, camera": ("smc-tracking", "hardware", Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA)),
     "another world": (
-        "smc-tracking", "stepper",
+        "smc-tracking", "hardware",
         Loop(
             control_period=5e-3, actuator=TENDON, sensor=CAMERA,
             plant=Plant(
@@ -113,7 +113,7 @@ def test_a_small_step_of_the_simulated_loop_is_the_linear_one(name: str) -> None
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "feedforward"])
 def test_every_law_rests_and_its_open_loop_closes_again(name: str) -> None:
-    ours: dict[str, Any] = {"smc": "stepper", "pid-angle": {"Kp": 0.5, "Ki": 2.0, "Kd": 0.01}}  # not at their limits
+    ours: dict[str, Any] = {"smc": "hardware", "pid-angle": {"Kp": 0.5, "Ki": 2.0, "Kd": 0.01}}  # not at their limits
     preset = ours.get(name, next(iter(CONTROLLERS[name].presets)))
     for degrees in (0.0, 30.0):
         found = linear(name, preset, Loop(), degrees)

@@ -31,7 +31,7 @@ def test_the_sliding_laws_say_what_their_surface_is() -> None:
 
 @pytest.mark.parametrize("name", SLIDING)
 def test_courses_come_into_the_layer_and_end_at_rest(name: str) -> None:
-    own = row(name, {"smc": "stepper"}.get(name, "default"), Loop())
+    own = row(name, {"smc": "hardware"}.get(name, "default"), Loop())
     theta = math.radians(15.0)
     found = phase_portrait(own.law, own.gains, own.loop, own.wrist, theta, 1.5, Draws(0))
     assert found is not None and len(found.courses) == 4

@@ -60,8 +60,8 @@ def test_an_override_is_relative_to_the_command_first() -> None:
         ("wrist: 3\n", "3 should be a group of keys and values - {file}:1: wrist"),
         ("wrist: {pretension: 70}\n", "must exceed pretension"),
         ("train: {optimiser: adam_w}\n", "{file}:1: train.optimiser - fix: did you mean 'adamw'?"),
-        ("compare:\n  rows:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.rows.1.contoller"),
-        ("compare:\n  rows:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
+        ("compare:\n  controllers:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.controllers.1.contoller"),
+        ("compare:\n  controllers:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
         ("tune:\n  scenarios:\n  - reference: {kind: ramp}\n", "{file}:3: tune.scenarios.0.reference.kind"),
         ("- 1\n", "a study file holds keys and values - {file}:1"),
         ("train: {epochs: 1}\ntrain: {}\n", "key 'train' is repeated - {file}:2"),
@@ -86,9 +86,10 @@ def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) ->
         ("hidden=[1,", "not valid YAML"),
         ("epochs=__import__('os').getpid()", "should be a valid integer"),
         (
-            "hw-run.rows.0.gain=x",
-            "'rows' is a list, and given as a whole: '0' is no key of it - --set hw-run.rows.0.gain=x: hw-run.rows - "
-            "fix: hw-run.rows=[{controller: ..., gains: ...}]; for 'gain' did you mean 'gains'?",
+            "hw-run.controllers.0.gain=x",
+            "'controllers' is a list, and given as a whole: '0' is no key of it - --set hw-run.controllers.0.gain=x: "
+            "hw-run.controllers - "
+            "fix: hw-run.controllers=[{controller: ..., gains: ...}]; for 'gain' did you mean 'gains'?",
         ),
         ("compare.references=3", "3 should be a valid list - --set compare.references=3: compare.references"),
         ("epochs={a: 1}", "{'a': 1} should be a valid integer - --set epochs={a: 1}: train.epochs"),

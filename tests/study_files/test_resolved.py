@@ -84,7 +84,7 @@ def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
         "wrist",
         command.replace("-", "_"),
         {"train": "gen_data", "analyse": "simulate"}.get(command),
-        "laws" if command in ("tune", "compare", "simulate", "analyse", "hw-run", "study") else None,
+        "controller_settings" if command in ("tune", "compare", "simulate", "analyse", "hw-run", "study") else None,
     }
     drawn, swept = command in ("tune", "compare", "study"), command in ("tune", "compare", "simulate")
     own |= ({"families"} if drawn else set()) | ({"sweep"} if swept else set())

@@ -68,13 +68,16 @@ def test_a_point_changes_its_leaf_and_nothing_else(key: str, value: object, unit
 
 
 def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None:
-    study = load_study(overrides=["compare.rows=[{controller: smc, gains: printed}, {controller: pid}]"])
+    study = load_study(overrides=["compare.controllers=[{controller: smc, gains: printed}, {controller: pid}]"])
     axes = axes_of(
-        study.model_copy(update={"sweep": ("rows.1.controller=mrac", "loops.default.plant_segments=1..3:3")}), "compare"
+        study.model_copy(
+            update={"sweep": ("controllers.1.controller=mrac", "loops.four-segments.plant_segments=1..3:3")}
+        ),
+        "compare",
     )
     at = study_at(study, axes, ["mrac", 3.0])
     assert [row.controller for row in at.compare.rows] == ["smc", "mrac"] and at.compare.loops[
-        "default"
+        "four-segments"
     ].plant_segments == 3
 
 

@@ -26,7 +26,7 @@ from wristctl.vision.view import View
 WRIST = WristParameters()
 SHORT: dict[str, Any] = {
     "directions": ("ulnar",),
-    "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
+    "rows": ({"controller": "smc-tracking", "gains": "hardware"},),
     "reference": {"duration": 0.3, "angle_deg": 8.0},
     "horizon": 0.4,
     "back": 0.2,

@@ -31,7 +31,7 @@ from wristctl.vision.view import View
 
 _AHEAD, _FIRST = 0.01, ("homing", "moving")
 _FULL = {
-    "directions": ("ulnar", "flexion"), "rows": ({"controller": "smc-tracking", "gains": "stepper"},),
+    "directions": ("ulnar", "flexion"), "rows": ({"controller": "smc-tracking", "gains": "hardware"},),
     "reference": {"duration": 1.0, "angle_deg": 30.0}, "horizon": 2.0, "back": 1.0, "rest": 0.3,
     "push": {"force": 0.0}, "calibration": "given", "positions": "stored",
     "bench": {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 10.0}},

@@ -11,8 +11,8 @@ from wristctl.study_files.load import load_study
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of
 
 SETTINGS = (
-    "rows=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8", "loops={default: {}}",
-    "references=[{duration: 0.5}]", "directions=[ulnar, radial, flexion, extension]",
+    "controllers=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8",
+    "loops={four-segments: {}}", "references=[{duration: 0.5}]", "directions=[ulnar, radial, flexion, extension]",
 )  # fmt: skip
 
 

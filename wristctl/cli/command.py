@@ -20,8 +20,8 @@ from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
 from wristctl.study_files.error_messages import check_sizes, located
-from wristctl.study_files.keys import section_keys
-from wristctl.study_files.load import read_study, whole_key
+from wristctl.study_files.keys import section_keys, whole_key
+from wristctl.study_files.load import read_study
 
 
 def asked_to_trust(trust: bool, shown: str) -> bool:

@@ -106,7 +106,7 @@ COMMANDS = {
         examples=(
             "wristctl analyse --controller computed-torque --gains default",
             "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
-            "wristctl analyse --controller smc-tracking --gains stepper --set loop.control_period=5e-3 "
+            "wristctl analyse --controller smc-tracking --gains hardware --set loop.control_period=5e-3 "
             "--set 'loop={actuator: {level: tendon}, sensor: {level: camera}}'",
         ),
     ),

@@ -78,7 +78,7 @@ class TerminalOperator:
     def dare(self, danger: str) -> None:
         """Only with the flag `force`."""
         if "force" not in self.flags:
-            raise UserError(danger, "hw-run.rows", "other gains, or go on with --force", exit_code=3)
+            raise UserError(danger, "hw-run.controllers", "other gains, or go on with --force", exit_code=3)
         self.tell(danger)
 
     def wait_for(self, request: str) -> None:

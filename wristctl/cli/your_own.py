@@ -128,7 +128,7 @@ def check_law(
 
     checks: list[LawCheck] = []
     with asking(partial(asked_to_trust, trust_code)):
-        for check in certificate(placed(law, None), load_study(config or ()).laws, not no_board):
+        for check in certificate(placed(law, None), load_study(config or ()).controller_settings, not no_board):
             checks.append(check)
             if not as_json:
                 say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<23} {check.found}")

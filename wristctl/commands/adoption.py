@@ -31,7 +31,7 @@ def adopted(study: Study, command: str) -> Adopted:
     read = names_read(command)
     sections = {name: getattr(study, name) for name in type(study).model_fields if name in read}
     names: dict[tuple[str, str], str] = {}
-    settings = dict(study.laws)
+    settings = dict(study.controller_settings)
     owners: dict[tuple[str, str], str] = {}
     origins: list[Foreign] = []
     for table, name in named_in(tuple(sections.values())):
@@ -50,9 +50,11 @@ def adopted(study: Study, command: str) -> Adopted:
         origins.append(origin)
 
     laws = [entry_name.removesuffix(PLAIN) for (kind, _), entry_name in names.items() if kind == CONTROLLERS.what]
-    for name in study.laws:
+    for name in study.controller_settings:
         if name not in laws and (meant := nearest(name, laws)):
-            raise UserError(f"this study names no law '{name}'", f"laws.{name}", f"did you mean '{meant}'?")
+            raise UserError(
+                f"this study names no controller '{name}'", f"controller-settings.{name}", f"did you mean '{meant}'?"
+            )
 
     def own_name(table: Choices[Any], name: str) -> str:
         return names.get((table.what, name), name)
@@ -60,7 +62,7 @@ def adopted(study: Study, command: str) -> Adopted:
     if not origins:
         return Adopted(study, ())
     called = {name: renamed(content, own_name) for name, content in sections.items()}
-    return Adopted(study.model_copy(update=called | {"laws": settings}), tuple(origins))
+    return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
 
 
 def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
@@ -125,7 +127,7 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
     if table.what == CONTROLLERS.what:
         from wristctl.control.vetting import law_of, vet
 
-        entry = law_of(entry, origin.reference, study.laws)
+        entry = law_of(entry, origin.reference, study.controller_settings)
         entry_name = str(entry.name)
     elif table.what == OPTIMISERS.what:
         from wristctl.tuning.optimisers import Optimiser

@@ -41,7 +41,9 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
     """
     row = {"controller": name, "gains": "default"}
     try:
-        study = Study.model_validate({"hw-run": {"rows": (row,)}, "laws": {key: dict(v) for key, v in laws.items()}})
+        study = Study.model_validate(
+            {"hw-run": {"rows": (row,)}, "controller-settings": {key: dict(v) for key, v in laws.items()}}
+        )
     except ValidationError as error:
         raise explained(error, {}).at(name) from error
     resolved, foreign = adopted(study, "hw-run")

@@ -12,6 +12,7 @@ from wristctl.commands.inputs_of_loops import by_angles, ends_of_family, identif
 from wristctl.commands.results import Findings
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import Row
+from wristctl.config.former_names import preset_today
 from wristctl.config.loop import DirectionName, Loop, Reference, longest_step
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
@@ -53,7 +54,7 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
-        stated = law.conditions.get(preset)
+        stated = law.conditions.get(preset_today(preset, law.presets))
         if real and stated is None:
             instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
             warnings.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")

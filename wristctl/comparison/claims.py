@@ -14,6 +14,7 @@ from wristctl.comparison.verdicts import Finding, joint, of_numbers, of_ordering
 from wristctl.config.audit import Claim, VerdictName
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import Row
+from wristctl.config.former_names import column_of_loop
 from wristctl.config.loop import LOOPS, Reference
 from wristctl.config.study import Study
 from wristctl.simulation.arrival import SHORT
@@ -349,11 +350,12 @@ def ledger_frame(judged: Sequence[Judgement]) -> pd.DataFrame:
         }
         for name in loops or [""]:
             finding = j.found.get(name) or j.found.get("")
+            column = column_of_loop(name)
             row |= {
-                f"{name}_verdict".strip("_"): finding.verdict if finding else "",
-                "_".join(part for part in (name, "low") if part): finding.low if finding else np.nan,
-                "_".join(part for part in (name, "high") if part): finding.high if finding else np.nan,
-                "_".join(part for part in (name, "mark") if part): finding.mark if finding else "",
+                f"{column}_verdict".strip("_"): finding.verdict if finding else "",
+                "_".join(part for part in (column, "low") if part): finding.low if finding else np.nan,
+                "_".join(part for part in (column, "high") if part): finding.high if finding else np.nan,
+                "_".join(part for part in (column, "mark") if part): finding.mark if finding else "",
             }
         rows.append(row | {"shown_by": ", ".join(j.shown_by), "reason": j.reason})
     return pd.DataFrame(rows)

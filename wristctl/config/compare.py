@@ -10,7 +10,9 @@ from wristctl.config.tune import TuneSettings
 class CompareSettings(Section):
     """Controllers x loops x references x inverses, beside the paper's T2."""
 
-    rows: tuple[Row, ...] = choice((Row(controller="smc", gains="printed"),), "controllers and gains", min_length=1)
+    rows: tuple[Row, ...] = choice(
+        (Row(controller="smc", gains="printed"),), "controllers with their gains", min_length=1, alias="controllers"
+    )
     loops: Loops = choice(
         LOOPS,
         "the loops to judge on, each a block of the table; naming any replaces these (`exact: {}` is the built-in one)",

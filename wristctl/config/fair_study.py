@@ -40,7 +40,9 @@ class StudyVariant(Section):
 class FairStudySettings(Section):
     """Every law tuned with the same budget on each family of worlds, and judged on worlds that no search has seen."""
 
-    laws: tuple[ControllerName, ...] = choice(("pd-ff", "pid-ff"), "laws that are tuned", min_length=1)
+    laws: tuple[ControllerName, ...] = choice(
+        ("pd-ff", "pid-ff"), "controllers that are tuned", min_length=1, alias="controllers"
+    )
     families: tuple[str, ...] = choice((), "families of worlds, by their names in `families`; none: all")
     presets: tuple[Row, ...] = choice((), "rows judged beside the tuned laws")
     terms: dict[str, tuple[str, str]] = choice(
@@ -64,7 +66,7 @@ class FairStudySettings(Section):
     def _laws_once(self) -> Self:
         twice = sorted({law for law in self.laws if self.laws.count(law) > 1})
         if twice:
-            raise ValueError(f"{twice[0]} is among the laws twice")
+            raise ValueError(f"{twice[0]} is named twice")
         return self
 
     @model_validator(mode="after")

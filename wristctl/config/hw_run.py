@@ -109,10 +109,13 @@ class CalibrateWristSettings(RigSettings):
 
 
 class HwRunSettings(RigSettings):
-    """The paper's experiment: directions x repetitions, with and without a push, for each row of controllers."""
+    """The paper's experiment: directions x repetitions, with and without a push, for each controller."""
 
     rows: tuple[Row, ...] = choice(
-        (Row(controller="smc-tracking", gains="stepper"),), "controllers and gains", min_length=1
+        (Row(controller="smc-tracking", gains="hardware"),),
+        "controllers with their gains",
+        min_length=1,
+        alias="controllers",
     )
     directions: tuple[DirectionName, ...] = choice(
         ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1

@@ -162,7 +162,7 @@ class Reference(OpenSection):
 class Scenario(Section):
     """A loop and a reference: what a controller is tuned or judged on."""
 
-    loop: str = choice("default", "name of a loop in `loops`")
+    loop: str = choice("four-segments", "name of a loop in `loops`")
     reference: Reference = Reference()
 
 
@@ -170,7 +170,7 @@ class Scenario(Section):
 LOOPS: dict[str, Loop] = {
     "exact": Loop(plant_segments=1, control_period=1e-6, limits=False),
     "sampled": Loop(plant_segments=1),
-    "default": Loop(),
+    "four-segments": Loop(),
 }
 
 

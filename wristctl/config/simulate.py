@@ -11,7 +11,7 @@ class SimulateSettings(Section):
     """One closed loop."""
 
     controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
-    gains: GainsChoice = choice("stepper", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    gains: GainsChoice = choice("hardware", "a preset's name, `tuned` (from a tune run), or every gain by name")
     loop: Loop = Loop()
     reference: Reference = Reference()
     direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")

@@ -33,9 +33,10 @@ class Study(Section):
     sweep: tuple[str, ...] = Field(
         (), description="leaves at many values, as KEY=1,2,3 or KEY=0..3:20", json_schema_extra={"unsaid": True}
     )
-    laws: dict[str, dict[str, float]] = Field(
+    controller_settings: dict[str, dict[str, float]] = Field(
         {},
-        description="settings of laws from elsewhere that have some, by the law's name",
+        alias="controller-settings",
+        description="settings of controllers of your own that have some, by the controller's name",
         json_schema_extra={"unsaid": True},
     )
     gen_data: DataSettings = Field(DataSettings(), alias="gen-data")

@@ -52,9 +52,9 @@ ADRC = Controller(
     },
     presets={
         "default": {"wc": 30.0, "wo": 200.0, "beta": 1.0},
-        "stepper": {"wc": 30.0, "wo": 120.0, "beta": 2.0},
+        "hardware": {"wc": 30.0, "wo": 120.0, "beta": 2.0},
     },
     memory=4,
-    notes={"stepper": BY_TRIAL},
-    conditions={"stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

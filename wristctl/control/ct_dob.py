@@ -34,9 +34,9 @@ CT_DOB = Controller(
     },
     presets={
         "default": {"w": 50.0, "zeta": 1.0, "wo": 50.0},
-        "stepper": {"w": 35.0, "zeta": 0.6, "wo": 300.0},
+        "hardware": {"w": 35.0, "zeta": 0.6, "wo": 300.0},
     },
     memory=VALUES,
-    notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

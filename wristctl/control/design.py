@@ -12,7 +12,7 @@ from wristctl.plugins.places import contained
 
 @dataclass(frozen=True)
 class LawDesign:
-    """Makes a controller from the settings that a study gives it in `laws`, `laws: {lqr: {angle_weight: 400}}`.
+    """Makes a controller from the settings of a study, `controller-settings: {lqr: {angle_weight: 400}}`.
 
     What `make` works out before a law runs, as numbers or as functions that it closes over, is part of the compiled
     law: other settings compile anew.
@@ -33,10 +33,16 @@ class LawDesign:
         for key in settings:
             if key not in self.section:
                 raise UserError(
-                    f"unknown setting '{key}' of {self.name}", f"laws.{self.name}", meant(key, self.section)
+                    f"unknown setting '{key}' of {self.name}",
+                    f"controller-settings.{self.name}",
+                    meant(key, self.section),
                 )
-        with contained(f"making {self.name} of these settings", f"laws.{self.name}"):
+        with contained(f"making {self.name} of these settings", f"controller-settings.{self.name}"):
             controller = self.make(self.values(settings))
         if not isinstance(controller, Controller) or controller.name.removesuffix(PLAIN) != self.name:
-            raise UserError(f"{self.name} makes no controller of that name", f"laws.{self.name}", "mend what makes it")
+            raise UserError(
+                f"{self.name} makes no controller of that name",
+                f"controller-settings.{self.name}",
+                "mend what makes it",
+            )
         return replace(controller, settings=self.section)

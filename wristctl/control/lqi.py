@@ -59,9 +59,9 @@ LQI = Controller(
     },
     presets={
         "default": {"wp": 40.0, "wd": 40.0, "wi": 15.0},
-        "stepper": {"wp": 40.0, "wd": 40.0, "wi": 30.0},
+        "hardware": {"wp": 40.0, "wd": 40.0, "wi": 30.0},
     },
     memory=1,
-    notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

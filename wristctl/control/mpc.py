@@ -112,10 +112,10 @@ MPC = Controller(
     },
     presets={
         "default": {"w": 50.0, "zeta": 1.0, "wo": 50.0},
-        "stepper": {"w": 45.0, "zeta": 0.8, "wo": 200.0},
+        "hardware": {"w": 45.0, "zeta": 0.8, "wo": 200.0},
     },
     memory=VALUES + 2 * HORIZON,
     preview=HORIZON,
-    notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -72,12 +72,12 @@ MRAC = Controller(
     },
     presets={
         "default": {"w": 80.0, "lambda": 80.0, "Kd": 0.5, "gamma": 100.0, "leak": 1e-3},
-        "stepper": {"w": 13.0, "lambda": 5.2, "Kd": 0.32, "gamma": 31.0, "leak": 7.7e-4},
+        "hardware": {"w": 13.0, "lambda": 5.2, "Kd": 0.32, "gamma": 31.0, "leak": 7.7e-4},
     },
     memory=PARAMETERS + len(LOWEST),
     notes={
         "default": "our design; chosen by trial on the four-segment plant at 1 kHz",
-        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
+        "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
-    conditions={"stepper": Conditions((1e-3, 5e-3), (8e3, 1e5))},
+    conditions={"hardware": Conditions((1e-3, 5e-3), (8e3, 1e5))},
 )

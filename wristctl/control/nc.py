@@ -69,12 +69,12 @@ NC = Controller(
     },
     presets={
         "default": {"lambda": 50.0, "Kv": 0.5, "Gamma": 2.0, "kappa": 0.1},
-        "stepper": {"lambda": 8.2, "Kv": 0.29, "Gamma": 2.1, "kappa": 0.014},
+        "hardware": {"lambda": 8.2, "Kv": 0.29, "Gamma": 2.1, "kappa": 0.014},
     },
     memory=UNITS + 1,
     notes={
         "default": "our design; chosen by trial on the four-segment plant at 1 kHz",
-        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
+        "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
-    conditions={"default": Conditions((5e-3, 1e-2), (2e4, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((5e-3, 1e-2), (2e4, 1e5)), "hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

@@ -92,12 +92,12 @@ NN_MRAC = Controller(
     presets={
         "published": {"w": 2.236, "zeta": 0.67, "eta": 10.0, "Kd": 0.1},
         "default": {"w": 50.0, "zeta": 1.0, "eta": 100.0, "Kd": 0.3},
-        "stepper": {"w": 150.0, "zeta": 1.0, "eta": 20.0, "Kd": 0.6},
+        "hardware": {"w": 150.0, "zeta": 1.0, "eta": 20.0, "Kd": 0.6},
     },
     memory=_MODEL + 3,
     notes={
         "published": "its reference model; the rest is not specified",
-        "stepper": BY_TRIAL,
+        "hardware": BY_TRIAL,
     },
-    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -31,8 +31,8 @@ PD_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Kd": 0.1},
-        "stepper": {"Kp": 6.0, "Kd": 0.4},
+        "hardware": {"Kp": 6.0, "Kd": 0.4},
     },
-    notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

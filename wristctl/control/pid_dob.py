@@ -36,9 +36,9 @@ PID_DOB = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 5.0, "Ki": 1.0, "Kd": 0.2, "wo": 20.0},
-        "stepper": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0},
+        "hardware": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0},
     },
     memory=1 + VALUES,
-    notes={"stepper": BY_TRIAL},
-    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -24,9 +24,9 @@ PID_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Ki": 5.0, "Kd": 0.1},
-        "stepper": {"Kp": 5.0, "Ki": 100.0, "Kd": 0.4},
+        "hardware": {"Kp": 5.0, "Ki": 100.0, "Kd": 0.4},
     },
     memory=1,
-    notes={"stepper": BY_TRIAL},
-    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
 )

@@ -32,18 +32,18 @@ SMC = Controller(
         "printed": {"P1": 0.001, "P2": 1000.0, "P3": 1000.0},
         "exchanged": {"P1": 1000.0, "P2": 0.001, "P3": 1000.0},
         "initial": {"P1": 1.0, "P2": 1.0, "P3": 1.0},
-        "stepper": {"P1": 20.0, "P2": 1.0, "P3": 60.0},
+        "hardware": {"P1": 20.0, "P2": 1.0, "P3": 60.0},
     },
     notes={
         "printed": "on sigma = 0 the angle has a time constant of P2/P1 = 1e6 s (C5)",
         "exchanged": "hypothesis: P1 and P2 of the printed gains exchanged (C5)",
         "initial": "the paper's start values",
-        "stepper": "behind a camera and stepper motors at a period of 5 ms: chosen by trial on the emulated bench",
+        "hardware": "behind a camera and stepper motors at a period of 5 ms: chosen by trial on the emulated bench",
     },
     conditions={
         "printed": Conditions((1e-3, 1e-2), (2e3, 1e5)),
         "initial": Conditions((1e-3, 1e-2), (5e3, 1e5)),
-        "stepper": Conditions((1e-3, 1e-2), (5e3, 1e5)),
+        "hardware": Conditions((1e-3, 1e-2), (5e3, 1e5)),
     },
     surface=Surface(lambda gains: (gains["P1"], gains["P2"], 0.0), lambda gains: 1.0, of_error=False),
 )

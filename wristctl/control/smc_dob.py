@@ -28,10 +28,10 @@ SMC_DOB = Controller(
     },
     presets={
         "default": {"Kp": 5.0, "Ki": 1.0, "Kd": 0.2, "wo": 20.0, "Ks": 0.05, "phi": 1.0},
-        "stepper": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0, "Ks": 0.02, "phi": 1.0},
+        "hardware": {"Kp": 4.0, "Ki": 1.0, "Kd": 0.1, "wo": 200.0, "Ks": 0.02, "phi": 1.0},
     },
     memory=1 + VALUES,
-    notes={"stepper": BY_TRIAL},
-    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    notes={"hardware": BY_TRIAL},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
     surface=Surface(lambda gains: (gains["Kp"], gains["Kd"], 0.0), lambda gains: gains["Kd"] * gains["phi"]),
 )

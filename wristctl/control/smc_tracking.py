@@ -41,15 +41,15 @@ SMC_TRACKING = Controller(
     presets={
         "default": {"lambda": 140.0, "kappa": 450.0, "k": 280.0, "phi": 10.0},
         "camera": {"lambda": 20.0, "kappa": 250.0, "k": 100.0, "phi": 10.0},
-        "stepper": {"lambda": 30.0, "kappa": 450.0, "k": 40.0, "phi": 10.0},
+        "hardware": {"lambda": 30.0, "kappa": 450.0, "k": 40.0, "phi": 10.0},
     },
     memory=1,
     notes={
         "default": "chosen by trial on the four-segment plant at 1 kHz with ideal sensing",
         "camera": "slower: chosen by search behind a 60 Hz camera with two frames of delay",
-        "stepper": "behind that camera and stepper motors at a period of 5 ms, where `camera` keeps swinging: by trial "
-        "on the emulated bench, springs of 70 and 100 %, tendons of 10 to 40 kN/m, up to three frames of delay",
+        "hardware": "behind that camera and stepper motors at a period of 5 ms, where `camera` keeps swinging: by "
+        "trial on the emulated bench, springs of 70 and 100 %, tendons of 10 to 40 kN/m, up to three frames of delay",
     },
-    conditions={"camera": Conditions((1e-3, 1e-2), (8e3, 1e5)), "stepper": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    conditions={"camera": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
     surface=Surface(lambda gains: (gains["lambda"], 1.0, gains["kappa"]), lambda gains: gains["phi"]),
 )

@@ -44,13 +44,13 @@ SUPER_TWISTING = Controller(
     },
     presets={
         "default": {"lambda": 140.0, "k1": 500.0, "k2": 5e4, "tau": 0.0036},
-        "stepper": {"lambda": 5.4, "k1": 100.0, "k2": 1.4e4, "tau": 0.017},
+        "hardware": {"lambda": 5.4, "k1": 100.0, "k2": 1.4e4, "tau": 0.017},
     },
     memory=1,
     notes={
         "default": "chosen by trial on the four-segment plant at 1 kHz",
-        "stepper": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
+        "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
-    conditions={"stepper": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
     surface=Surface(lambda gains: (gains["lambda"], 1.0, 0.0), lambda gains: 0.25 * (gains["k1"] * gains["tau"]) ** 2),
 )

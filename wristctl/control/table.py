@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wristctl.config.choices import CONTROLLERS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.config.former_names import preset_today
 from wristctl.control.law import Controller
 from wristctl.control.vetting import law_of
 from wristctl.errors import Call, UserError, meant
@@ -36,11 +37,12 @@ def gains_of(
             raise UserError(f"no tuned gains of {chosen.name}", "gains", fix)
         gains = tuned[chosen.name]
     if isinstance(gains, str):
-        if gains not in chosen.presets:
+        preset = preset_today(gains, chosen.presets)
+        if preset not in chosen.presets:
             raise UserError(
                 f"unknown gains '{gains}' of {chosen.name}", "gains", meant(gains, [*chosen.presets, "tuned"])
             )
-        return chosen.values(chosen.presets[gains])
+        return chosen.values(chosen.presets[preset])
     for name in gains:
         if name not in chosen.gains:
             raise UserError(f"unknown gain '{name}' of {chosen.name}", f"gains.{name}", meant(name, chosen.gains))

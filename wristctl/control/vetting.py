@@ -46,7 +46,11 @@ def law_of(entry: Any, where: str, settings: Mapping[str, Mapping[str, float]]) 
         problem = f"{where.rpartition(':')[2]} is a {type(entry).__name__}, and no Controller"
         raise UserError(problem, where, "name the Controller of that file: `wristctl new controller NAME` writes one")
     if settings.get(entry.name.removesuffix(PLAIN)):
-        raise UserError(f"{entry.name} has no settings", f"laws.{entry.name}", "leave them out, or make it a LawDesign")
+        raise UserError(
+            f"{entry.name} has no settings",
+            f"controller-settings.{entry.name}",
+            "leave them out, or make it a LawDesign",
+        )
     return entry
 
 

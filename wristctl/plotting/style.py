@@ -20,6 +20,8 @@ from matplotlib.text import Text
 from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
+from wristctl.config.former_names import label_today
+
 BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 # Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted.
@@ -62,7 +64,7 @@ STRAIGHT: dict[str, Any] = {"color": BLUE, "linewidth": 1.0}
 _DASHES: dict[str, Any] = {
     "tuned": "-",
     "default": "-",
-    "stepper": (0, (9, 1)),
+    "hardware": (0, (9, 1)),
     "exchanged": (0, (5, 1.5)),
     "printed": (0, (1.2, 1.2)),
     "initial": (0, (5, 1.5, 1.2, 1.5)),
@@ -201,7 +203,7 @@ def colour(controller: str) -> str:
 
 def line(label: str) -> dict[str, Any]:
     """Line style of "controller/gains": colour by controller, dashes by gains."""
-    controller, _, gains = label.partition("/")
+    controller, _, gains = label_today(label).partition("/")
     return {"color": colour(controller), "linestyle": _DASHES.get(gains or "default", _OTHER_DASHES)}
 
 

@@ -1,5 +1,6 @@
 """Code that a study names by its place, path/to/file.py:NAME, or by an entry point: where it is from, and loaded."""
 
+import logging
 import os
 import sys
 import traceback
@@ -11,10 +12,13 @@ from types import ModuleType
 from typing import Any
 
 from wristctl.config.foreign import Foreign, is_reference, split
+from wristctl.config.former_names import file_today
 from wristctl.errors import UserError, meant
 from wristctl.interrupt import from_outside
 from wristctl.plugins.import_hook import digest_now, imported, root_of
 from wristctl.plugins.trust import run_around, trusted
+
+log = logging.getLogger(__name__)
 
 _PACKAGE = os.path.join(Path(__file__).parents[1], "")
 
@@ -32,9 +36,11 @@ def placed(value: Any, document: Path | None) -> Any:
         return value
     file, attribute = split(value)
     full_path = Path(os.path.abspath((document.parent if document else Path()) / file.expanduser()))
+    if (moved := file_today(full_path)) != full_path:
+        log.warning("%s is now %s", full_path, moved)
     if document:
-        check_within(full_path, document)
-    return f"{full_path}:{attribute}"
+        check_within(moved, document)
+    return f"{moved}:{attribute}"
 
 
 def check_within(named: Path, document: Path) -> None:

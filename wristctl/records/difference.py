@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from wristctl.records.manifest import CONFIG, PACKAGES, SOURCES
 from wristctl.records.run import Run
+from wristctl.study_files.renaming import NewNames, with_keys_of_today
 from wristctl.study_files.strict_yaml import parse_yaml
 
 _FACTS = ("python", "os", "machine", "cpu", "cores")
@@ -52,7 +53,8 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Change]
 def leaves_of(run: Run) -> dict[str, Any]:
     """The configuration as written, by dotted key path."""
     file = run.file(CONFIG)
-    return dict(_leaves(parse_yaml(file.read_bytes(), str(file)).data, ""))
+    document = with_keys_of_today(parse_yaml(file.read_bytes(), str(file)), str(file), NewNames())
+    return dict(_leaves(document.data, ""))
 
 
 def _leaves(value: Any, path: str) -> list[tuple[str, Any]]:

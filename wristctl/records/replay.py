@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from wristctl.config.former_names import label_today
 from wristctl.errors import UserError
 from wristctl.records.difference import Change, difference
 from wristctl.records.files import sha256_of
@@ -95,7 +96,7 @@ def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, kind: str) -
                 differences = np.abs(a.astype(float) - b.astype(float))
             largest = max(largest, float(np.nanmax(differences[np.isfinite(differences)], initial=0.0)))
         else:
-            alike = (a == b) | ((a != a) & (b != b))
+            alike = (a == b) | ((a != a) & (b != b)) | (_names_today(a) == _names_today(b))
         if not np.all(alike):
             index = tuple(int(k) for k in np.argwhere(~np.atleast_1d(alike))[0])
             timed = time is not None and (time.shape == a.shape or time.shape == a.shape[:1])
@@ -106,6 +107,13 @@ def _first_difference(pairs: dict[str, tuple[Any, Any]], time: Any, kind: str) -
         return FileComparison("within tolerance", f"largest difference {largest:.2g}")
     *_, place = min(places, key=lambda place: place[:2])
     return FileComparison("differs", f"{place}; largest difference {largest:.2g}")
+
+
+def _names_today(names: np.ndarray) -> np.ndarray:
+    """Text with former names of gain presets as they are called today."""
+    import numpy as np
+
+    return np.array([label_today(str(name)) for name in names.ravel()], dtype=object).reshape(names.shape)
 
 
 def _compare_pictures(a: np.ndarray, b: np.ndarray) -> FileComparison:

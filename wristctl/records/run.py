@@ -26,7 +26,7 @@ from wristctl.records.seal import (
     faults_of_manifest,
 )
 from wristctl.sha256sums import read_seal, unreadable
-from wristctl.study_files.load import load_study
+from wristctl.study_files.load import read_study
 
 if TYPE_CHECKING:
     import numpy as np
@@ -100,7 +100,7 @@ class Run:
     @cached_property
     def config(self) -> Study:
         """The resolved study it ran."""
-        return load_study([self.path / CONFIG])
+        return read_study([self.path / CONFIG], note=False)[0]
 
     @property
     def metrics(self) -> dict[str, dict[str, Any]]:

@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from wristctl.config import former_names
 from wristctl.config.section import OneOf, Section
 from wristctl.config.study import Study
 from wristctl.study_files.strict_yaml import KeyPath
@@ -51,6 +52,14 @@ def section_keys(command: str | None) -> dict[str, FieldInfo]:
 def home_of(command: str, key: str) -> str:
     """The section in which a command finds one of its keys."""
     return command if key in keys_of(field_at((command,))[0]) else SUBJECTS.get(command, command)
+
+
+def whole_key(key: str, command: str | None) -> str:
+    """A dotted key, or an override that begins with one, with the section in which a command looks for it."""
+    first = key.partition("=")[0].partition(".")[0]
+    if command and (first in section_keys(command) or (command, first) in former_names.KEYS):
+        return f"{home_of(command, first)}.{key}"
+    return key
 
 
 def unit_of(field: FieldInfo) -> str:

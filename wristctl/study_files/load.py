@@ -1,54 +1,29 @@
 """Read a study from files and overrides; every error says where it stands and how to mend it."""
 
-import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_in
 from wristctl.config.study import Study
-from wristctl.errors import Phrase, Setting, UserError, meant, worded
+from wristctl.errors import Phrase, Setting, UserError, meant
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
 from wristctl.study_files.error_messages import explained
-from wristctl.study_files.keys import field_at, home_of, keys_of, section_keys
+from wristctl.study_files.keys import field_at, keys_of, section_keys, whole_key
+from wristctl.study_files.renaming import (
+    NewNames,
+    leave_out_removed,
+    note_presets,
+    with_keys_of_today,
+    with_loops_of_today,
+)
 from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
-
-log = logging.getLogger(__name__)
-
-# The end of a key path, and what has come in its place.
-FORMER = {
-    ("sensor", "seed"): "a camera's noise now comes from `seed`, the root of every random stream (--seed)",
-    ("claims", "exact"): "each loop has a verdict of its own now, and `sense` says how a value is meant",
-}
-
-
-def leave_out_former(data: dict[str, Any], origins: Mapping[KeyPath, Phrase]) -> None:
-    """Take former keys out of what files say; a warning names each kind of them once, with its first place."""
-    removed: dict[tuple[str, str], KeyPath] = {}
-    _take_out(data, (), removed)
-    for former, path in removed.items():
-        where = f"{worded(origins[path])}: " if path in origins else ""
-        log.warning("%s%s is no longer a setting: %s", where, ".".join(map(str, path)), FORMER[former])
-
-
-def _take_out(node: Any, path: KeyPath, removed: dict[tuple[str, str], KeyPath]) -> None:
-    if isinstance(node, dict):
-        for key in list(node):
-            former = (next((part for part in reversed(path) if isinstance(part, str)), ""), str(key))
-            if former in FORMER:
-                del node[key]
-                removed.setdefault(former, (*path, key))
-            else:
-                _take_out(node[key], (*path, key), removed)
-    elif isinstance(node, list | tuple):
-        for position, item in enumerate(node):
-            _take_out(item, (*path, position), removed)
-
 
 # The key of a study file that names others, which are read before it.
 INCLUDE = "include"
@@ -73,27 +48,39 @@ def load_study(
 
 
 def read_study(
-    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None
+    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None, note: bool = True
 ) -> tuple[Study, Mapping[KeyPath, Phrase]]:
-    """As load_study, with the file and line (or override) of each key that was given."""
+    """As load_study, with the file and line (or override) of each key that was given.
+
+    A note names the former names among them, unless none is wanted.
+    """
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
+    former = NewNames()
     for file in files:
         path = study_file(file)
         if path is None:
             problem = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
             raise UserError(problem, str(file), meant(shipped_name(file), shipped_names()))
-        _merge_file(data, path, origins, ())
-    leave_out_former(data, origins)
+        _merge_file(data, path, origins, (), former)
+    leave_out_removed(data, origins)
     for override in overrides:
-        _merge(data, _whole(_override(override, command), None), Setting(override), origins)
+        setting = Setting(override)
+        document = with_keys_of_today(_override(override, command), setting, former)
+        _merge(data, _whole(document, None), setting, origins)
+    with_loops_of_today(data, origins, former)
+    note_presets(data, origins, former)
+    if note:
+        former.note()
     try:
         return Study.model_validate(data, by_alias=True, by_name=False), origins
     except ValidationError as error:
         raise explained(error, origins) from error
 
 
-def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase], outer: Sequence[Path]) -> None:
+def _merge_file(
+    data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase], outer: Sequence[Path], former: NewNames
+) -> None:
     """A file after those that it includes, which it names from where it stands."""
     document = _read(file)
     content = dict(document.data or {})
@@ -109,9 +96,10 @@ def _merge_file(data: dict[str, Any], file: Path, origins: dict[KeyPath, Phrase]
         if inner.resolve() in [outer_file.resolve() for outer_file in (*outer, file)]:
             raise UserError(f"{inner} includes itself", where, "leave one of them out")
         check_within(inner, file)
-        _merge_file(data, inner, origins, (*outer, file))
+        _merge_file(data, inner, origins, (*outer, file), former)
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
-    _merge(data, _whole(Document(content, lines), file), str(file), origins)
+    document = with_keys_of_today(Document(content, lines), str(file), former)
+    _merge(data, _whole(document, file), str(file), origins)
 
 
 def _read(file: Path) -> Document:
@@ -135,12 +123,6 @@ def _whole(document: Document, file: Path | None) -> Document:
     return Document(placed(_found_from(document.data, folder), file), document.lines)
 
 
-def whole_key(key: str, command: str | None) -> str:
-    """A dotted key, or an override that begins with one, with the section in which a command looks for it."""
-    first = key.partition("=")[0].partition(".")[0]
-    return f"{home_of(command, first)}.{key}" if command and first in section_keys(command) else key
-
-
 def _override(text: str, command: str | None) -> Document:
     dotted, equals, value = text.partition("=")
     where = Setting(text)
@@ -148,7 +130,7 @@ def _override(text: str, command: str | None) -> Document:
         raise UserError("an override is key=value", where, ("for example ", Setting("wrist.length=0.09")))
     keys = whole_key(dotted, command).split(".")
     command_keys, top = section_keys(command), keys_of(Study)
-    if keys[0] not in top:
+    if key_today(tuple(keys))[0] not in top:
         raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*command_keys, *top])))
     try:
         data = parse_yaml(value, "").data

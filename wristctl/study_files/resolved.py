@@ -21,9 +21,10 @@ _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 Entry = tuple[str, Any, str]
 
 _SHARED = ("seed", "wrist")
-_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": ("laws", "sweep"), "hw-run": ("laws",)}
-_READ |= dict.fromkeys(("tune", "compare"), ("families", "laws", "sweep")) | {"study": ("families", "laws")}
-_READ |= {command: (subject, "laws") for command, subject in SUBJECTS.items()}
+_OWN = "controller-settings"
+_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, "sweep"), "hw-run": (_OWN,)}
+_READ |= dict.fromkeys(("tune", "compare"), ("families", _OWN, "sweep")) | {"study": ("families", _OWN)}
+_READ |= {command: (subject, _OWN) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 

@@ -11,10 +11,11 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from wristctl.config.families import Range
+from wristctl.config.former_names import LOOPS, key_today
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError, meant
-from wristctl.study_files.keys import home_of, keys_of, section_keys, unit_of
+from wristctl.study_files.keys import keys_of, unit_of, whole_key
 from wristctl.study_files.strict_yaml import parse_yaml
 
 MOST_POINTS = 1_000_000
@@ -52,10 +53,7 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
         key, equals, values = text.partition("=")
         if not equals or not key.strip() or not values.strip():
             raise UserError("a sweep is KEY=VALUES", Argument("sweep", text), _EXAMPLE)
-        parts = key.strip().split(".")
-        if parts[0] in section_keys(command):
-            parts.insert(0, home_of(command, parts[0]))
-        name = ".".join(parts)
+        name = ".".join(key_today(tuple(whole_key(key.strip(), command).split("."))))
         if name in [axis.key for axis in axes]:
             raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
         counted.append((text, *_count(text, values)))
@@ -128,6 +126,7 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         object.__setattr__(copy, "__pydantic_fields_set__", section.model_fields_set | {name})
         return copy
     if isinstance(section, Mapping) and (head in section or below_head):
+        head = head if head in section else LOOPS.get(head, head)
         if head not in section:
             raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, map(str, section)))
         new = _changed(section[head], tuple(below_head), value, axis) if below_head else _alike(section[head], value)

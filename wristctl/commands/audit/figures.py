@@ -132,7 +132,7 @@ def _places(values: Sequence[object]) -> tuple[np.ndarray, list[str]]:
     return np.array([names.index(str(value)) for value in values]) + spread, names
 
 
-_LOOPS = {"exact": (BLUE, "o"), "sampled": (ORANGE, "s"), "default": (VERMILLION, "^")}
+_LOOPS = {"exact": (BLUE, "o"), "sampled": (ORANGE, "s"), "four-segments": (VERMILLION, "^")}
 _REACH = (1e-8, 1e5)
 
 

@@ -193,7 +193,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
     for number, row in enumerate(settings.rows):
         if row.gains != "tuned" or row.controller not in found_here:
-            with under(f"compare.rows.{number}"):
+            with under(f"compare.controllers.{number}"):
                 check_row(row, tuned_gains(inputs), inputs.runs().get("tuned"))
     if settings.tuning is not None:
         check_family_reach(study, settings.tuning.worlds.family)

@@ -65,7 +65,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check controllers and gains and say what would be done; opens nothing."""
     settings, tuned = study.hw_run, tuned_gains(inputs)
     for number, row in enumerate(settings.rows):
-        with under(f"hw-run.rows.{number}"):
+        with under(f"hw-run.controllers.{number}"):
             check_row(row, tuned)
     with under("hw-run"):
         check_reach([settings.reference], identified(study, "hw-run", inputs).wrist, "reference")

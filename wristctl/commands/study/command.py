@@ -45,7 +45,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         for name in (*families_of(study), *filter(None, [settings.varied])):
             family_of(study.families, name, "families")
         for number, name in enumerate(settings.laws):
-            with under(f"laws.{number}"):
+            with under(f"controllers.{number}"):
                 check_tunable(controller(name))
         for number, row in enumerate(settings.presets):
             with under(f"presets.{number}"):

@@ -26,5 +26,5 @@ LQR = Controller(
         "q": Gain("1/s^4", "weight of the squared error over that of the squared acceleration", 1e2, 1e9),
         "qd": Gain("1/s^2", "weight of its squared rate", 1e-2, 1e5),
     },
-    presets={"default": {"q": 4.0e6, "qd": 100.0}, "rig": {"q": 2.0e4, "qd": 100.0}},
+    presets={"default": {"q": 4.0e6, "qd": 100.0}, "hardware": {"q": 2.0e4, "qd": 100.0}},
 )
