@@ -126,3 +126,13 @@ def test_a_stranger_who_types_the_page_gets_a_row_in_compare_and_a_trial_in_hw_r
     for kind in ("simulate", "compare", "hw-run"):
         done = wristctl(tmp_path, "runs", "replay", f"latest:{kind}", "--trust-code")
         assert done.returncode == 0 and "identical" in done.stdout.splitlines()[-1], done.stderr
+
+
+def test_the_law_with_filters_in_the_page_is_fit_and_rests_where_it_should(tmp_path: Path) -> None:
+    (text,) = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "PD_NOTCH" in block)
+    (tmp_path / "notched.py").write_text(text)
+    place = f"{tmp_path}/notched.py:PD_NOTCH"
+    assert not [check for check in asked(place).values() if check.passed is False]
+    study = face.load_study(None, f"simulate.controller={place}", "simulate.gains=default", "simulate.horizon=2.0")
+    done = face.simulate(study)
+    assert done.metrics["missing"] < 0.01 and done.metrics["oscillation"] < 1e-3 and not done.marks

@@ -23,6 +23,7 @@ from wristctl.config.foreign import PLAIN
 from wristctl.config.section import Parameter
 from wristctl.control.plain_law import PlainLaw
 from wristctl.errors import UserError
+from wristctl.lanes import functions, lane
 from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import compiled, frozen_values, keep
 from wristctl.lanes.rows import rows_named
@@ -174,12 +175,16 @@ class _NativeLaw(types.WrapperAddressProtocol):
         """Nothing can have gone wrong in native code."""
 
 
+# Functions of Python and NumPy that have another name for lanes.
+_OTHER_NAMES = {"arctan2": "atan2", "pow": "power", "min": "minimum", "max": "maximum"}
+
 # Patterns in numba's messages, and their meaning.
 _TOLD = (
     (r"(?:bool|truth)\((?:Mask|Lane)Type",
      "it branches on a value, which differs from rollout to rollout: use where(condition, yes, no)"),
     (r"Unknown attribute '(\w+)' of type rows\(.*?, \d+, ([\w,]*)\)", "there is no '{0}' among {1}"),
-    (r"No implementation of function Function\((.*?)\) found", "it calls {0}, which compiled code does not have"),
+    (r"No implementation of function Function\((?:<(?:built-in function |function |ufunc '))?(\w+).*?\) found",
+     "it calls {0}, which does not compile"),
     (r"No conversion from none to LaneType", "it returns no torque"),
 )  # fmt: skip
 
@@ -191,13 +196,21 @@ def _refused(law: Law, error: NumbaError) -> UserError:
     reasons = [message for message in lines if not message.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
     why = reasons[0] if reasons else type(error).__name__
     explanations = [(match, words) for pattern, words in _TOLD if (match := re.search(pattern, text))]
+    fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
     if explanations:
         match, words = explanations[0]
         why = words.format(*match.groups())
+        fix = (_import_of(match[1]) if match.lastindex == 1 else "") or fix
     numbers = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
     line = numbers[-1] if numbers else law.__code__.co_firstlineno
-    fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
     return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
+
+
+def _import_of(name: str) -> str:
+    """The import of what a law calls in place of a function of Python or NumPy; empty for what lanes do not have."""
+    lanes_name = _OTHER_NAMES.get(name, name)
+    modules = [module for module in (lane, functions) if callable(getattr(module, lanes_name, None))]
+    return f"from {modules[0].__name__} import {lanes_name}" if modules else ""
 
 
 @cache

@@ -92,11 +92,23 @@ def exp2i(k: Any) -> Any:
     raise NotImplementedError("compiled code only")
 
 
+def exponent(x: Any) -> Any:
+    """The whole k of x = m 2^k with 1 <= m < 2, for x of at least 2^-1022."""
+    raise NotImplementedError("compiled code only")
+
+
 def _exp2i(builder: Any, k: Any) -> Any:
     width = k.type.count
     integers = ir.VectorType(ir.IntType(64), width)
     biased = builder.add(builder.fptosi(k, integers), ir.Constant(integers, [1023] * width))
     return builder.bitcast(builder.shl(biased, ir.Constant(integers, [52] * width)), k.type)
+
+
+def _exponent(builder: Any, x: Any) -> Any:
+    width = x.type.count
+    integers = ir.VectorType(ir.IntType(64), width)
+    biased = builder.lshr(builder.bitcast(x, integers), ir.Constant(integers, [52] * width))
+    return builder.sitofp(builder.sub(biased, ir.Constant(integers, [1023] * width)), x.type)
 
 
 define(where, (MaskType, LaneType, LaneType), LaneType, lambda b, c, x, y: b.select(c, x, y))
@@ -105,6 +117,7 @@ define(sqrt, (LaneType,), LaneType, _instruction("sqrt"))
 define(floor, (LaneType,), LaneType, _instruction("floor"))
 define(abs, (LaneType,), LaneType, _instruction("fabs"))
 define(exp2i, (LaneType,), LaneType, _exp2i)
+define(exponent, (LaneType,), LaneType, _exponent)
 define(rounded, (LaneType,), LaneType, lambda b, x: b.fadd(x, ir.Constant(x.type, [-0.0] * x.type.count)))
 
 
@@ -115,7 +128,7 @@ def _rounded_number(x: Any) -> Any:
 
 @overload(zero_like, strict=False)
 def _zero_like_number(x: Any) -> Any:
-    return (lambda x: 0.0) if isinstance(x, types.Float) else None
+    return (lambda x: 0.0) if isinstance(x, types.Number) else None
 
 
 def polynomial(coefficients: tuple[float, ...]) -> Any:
