@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+import logging
 import time
+from itertools import accumulate, islice, takewhile
 from typing import Any
 
 import pytest
 from rich.console import Console
 
 from wristctl.cli import progress as module
-from wristctl.commands.progress import Count, no_event
+from wristctl.commands.progress import Count, counting, no_event
 
 
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
@@ -24,17 +26,40 @@ def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict
     return screen.getvalue().splitlines(), events
 
 
-def test_frequent_calls_give_few_lines_and_events() -> None:
+def test_frequent_calls_give_no_lines_and_few_events() -> None:
     lines, events = _shown(1000)
     assert lines == []
     assert [event["count"] for event in events] == [1, 1000]
     assert events[-1]["best"] == 1e-3
 
 
-def test_a_line_tells_count_and_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_LINE_EVERY", 0.0)
-    lines, _ = _shown(1000)
-    assert lines[-1] == "tuning: 1000 of 1000 steps, best 0.001"
+def test_a_step_that_takes_long_has_lines_of_its_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_FIRST_LINE", 0.2)
+    screen = io.StringIO()
+    with module.progress(Console(file=screen, width=20), no_event, "tuning", 1000, "steps", False) as done:
+        done(100, best=0.5)
+        done(500, best=0.002)
+        time.sleep(0.3)
+    lines = screen.getvalue().splitlines()
+    assert lines and all(line.startswith("tuning: 500 of 1000 steps, best 0.002, ") for line in lines)
+
+
+def test_lines_of_a_step_come_further_and_further_apart_up_to_five_minutes() -> None:
+    waits = list(islice(module._waits(), 9))
+    assert waits[:3] == [10.0, 10.0, 20.0] and waits == sorted(waits) and waits[-2:] == [300.0, 300.0]
+    assert sum(1 for _ in takewhile(lambda passed: passed < 3600.0, accumulate(module._waits()))) < 20
+
+
+@pytest.mark.parametrize(("passed", "told"), [(0.4, False), (1.0, True), (75.0, True)])
+def test_a_step_has_one_line_in_the_end_and_none_if_it_takes_less_than_a_second(
+    passed: float, told: bool, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    instants = iter([0.0, *[passed] * 10])
+    monkeypatch.setattr("time.monotonic", lambda: next(instants))
+    with caplog.at_level(logging.DEBUG), counting(no_event, "drawing", None, "", lambda count: None):
+        pass
+    (record,) = caplog.records
+    assert record.getMessage() == f"drawing, {passed:.1f} s" and (record.levelno >= logging.INFO) == told
 
 
 def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,25 +69,22 @@ def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.Mo
         assert count.remaining() == left
     for known in (Count("drawing", 1000, "samples", 1000, began=0.0), Count("drawing", None, "samples", 3, began=0.0)):
         assert known.seconds_left() is None and known.remaining() == ""
-    instants = iter([0.0, 0.0, *[20.0] * 10])
-    monkeypatch.setattr("time.monotonic", lambda: next(instants))
-    monkeypatch.setattr(module, "_LINE_EVERY", 0.0)
+
+
+def test_nothing_is_announced_and_quiet_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _shown(None)[0] == []
+    monkeypatch.setattr(module, "_FIRST_LINE", 0.1)
     screen = io.StringIO()
-    with module.progress(Console(file=screen, width=20), no_event, "drawing", 40, "samples", False) as done:
-        done(10)
-    assert screen.getvalue() == "drawing: 10 of 40 samples, about 60 s left\n"
-
-
-def test_a_length_that_is_unknown_is_announced_and_quiet_is_quiet() -> None:
-    assert _shown(None)[0] == ["tuning ..."]
-    assert _shown(None, quiet=True)[0] == []
+    with module.progress(Console(file=screen, width=20), no_event, "tuning", None, "", True):
+        time.sleep(0.3)
+    assert screen.getvalue() == ""
 
 
 def test_what_says_nothing_for_long_is_said_to_go_on_off_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     """A rig that is prepared for a minute, in a pipe."""
-    monkeypatch.setattr(module, "_LINE_EVERY", 1.0)
+    monkeypatch.setattr(module, "_FIRST_LINE", 1.0)
     screen = io.StringIO()
     with module.progress(Console(file=screen, width=80), no_event, "opening board and camera", None, "", False):
         time.sleep(1.3)
-    begin, still = screen.getvalue().splitlines()
-    assert begin == "opening board and camera ..." and still == "opening board and camera ... 1 s"
+    (still,) = screen.getvalue().splitlines()
+    assert still == "opening board and camera, 1 s so far"

@@ -105,6 +105,24 @@ def test_errors_in_overrides_name_the_override(override: str, said: str) -> None
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize("text", ["Kp=10,Ki=2,Kd=0.1", "Kp=10 Ki=2.0 Kd=1e-1", "Kp=10, Ki=2, Kd=0.1"])
+def test_gains_by_name_are_read_from_a_text(text: str) -> None:
+    study = load_study(
+        overrides=["simulate.controller=pid", f'simulate.gains="{text}"', f"compare.rows=[{{gains: '{text}'}}]"]
+    )
+    assert study.simulate.gains == study.compare.rows[0].gains == {"Kp": 10.0, "Ki": 2.0, "Kd": 0.1}
+    assert load_study(overrides=["simulate.gains=exchanged"]).simulate.gains == "exchanged"
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"), [("Kp=10,Ki=x", "Ki=x"), ("Kp=10,2", "'2'"), ("Kp=1,Kp=2", "twice"), ("=1", "no gain")]
+)
+def test_gains_by_name_that_cannot_be_read_are_refused(text: str, wrong: str) -> None:
+    with pytest.raises(UserError, match=wrong) as caught:
+        load_study(overrides=[f'simulate.gains="{text}"'])
+    assert "simulate.gains" in caught.value.where and caught.value.fix
+
+
 def test_an_error_names_the_file_that_set_the_value_last(tmp_path: Path) -> None:
     good = _file(tmp_path, "train: {epochs: 5, batch: 10}", "good.yaml")
     bad = _file(tmp_path, "train:\n  epochs: 0\n", "bad.yaml")

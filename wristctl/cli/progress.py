@@ -4,7 +4,6 @@ import logging
 import os
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -21,15 +20,15 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from wristctl.commands.progress import Count, counting
+from wristctl.commands.progress import Count, counting, duration
 from wristctl.commands.session import Done, Event
 from wristctl.escape import printable_lines
 
 # Keywords with which the console prints text that is not rich's markup.
 PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
 
-# Seconds between two plain lines.
-_LINE_EVERY = 10.0
+# Seconds after which a step that is not over has a plain line; each line later doubles the time, up to the most.
+_FIRST_LINE, _LINE_EVERY = 10.0, 300.0
 
 
 class Terminal(Console):
@@ -98,44 +97,46 @@ def listening(quiet: bool, verbose: bool) -> Iterator[Terminal]:
 def progress(
     console: Console, event: Event, activity: str, total: int | None, unit: str, quiet: bool
 ) -> Iterator[Done]:
-    """Show how far `what` has come; yields `done(count, **figures)`, to be called as often as one likes.
+    """Show the progress of a step; yields `done(count, **figures)`, to be called as often as one likes.
 
-    Without a `total` the length is unknown. Figures stand beside the count and go to `event`, at most once a
-    second.
+    Without a `total` the length is unknown. Figures stand beside the count and go to `event`, at most once a second.
+    Off a terminal a step that takes long has a line after 10 s, 20 s, 40 s and so on.
     """
     live, lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
     bar = Progress(*_columns(), console=console, transient=True, disable=not live)
     task = bar.add_task(activity, total=total, figures="", left="")
-    last_line = time.monotonic()
-    over, reported = threading.Event(), threading.Event()
+    over, current = threading.Event(), Count(activity, total, unit)
 
-    def still_at_it() -> None:
-        """Off a terminal what says nothing of its own for long is said to go on."""
-        passed, interval = 0.0, max(1.0, _LINE_EVERY)
-        while not over.wait(interval):
-            passed += interval
-            if not reported.is_set():
-                console.print(f"{activity} ... {passed:.0f} s", **PLAIN)
-            reported.clear()
+    def tell() -> None:
+        passed = 0.0
+        for wait in _waits():
+            if over.wait(wait):
+                return
+            passed += wait
+            remaining = current.remaining() or f"{duration(passed)} so far"
+            console.print(f"{current.line()}, {remaining}", **PLAIN)
 
     def show(count: Count) -> None:
-        nonlocal last_line
+        nonlocal current
+        current = count
         bar.update(task, completed=count.count, figures=count.beside(), left=count.remaining())
-        instant = time.monotonic()
-        if lines and instant - last_line >= _LINE_EVERY:
-            last_line = instant
-            reported.set()
-            console.print(", ".join(part for part in (count.line(), count.remaining()) if part), **PLAIN)
 
-    if lines and total is None:
-        console.print(f"{activity} ...", **PLAIN)
     if lines:
-        threading.Thread(target=still_at_it, daemon=True).start()
+        threading.Thread(target=tell, daemon=True).start()
     try:
         with counting(event, activity, total, unit, show) as advance, bar:
             yield advance
     finally:
         over.set()
+
+
+def _waits() -> Iterator[float]:
+    """Seconds to each plain line of a step from the one before."""
+    wait, passed = _FIRST_LINE, 0.0
+    while True:
+        yield wait
+        passed += wait
+        wait = min(passed, _LINE_EVERY)
 
 
 def _columns() -> tuple[ProgressColumn, ...]:

@@ -19,6 +19,8 @@ Watch = Callable[[str, int, int | None, Mapping[str, float]], None]
 _EVENT_EVERY = 1.0
 # Time after which a pace is meaningful [s].
 _TELLS = 2.0
+# Time from which a step has a line of the log, unless details are asked for [s].
+_LONG = 1.0
 
 
 @dataclass
@@ -64,10 +66,12 @@ class Count:
 def counting(event: Event, task: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
     """Count while a block works: each call is shown, and at most one a second is an event.
 
+    In the end one line of the log names the step and its time; of a step shorter than a second it is a detail.
+
     Parameters
     ----------
     event
-        Function that notes an event; the end is one, and a log message.
+        Function that notes an event; the end is one.
     task
         Name of the task.
     total
@@ -92,7 +96,8 @@ def counting(event: Event, task: str, total: int | None, unit: str, show: Callab
 
     yield done
     event("progress", **state.fields())
-    log.info("%s, %.1f s", state.line(), time.monotonic() - state.began)
+    passed = time.monotonic() - state.began
+    log.log(logging.INFO if passed >= _LONG else logging.DEBUG, "%s, %.1f s", state.line(), passed)
 
 
 def duration(seconds: float) -> str:

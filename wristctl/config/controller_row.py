@@ -1,11 +1,36 @@
 """A controller with its gains: a row of a comparison."""
 
-from typing import Annotated
+import re
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
 
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.section import OneOf, Section, choice
+from wristctl.errors import Unfitting
 
-GainsChoice = str | dict[str, float]
+# How gains are given by name, for a description and an error.
+BY_NAME = "every gain by name (Kp=10,Ki=2,Kd=0.1)"
+
+
+def _by_name(gains: Any) -> Any:
+    """Gains by name out of a text such as Kp=10,Ki=2,Kd=0.1; anything else as it is."""
+    if not isinstance(gains, str) or "=" not in gains:
+        return gains
+    values: dict[str, float] = {}
+    for part in re.split(r"[,\s]+", gains.strip()):
+        name, _, value = part.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            raise Unfitting(f"gains by name are NAME=NUMBER, and '{part}' is not", "Kp=10,Ki=2,Kd=0.1") from None
+        if not name or name in values:
+            raise Unfitting(f"'{part}' names {'a gain twice' if name else 'no gain'}", "each gain once, by its name")
+        values[name] = number
+    return values
+
+
+GainsChoice = Annotated[str | dict[str, float], BeforeValidator(_by_name)]
 ControllerName = Annotated[str, OneOf(CONTROLLERS)]
 
 REPETITIONS = "repetitions, each with noise and drawn plants of its own, the same for all rows"
@@ -15,7 +40,7 @@ class Row(Section):
     """One controller with one set of gains."""
 
     controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
-    gains: GainsChoice = choice("default", "a preset's name, `tuned` (from a tune run), or every gain by name")
+    gains: GainsChoice = choice("default", f"a preset's name, `tuned` (from a tune run), or {BY_NAME}")
 
     @property
     def gains_name(self) -> str:

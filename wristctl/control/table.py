@@ -39,9 +39,10 @@ def gains_of(
     if isinstance(gains, str):
         preset = preset_today(gains, chosen.presets)
         if preset not in chosen.presets:
-            raise UserError(
-                f"unknown gains '{gains}' of {chosen.name}", "gains", meant(gains, [*chosen.presets, "tuned"])
-            )
+            example = ",".join(f"{name}=1" for name in chosen.gains)
+            by_name = f", or every gain by name, such as {example}" if example else ""
+            fix = f"{meant(gains, [*chosen.presets, 'tuned'])}{by_name}"
+            raise UserError(f"unknown gains '{gains}' of {chosen.name}", "gains", fix)
         return chosen.values(chosen.presets[preset])
     for name in gains:
         if name not in chosen.gains:
