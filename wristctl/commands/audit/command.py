@@ -60,7 +60,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     claims = study.audit.claims
     if not claims:
-        raise UserError("no claims to audit", "audit.claims", Call("audit", "experiments/claims.yaml"))
+        raise UserError("no claims to audit", "audit.claims", Call("paper audit", "experiments/claims.yaml"))
     _check_claims(claims)
     _check_trainings(claims, inputs)
     asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in (*TRAININGS, "hardware"))
@@ -177,7 +177,9 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
 
     if session.findings.run is None:
         return compared(None)
-    with start_run("compare", study, label, session.findings.run.path.parent, ["wristctl", "audit"], []) as run:
+    with start_run(
+        "compare", study, label, session.findings.run.path.parent, ["wristctl", "paper", "audit"], []
+    ) as run:
         return compared(run)
 
 
