@@ -17,7 +17,7 @@ run: .venv/run
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
 	compared=$$(last compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
-	judged=$$(last audit $(CLAIMS)); \
+	judged=$$(last paper audit $(CLAIMS)); \
 	printf '\nWhich law is best\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
 
 test: lint

@@ -34,7 +34,7 @@ COMMANDS = (
     "hw-run --set directions=[ulnar] --set push.force=0",
     "identify latest:hw-run --dry-run",
     "new controller own",
-    "check-law own.py:OWN",
+    "check-controller own.py:OWN",
     "simulate --controller own.py:OWN --gains default",
     "runs verify",
     "runs replay latest:simulate --trust-code",

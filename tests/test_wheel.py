@@ -96,7 +96,7 @@ def test_the_sdist_holds_the_tests_and_what_they_read(built: Path) -> None:
 def test_the_readmes_commands_find_their_studies_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     examples = [shlex.split(each)[1:] for each in re.findall(r"`(wristctl [^`]*experiments/[^`]*)`", page)]
-    assert {typed[0] for typed in examples} >= {"gen-data", "train", "tune", "compare", "study", "audit", "hysteresis"}
+    assert {typed[0] for typed in examples} >= {"gen-data", "train", "tune", "compare", "study", "paper", "hysteresis"}
     calls = [[*typed, "--dry-run"] for typed in [*examples, ["tune", "quick"], ["tune", "scenarios/camera"]]]
     out, ended = _said(installed, tmp_path, *calls)
     assert out.startswith(f"package: {installed}/wristctl/")

@@ -14,7 +14,7 @@ import pytest
 from typer.main import get_command
 
 from wristctl.cli.app import app, main, typer_of
-from wristctl.cli.commands import CALIBRATIONS, COMMANDS
+from wristctl.cli.commands import CALIBRATIONS, COMMANDS, PAPER
 from wristctl.study_files.strict_yaml import parse_yaml
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +40,7 @@ for arguments in json.loads(sys.argv[1]):
 
 
 def test_help_and_listing_load_no_heavy_package() -> None:
-    named = [*([name] for name in COMMANDS), ["hw", "calibrate", "camera"]]
+    named = [*([name] for name in COMMANDS), ["hw", "calibrate", "camera"], ["paper", "audit"]]
     typed = [[], ["--help"], ["--version"], ["runs", "ls"], *([*name, "--help"] for name in named)]
     done = _python(_LOADED, json.dumps(typed))
     ended = [json.loads(line.removeprefix("ended:")) for line in done.stderr.splitlines() if line.startswith("ended:")]
@@ -52,10 +52,70 @@ def test_help_and_listing_load_no_heavy_package() -> None:
 def test_wristctl_alone_shows_help_with_examples() -> None:
     done = _python("from wristctl.cli.app import main; main()")
     assert done.returncode == 0
-    for name in COMMANDS:
-        assert f" {name} " in done.stdout
-    assert "wristctl gen-data experiments/quick.yaml" in done.stdout
-    assert "--set 'controllers=[smc,pid]'" in done.stdout
+    for name, entry in COMMANDS.items():
+        assert (f" {name} " in done.stdout) != entry.hidden
+    assert "Examples:\n wristctl " in re.sub(r" *\n", "\n", done.stdout)
+
+
+def test_what_most_users_want_stands_in_front() -> None:
+    front = ["init", "simulate", "gen-data", "train", "tune", "compare", "identify", "hw-run", "runs"]
+    shown = _python("from wristctl.cli.app import main; main()").stdout
+    places = [shown.index(f"│ {name} ") for name in front]
+    assert places == sorted(places) and set(front) < set(COMMANDS)
+    assert all(shown.index(f"│ {name} ") > places[-1] for name in COMMANDS.keys() - {*front, "audit", "check-law"})
+
+
+_PAGES = """
+import json, sys
+from wristctl.cli.app import main
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = ["wristctl", *arguments]
+    print("page:", json.dumps(arguments))
+    try:
+        main()
+    except SystemExit:
+        pass
+"""
+
+
+def _pages(typed: list[list[str]]) -> dict[str, str]:
+    """Help pages at 100 columns, by what was typed."""
+    pages = _python(_PAGES, json.dumps(typed)).stdout.split("page: ")[1:]
+    return {" ".join(arguments): page.partition("\n")[2] for arguments, page in zip(typed, pages, strict=True)}
+
+
+def test_each_page_of_help_is_one_screen_and_with_all_names_every_option() -> None:
+    named = [
+        [],
+        *([name] for name in COMMANDS),
+        ["paper", "audit"],
+        *(["hw", "calibrate", name] for name in CALIBRATIONS),
+    ]
+    short, whole = _pages([[*name, "--help"] for name in named]), _pages([[*name, "--help", "--all"] for name in named])
+    for page, text in short.items():
+        assert len(text.rstrip().splitlines()) <= 40, page
+    advanced = ("--seed", "--json", "--debug", "--force", "--trust-code", "--label")
+    for page in ("simulate --help", "compare --help", "hw-run --help"):
+        assert not [option for option in advanced if option in short[page]], page
+        assert [option for option in advanced if option in whole[f"{page} --all"]] == list(advanced), page
+        assert "--set" in short[page] and "--dry-run" in short[page]
+    assert "--executor" in whole["tune --help --all"] and "--executor" not in short["tune --help"]
+    assert "--priority" in whole["hw-run --help --all"] and "--priority" not in short["hw-run --help"]
+    assert "--version" in whole["--help --all"]
+
+
+def test_an_advanced_option_works_without_being_shown(tmp_path: Path) -> None:
+    asked = ("-m", "wristctl", "simulate", "--dry-run", "--json", "--seed", "5")
+    done = subprocess.run([sys.executable, *asked], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and "seed: 5" in json.loads(done.stdout)["config"]
+
+
+def test_former_names_are_the_same_commands() -> None:
+    assert COMMANDS["audit"].place == PAPER["audit"].place
+    typed = [["audit", "--help"], ["paper", "audit", "--help"], ["check-law", "--help"], ["check-controller", "--help"]]
+    audit, paper_audit, check_law, check_controller = _pages(typed).values()
+    assert audit.partition("[FILE]")[2].split() == paper_audit.partition("[FILE]")[2].split() != []
+    assert check_law.partition("FILE:NAME")[2].split() == check_controller.partition("FILE:NAME")[2].split() != []
 
 
 TAKEN_FOR_GRANTED = (
@@ -71,13 +131,14 @@ def test_every_example_runs_as_written_but_for_what_it_takes_for_granted(
 ) -> None:
     """Earlier runs and recordings; and a study file that it names says something of its command."""
     monkeypatch.chdir(ROOT)
-    entries = (*COMMANDS.values(), *CALIBRATIONS.values())
+    entries = (*COMMANDS.values(), *CALIBRATIONS.values(), *PAPER.values())
     pages = [get_command(typer_of(entry)).epilog for entry in entries]
     examples = [line for page in (*pages, app.info.epilog) for line in (page or "").split("\n") if "wristctl " in line]
     assert len(examples) > 30
     for example in examples:
         _, *typed = shlex.split(example.replace("\\[", "["))
-        if typed[0] in ("runs", "export-model"):
+        typed = typed[1:] if typed[0] == "paper" else typed
+        if typed[0] in ("init", "runs", "export-model"):
             continue
         monkeypatch.setattr(sys, "argv", ["wristctl", *typed, "--dry-run", "--out", str(tmp_path)])
         with pytest.raises(SystemExit) as ended:

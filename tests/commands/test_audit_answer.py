@@ -1,7 +1,8 @@
-"""The first screen of an audit says what the verdicts say, whichever way they come out, and fits a terminal."""
+"""The answer of an audit says what the verdicts say, whichever way they come out, and fits a screen."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.audit.answer import LINES, answer_of
 from wristctl.commands.printed_table import COLUMNS
 from wristctl.comparison.claims import Grounds, LoopCondition, Metrics, judge_all
@@ -40,14 +42,26 @@ def loop(missing: Mapping[str, float], rmse: Mapping[str, float], peak: float = 
     return pd.DataFrame(rows)
 
 
-def said(loops: Mapping[str, pd.DataFrame], trained: Metrics | None = None, strips: Any = ()) -> str:
-    """The first screen in one line, having checked that it fits."""
+def answered(loops: Mapping[str, pd.DataFrame], trained: Metrics | None = None, strips: Any = ()) -> Answer:
+    """The answer, having checked that it fits."""
     shown: dict[LoopCondition, pd.DataFrame] = {(name, 1.0): each for name, each in loops.items()}
     shown |= {(name, 0.7): each for name, each in loops.items()}
     trainings = {} if trained is None else {"table1": trained}
-    lines = answer_of(judge_all(CLAIMS, Grounds(shown, trainings, None, 60.0)), strips, 60.0)
+    answer = answer_of(judge_all(CLAIMS, Grounds(shown, trainings, None, 60.0)), strips, 60.0)
+    lines = answer.lines()
     assert len(lines) <= LINES and max(map(len, lines)) <= COLUMNS
-    return " ".join(" ".join(lines).split())
+    return answer
+
+
+def said(loops: Mapping[str, pd.DataFrame], trained: Metrics | None = None, strips: Any = ()) -> str:
+    """The answer in one line."""
+    return " ".join(" ".join(answered(loops, trained, strips).lines()).split())
+
+
+def sentence(text: str, *words: str) -> str:
+    """The one sentence with all of these words."""
+    (found,) = [each for each in re.split(r"(?<=[a-z)%])\. ", text) if all(word in each for word in words)]
+    return found
 
 
 def trained(best: set[str] = frozenset(), beaten: set[str] = frozenset(), dead: set[str] = frozenset()) -> Metrics:  # type: ignore[assignment]
@@ -63,53 +77,67 @@ def trained(best: set[str] = frozenset(), beaten: set[str] = frozenset(), dead: 
 NOTHING = {"smc/printed": 1.0, "smc/exchanged": 1.0, "pid/printed": 1.0}
 
 
+SMC, SWAPPED, PID = "(SMC)", "SMC with P1 and P2 exchanged", "its PID"
+
+
+def test_each_loop_is_named_by_what_it_is() -> None:
+    answer = answered(dict.fromkeys(LOOPS, loop({}, {})))
+    assert answer.table is not None
+    heads = answer.table.columns[2:-1]
+    assert len(set(heads)) == len(LOOPS) and not {"exact", "sampled", "default"} & set(heads)
+    first = answer.sentence.split(". ")[0]
+    assert all(head in first for head in heads) and "no tension limit" in first and "60 N" in first
+
+
 def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
+    names = list(LOOPS)
     there, away = loop({}, {}), loop(NOTHING, dict.fromkeys(NOTHING, 0.5))
-    everywhere = said(dict.fromkeys(LOOPS, there))
-    nowhere = said(dict.fromkeys(LOOPS, away))
-    assert everywhere.count("(SMC) with the printed gains on all loops") == 1
-    assert nowhere.count("(SMC) with the printed gains on no loop") == 1
-    assert "(a guess of ours) on all loops" in everywhere and "(a guess of ours) on no loop" in nowhere
-    assert "its PID with the printed gains on all loops" in everywhere
-    assert "its PID with the printed gains on no loop" in nowhere
-    some = said({"exact": there, "sampled": loop({"smc/printed": 1.0}, {}), "four-segments": away})
-    assert "(SMC) with the printed gains on exact alone" in some
-    assert "(a guess of ours) on exact and sampled" in some
+    everywhere, nowhere = said(dict.fromkeys(LOOPS, there)), said(dict.fromkeys(LOOPS, away))
+    for who in (SMC, SWAPPED + " (", "Its PID"):
+        assert "on all loops" in sentence(everywhere, who, "30 deg") and "any loop" not in everywhere
+        assert "on any loop" in sentence(nowhere, who, "30 deg") and "all loops" not in sentence(nowhere, who, "30 deg")
+    some = said({names[0]: there, names[1]: loop({"smc/printed": 1.0}, {}), names[2]: away})
+    assert "30 deg on the ideal loop only" in sentence(some, SMC)
+    assert "30 deg on the ideal and 1 kHz loops" in sentence(some, SWAPPED + " (")
 
 
 def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_strength_it_says_so() -> None:
     off = dict.fromkeys(NOTHING, 0.5)
-    mixed = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, {}), "four-segments": loop({}, off)})
-    assert "for SMC as printed on exact and sampled (on exact with tensions that no tendon" in mixed
-    alone = said({"exact": loop({}, {}, 1e5), "sampled": loop({}, off), "four-segments": loop({}, off)})
-    assert "for PID as printed on exact alone (with tensions that no tendon" in alone
+    ideal, sampled, segments = LOOPS
+    mixed = sentence(said({ideal: loop({}, {}, 1e5), sampled: loop({}, {}), segments: loop({}, off)}), SMC)
+    assert "on the ideal and 1 kHz loops" in mixed and mixed.endswith("no tendon bears on the ideal loop")
+    alone = said({ideal: loop({}, {}, 1e5), sampled: loop({}, off), segments: loop({}, off)})
+    assert re.search("RMSE on the ideal loop only, .*no tendon bears$", sentence(alone, "Its PID"))
     sound = said(dict.fromkeys(LOOPS, loop({}, {})))
-    assert "for PID as printed on all loops." in sound and "no tendon" not in sound
-    assert "for PID as printed on no loop." in said(dict.fromkeys(LOOPS, loop({}, off)))
+    assert "RMSE on all loops" in sentence(sound, "Its PID") and "no tendon" not in sound
+    assert "RMSE on no loop" in sentence(said(dict.fromkeys(LOOPS, loop({}, off))), "Its PID")
 
 
 def test_the_ranking_is_that_of_the_numbers() -> None:
     printed = dict.fromkeys(LOOPS, loop({}, {}))
-    assert "SMC has less RMSE than PID: as printed on all loops; with P1 and P2 exchanged on all loops." in said(
-        printed
-    )
-    assert "cannot be judged" in said(printed) and "it holds on all loops." in said(printed)
-    turned = loop({}, {"pid/printed": 1e-5})
-    found = said({**printed, "four-segments": turned})
-    assert "as printed on exact and sampled; with" in found and "it holds on exact and sampled." in found
-    one_link = loop({}, {"gvsc/default": 0.09})
-    assert "it holds on no loop." in said(dict.fromkeys(LOOPS, one_link)), "GVSC above NC alone breaks it"
-    alike = said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": 1.5e-3})))
-    assert "as printed on no loop, as much as it on exact, sampled and four-segments" in alike
+    last = list(LOOPS)[-1]
+    assert sentence(said(printed), "smaller RMSE").count("on all loops") == 2
+    assert "on all loops" in sentence(said(printed), "designs of ours")
+    found = said({**printed, last: loop({}, {"pid/printed": 1e-5})})
+    assert sentence(found, "smaller RMSE").count("on the ideal and 1 kHz loops") == 2
+    assert "on the ideal and 1 kHz loops" in sentence(found, "designs of ours")
+    one_link = said(dict.fromkeys(LOOPS, loop({}, {"gvsc/default": 0.09})))
+    assert "on no loop" in sentence(one_link, "designs of ours"), "GVSC above NC alone breaks it"
+    alike = sentence(said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": 1.5e-3}))), "smaller RMSE")
+    assert "on no loop, with equal errors on the ideal, 1 kHz and 4-segment loops;" in alike
+    differ = loop({}, {})
+    differ.loc[(differ["gains"] == "exchanged") & differ["reference"].str.contains(" 2 s"), "rmse"] = 1.0
+    told = sentence(said({**printed, last: differ}), "smaller RMSE")
+    assert told.endswith("on the ideal and 1 kHz loops, undecided on the 4-segment loop, where the two moves differ")
 
 
 def test_the_networks_are_told_by_the_ways_to_train_them() -> None:
     loops = dict.fromkeys(LOOPS, loop({}, {}))
-    assert "Not tested here: the table of networks (--table1 RUN)" in said(loops)
+    assert "--table1 RUN" in said(loops)
     none = said(loops, trained(beaten={"raw-coupled", "scaled-coupled", "scaled-decoupled"}, dead={"raw-coupled"}))
     assert "sigmoid is shown to be the most accurate in none, and another to be more accurate in 3." in none
     assert "Sigmoid does not learn (R^2 of 0.5) with raw inputs, coupled decay." in none
-    assert "table of networks" not in none
+    assert "--table1 RUN" not in none and "--selection RUN" in none
     two = said(loops, trained(best={"raw-decoupled", "scaled-coupled"}))
     assert "in 2 (raw inputs, decoupled decay; scaled inputs, coupled decay)" in two
     assert "another to be more accurate in none" in two and "Sigmoid learns (R^2 of 0.5) in all of them." in two
@@ -118,19 +146,39 @@ def test_the_networks_are_told_by_the_ways_to_train_them() -> None:
 
 def test_what_cannot_be_told_is_what_is_judged_so() -> None:
     loops = dict.fromkeys(LOOPS, loop({}, {}))
-    found = said(loops)
-    cannot = found[found.index("Cannot be told") :].split(". ")[0]
+    cannot = sentence(said(loops), "too little")
     assert "the payload" in cannot and "global stability" not in cannot, "which here holds nowhere"
-    tight = {name: each.assign(steady_state=1e-9 if name == "exact" else 0.1) for name, each in loops.items()}
-    told = said(tight)
-    assert "global stability" in told[told.index("Cannot be told") :].split(". ")[0], "here the loop decides"
+    first = next(iter(LOOPS))
+    tight = {name: each.assign(steady_state=1e-9 if name == first else 0.1) for name, each in loops.items()}
+    assert "global stability" in sentence(said(tight), "too little"), "here the loop decides"
 
 
-def test_the_heaviest_claims_have_both_numbers_with_their_unit_and_what_fails_says_so() -> None:
-    found = said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": float("nan"), "pid/printed": 0.25})))
-    assert "RMSE, SMC as printed 0.00027 rad fails fails fails" in found
-    assert "RMSE, PID as printed 0.0015 rad 0.25 0.25 0.25" in found
-    assert "RMSE, SMC exchanged 0.00027 rad 0.00027* 0.00027* 0.00027*" in found
+def test_the_heaviest_claims_have_both_numbers_in_degrees_and_where_they_agree() -> None:
+    ideal, sampled, segments = LOOPS
+    fails, off = loop({}, {"smc/printed": float("nan"), "pid/printed": 0.25}), loop({}, {"smc/exchanged": 0.5})
+    answer = answered({ideal: fails, sampled: loop({}, {}), segments: off})
+    assert answer.table is not None and "[deg]" in answer.table.title and len(answer.table.rows) == 5
+    printed, exchanged, pid, *_ = (list(row[1:]) for row in answer.table.rows)
+    assert printed == ["0.015", "fails", "0.015", "0.015", "1 kHz, 4-segment"]
+    assert exchanged == ["0.015", "0.015", "0.015", "29", "ideal, 1 kHz"]
+    assert pid == ["0.086", "14", "0.086", "0.086", "1 kHz, 4-segment"]
+    whole = answered(dict.fromkeys(LOOPS, loop({}, {}))).table
+    assert whole is not None and whole.rows[0][-1] == "all loops" and whole.rows[-1][-1] == "no loop"
+    for row in whole.rows:
+        assert row[0] in whole.text(COLUMNS), "nothing is cut off"
+
+
+def test_a_range_of_errors_and_another_unit_are_told_as_they_are() -> None:
+    moves = loop({}, {})
+    moves["rmse"] = moves["rmse"].where(moves["reference"].str.contains(" 1 s"), 1e-9)
+    table = answered(dict.fromkeys(LOOPS, moves)).table
+    assert table is not None and table.rows[0][2] == "<0.001 to 0.015"
+    weighed = [claim.model_copy(update={"weight": 6}) if claim.id == "T2-smc-settling" else claim for claim in CLAIMS]
+    shown: dict[LoopCondition, pd.DataFrame] = {(name, 1.0): loop({}, {}) for name in LOOPS}
+    mixed = answer_of(judge_all(weighed, Grounds(shown))).table
+    assert mixed is not None and "[deg]" not in mixed.title
+    assert mixed.rows[0][0].endswith("[s]") and mixed.rows[0][1] == "1.2"
+    assert mixed.rows[1][0].endswith("[deg]") and mixed.rows[1][1] == "0.015"
 
 
 def test_no_id_of_a_claim_is_on_the_first_screen() -> None:
@@ -154,8 +202,8 @@ def strip(evidence: str, label: str, share: float, left: int = 0) -> Any:
 def test_over_the_box_the_shares_are_told(share: float, told: str) -> None:
     strips = [strip("arrival", label, share) for label in ROWS[:3]] + [strip("together", "smc/exchanged", 0.02)]
     found = said(dict.fromkeys(LOOPS, loop(NOTHING, {})), trained(dead=set(CELLS)), strips)
-    assert f"Of 200 settings that the paper may have had 30 deg are reached with SMC as printed in {told}" in found
-    assert "within a factor of 1.5, with SMC exchanged in 2 %" in found
+    box = sentence(found, "Of 200 settings")
+    assert box.count(f" in {told}") == 3 and "factor of 1.5, with SMC with P1 and P2 exchanged in 2 %" in box
     assert "did not converge" not in found
 
 
@@ -176,16 +224,18 @@ def test_what_the_box_says_comes_with_what_must_be_known_of_it() -> None:
 def test_with_a_box_the_screen_still_says_what_cannot_be_told_and_what_is_contradicted() -> None:
     strips = [strip("arrival", label, 0.615, 17) for label in ROWS[:3]]
     strips += [strip("together", "smc/exchanged", 0.02, 9), strip("together", "pid/printed", 0.0, 12)]
-    mixed = {"exact": loop({"smc/printed": 1.0}, {}, 1e5), "sampled": loop({}, {}), "four-segments": loop(NOTHING, {})}
-    found = said(mixed, trained(dead=set(CELLS)), strips)
-    places = [
-        found.index(each) for each in ("are reached", "RMSE comes out", "Cannot be told", "Contradicted", "Of 200")
-    ]
-    assert places == sorted(places)
-    assert "whatever is asked of them" in found and "RMSE, SMC as printed" in found
+    ideal, sampled, segments = LOOPS
+    away = loop(NOTHING, dict.fromkeys(NOTHING, 0.5))
+    mixed = {ideal: loop({"smc/printed": 1.0}, {"smc/printed": 0.5}, 1e5), sampled: away, segments: away}
+    answer = answered(mixed, trained(dead=set(CELLS)), strips)
+    notes = " ".join(answer.notes)
+    places = [notes.index(each) for each in ("Of 200", "contradict", "too little")]
+    assert places == sorted(places) and "whatever is asked of them" in notes
+    assert answer.table is not None and len(answer.table.rows) == 3
 
 
-def test_without_loops_or_claims_there_is_no_sentence_about_them() -> None:
+def test_without_loops_there_is_no_sentence_and_no_table_about_them() -> None:
     text = [claim for claim in CLAIMS if claim.evidence == "text"]
-    lines = answer_of(judge_all(text, Grounds()))
-    assert not any("loop" in line or "RMSE" in line for line in lines[:-1]) and lines
+    answer = answer_of(judge_all(text, Grounds()))
+    assert answer.table is None and answer.sentence
+    assert not any("loops" in note or "RMSE" in note for note in answer.notes) and answer.notes

@@ -81,7 +81,7 @@ def test_what_an_error_calls_is_there_to_be_called() -> None:
         "analyse",
         "hysteresis",
         "identify",
-        "audit",
+        "paper audit",
         "runs ls",
     )
     for call in (Call(command).in_python for command in commands):

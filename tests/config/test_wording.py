@@ -24,7 +24,7 @@ PHRASES: list[tuple[Phrase, str, str]] = [
     (Call("train"), "wristctl train", "wristctl.train(study)"),
     (Call("gen-data", arguments=(Argument("run", "latest:simulate"),)), "wristctl gen-data --run latest:simulate",
      "wristctl.gen_data(study, run='latest:simulate')"),
-    (Call("audit", "experiments/claims.yaml"), "wristctl audit experiments/claims.yaml",
+    (Call("paper audit", "experiments/claims.yaml"), "wristctl paper audit experiments/claims.yaml",
      "wristctl.audit(load_study('experiments/claims.yaml'))"),
     (Call("runs ls"), "wristctl runs ls", "wristctl.runs()"),
     (Call("hw calibrate camera"), "wristctl hw calibrate camera", "wristctl hw calibrate camera"),

@@ -67,7 +67,7 @@ def test_a_law_that_pushes_the_wrong_way_gets_no_certificate(stranger: Path) -> 
     assert asked(place)["bends the wrist back"].passed
     (stranger / "strange.py").write_text(LAW.replace("load - scaled", "load + scaled"))
     assert asked(place)["bends the wrist back"].passed is False
-    done = wristctl(stranger, "check-law", "strange.py:STRANGE", "--no-board")
+    done = wristctl(stranger, "check-controller", "strange.py:STRANGE", "--no-board")
     assert done.returncode == 3 and "FAILS bends the wrist back" in done.stdout and "is fit" not in done.stdout
 
 
@@ -76,7 +76,7 @@ def test_a_law_that_pushes_the_wrong_way_gets_no_certificate(stranger: Path) -> 
     [("strange.py", "strange.py should name its controller: strange.py:NAME"), ("pidd", "did you mean 'pid'?")],
 )
 def test_a_law_that_is_not_named_is_asked_for_by_name(stranger: Path, place: str, told: str) -> None:
-    done = wristctl(stranger, "check-law", place, "--no-board")
+    done = wristctl(stranger, "check-controller", place, "--no-board")
     assert done.returncode == 2 and told in done.stderr and not done.stdout
 
 
@@ -106,7 +106,7 @@ def commands() -> Iterator[list[str]]:
 
 def test_the_page_names_commands_that_there_are() -> None:
     typed = list(commands())
-    assert [each[0] for each in typed] == ["new", "check-law", "simulate", "tune", "compare", "hw-run"]
+    assert [each[0] for each in typed] == ["new", "check-controller", "simulate", "tune", "compare", "hw-run"]
 
 
 @pytest.mark.skipif(not THOROUGH, reason="takes minutes: WRISTCTL_THOROUGH=1")

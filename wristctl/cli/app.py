@@ -9,10 +9,11 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
 from wristctl.cli.commands import COMMANDS, Entry
+from wristctl.cli.options import everything
 from wristctl.errors import UserError, error_of_the_system
 from wristctl.escape import printable
 from wristctl.interrupt import again, interrupts
@@ -27,14 +28,14 @@ def typer_of(entry: Entry) -> typer.Typer:
         return target
     from wristctl.cli.command import study_command
 
-    return study_command(target, entry.shortcuts, entry.flags, entry.examples, entry.argument)
+    return study_command(target, entry)
 
 
 class _OnCall(TyperCommand):
     """A command known by its line in the help; its module is imported when it is called."""
 
     def __init__(self, name: str, entry: Entry) -> None:
-        super().__init__(name, help=entry.line, rich_help_panel=entry.panel)
+        super().__init__(name, help=entry.line, rich_help_panel=entry.panel, hidden=entry.hidden)
         self.entry = entry
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
@@ -52,22 +53,21 @@ def lazy_group(commands: Mapping[str, Entry]) -> type[TyperGroup]:
             for name, entry in commands.items():
                 self.add_command(_OnCall(name, entry))
 
+        def format_help(self, ctx: Any, formatter: Any) -> None:
+            """The commands; with --all the group's options too."""
+            for option in self.get_params(ctx):
+                if isinstance(option, TyperOption):
+                    option.hidden = not everything()
+            super().format_help(ctx, formatter)
+
     return Commands
 
 
-_EXAMPLES = r"""
-Examples:
-
-wristctl gen-data experiments/quick.yaml
-
-wristctl train experiments/quick.yaml --data latest:gen-data
-
-wristctl tune experiments/quick.yaml --set 'controllers=\[smc,pid]'
-
-wristctl compare experiments/quick.yaml --network latest:train --tuned latest:tune
-
-wristctl runs show latest:compare
-"""
+_EXAMPLES = """Examples:
+wristctl init my-wrist
+wristctl simulate --controller smc --gains exchanged
+wristctl compare controllers
+wristctl compare --help"""
 
 
 app = typer.Typer(cls=lazy_group(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})
@@ -77,6 +77,7 @@ app = typer.Typer(cls=lazy_group(COMMANDS), epilog=_EXAMPLES, context_settings={
 def _wristctl(
     context: typer.Context,
     version: bool = typer.Option(False, "--version", help="Show the version and exit."),
+    all_: bool = typer.Option(False, "--all", help="Beside --help: show these options too."),
 ) -> None:
     """Experiments with tendon-driven soft prosthetic wrists. Each command writes one run directory."""
     if version:

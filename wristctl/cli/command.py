@@ -4,15 +4,15 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any, get_origin
 
 import typer
 
+from wristctl.cli.commands import Entry
 from wristctl.cli.operator import TerminalOperator, idle, typed_line
-from wristctl.cli.options import Options, Own, controllers, run_ids, signature
+from wristctl.cli.options import Options, Own, StudyCommand, controllers, run_ids, signature
 from wristctl.cli.output import print_plan, print_result
 from wristctl.cli.progress import PLAIN, listening, progress
 from wristctl.commands.perform import check_executor, perform, prepare, recording
@@ -34,23 +34,17 @@ def asked_to_trust(trust: bool, shown: str) -> bool:
 
 
 _SWEEP = "A leaf at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
+_MORE_OPTIONS = "More options: --help --all"
 _EXECUTOR = "Who does the work: serial, processes[:N], dask://host:port or module:factory."
 
 
-def study_command(
-    procedure: Procedure[Any],
-    shortcuts: Sequence[str] = (),
-    flags: Mapping[str, str] = MappingProxyType({}),
-    examples: Sequence[str] = (),
-    argument: str | None = None,
-) -> typer.Typer:
+def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     """The command of a study, which performs it on its section of the study files in a run directory of its own.
 
-    Each of the procedure's needs becomes an option that names an earlier run, each of the `shortcuts` (leaves of the
-    section) an option for `--set`. The leaf `argument` is what stands first, without an option, in place of study
-    files. `flags` (name and help) are switches of this call that are no settings. The docstring of what the procedure
-    performs is the help.
+    Each of the procedure's needs becomes an option that names an earlier run, each of the entry's shortcuts an option
+    for `--set`. The docstring of what the procedure performs is the help.
     """
+    shortcuts, flags, argument = entry.shortcuts, entry.flags, entry.argument
     named = [need.leaf for need in procedure.needs if need.leaf != argument]
     first = (argument,) if argument else ()
 
@@ -73,17 +67,17 @@ def study_command(
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
     completed = {"controller": controllers} | {need.leaf: run_ids for need in procedure.needs}
     parameters = [
-        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf))
-        for leaf in (*first, *named, *shortcuts)
+        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf), leaf in entry.advanced)
+        for leaf in (*first, *shortcuts, *named)
     ]
     parameters += [Own(name, text, bool) for name, text in flags.items()]
     parameters += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
-    parameters += [Own("executor", _EXECUTOR, str)] * procedure.in_units
+    parameters += [Own("executor", _EXECUTOR, str, advanced=True)] * procedure.in_units
     call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
-    shown = [example.replace("[", r"\[") for example in examples]  # a bracket begins rich's markup
-    epilog = "\n\n".join(["Examples:", *shown]) if shown else None
-    app.command(procedure.kind, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
+    shown = [example.replace("[", r"\[") for example in entry.examples]  # a bracket begins rich's markup
+    epilog = "\n".join(["Examples:", *shown, _MORE_OPTIONS])
+    app.command(procedure.kind, cls=StudyCommand, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
 
 

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-_REPRODUCE, _HARDWARE, _OWN, _RESULTS = "Reproduce the paper", "Hardware", "Your own", "Results"
+_MAIN, _OWN = "From a wrist to its controller", "A controller of your own"
+_HARDWARE, _MORE = "Motors and camera", "More"
 # The flag of commands that move motors, and its help.
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
 
@@ -24,16 +25,31 @@ class Entry(NamedTuple):
     examples: Sequence[str] = ()
     argument: str | None = None
     """The leaf that stands first, without an option, in place of study files."""
+    advanced: Sequence[str] = ()
+    """Inputs and shortcuts that the help shows with `--all` only."""
+    hidden: bool = False
+    """Whether the help leaves it out: a former name."""
 
 
 COMMANDS = {
     "init": Entry(
-        "wristctl.cli.your_own:init_app", _REPRODUCE, "Lay out the study files in a folder, for you to change."
+        "wristctl.cli.your_own:init_app", _MAIN, "Begin a folder for a wrist of your own, with studies to change."
+    ),
+    "simulate": Entry(
+        "wristctl.commands.simulate.command:SIMULATE",
+        _MAIN,
+        "Simulate one controller on one wrist.",
+        shortcuts=("controller", "gains"),
+        examples=(
+            "wristctl simulate --controller smc --gains exchanged",
+            "wristctl simulate --set reference.kind=step --set loop.plant_segments=1",
+            "wristctl simulate --gains tuned --tuned latest:tune",
+        ),
     ),
     "gen-data": Entry(
         "wristctl.commands.gen_data.command:GEN_DATA",
-        _REPRODUCE,
-        "Sample tip positions and bending angles of the wrist's model.",
+        _MAIN,
+        "Sample tip positions and bending angles for a network.",
         shortcuts=("samples", "source"),
         examples=(
             "wristctl gen-data experiments/paper.yaml",
@@ -45,7 +61,7 @@ COMMANDS = {
     ),
     "train": Entry(
         "wristctl.commands.train.command:TRAIN",
-        _REPRODUCE,
+        _MAIN,
         "Train the network from tip position to bending angle.",
         shortcuts=("search", "preset", "epochs", "seeds", "device"),
         examples=(
@@ -57,7 +73,7 @@ COMMANDS = {
     ),
     "tune": Entry(
         "wristctl.commands.tune.command:TUNE",
-        _REPRODUCE,
+        _MAIN,
         "Search the gains of controllers.",
         shortcuts=("candidates", "iterations"),
         examples=(
@@ -68,74 +84,32 @@ COMMANDS = {
     ),
     "compare": Entry(
         "wristctl.commands.compare.command:COMPARE",
-        _REPRODUCE,
-        "Compare controllers, the paper's numbers beside ours.",
+        _MAIN,
+        "Compare controllers on the same motions.",
         shortcuts=("horizon",),
         examples=(
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
             "wristctl compare --set 'inverses=[none]' --set 'rows=[{controller: computed-torque, gains: default}]'",
         ),
     ),
-    "study": Entry(
-        "wristctl.commands.study.command:FAIR_STUDY",
-        _REPRODUCE,
-        "Tune and judge all laws at equal budget: which is for which rig.",
-        shortcuts=("budget",),
+    "identify": Entry(
+        "wristctl.commands.identify.command:IDENTIFY",
+        _MAIN,
+        "Find a real wrist's parameters from measured motions.",
+        argument="runs",
         examples=(
-            "wristctl study experiments/fair_study.yaml",
-            "wristctl study experiments/fair_study.yaml --budget full --executor processes",
-            "wristctl study experiments/fair_study.yaml --budget full --resume RUN --executor dask://host:8786",
-        ),
-    ),
-    "simulate": Entry(
-        "wristctl.commands.simulate.command:SIMULATE",
-        _REPRODUCE,
-        "Simulate one closed loop, with pictures.",
-        shortcuts=("controller", "gains"),
-        examples=(
-            "wristctl simulate --controller smc --gains exchanged",
-            "wristctl simulate --set reference.kind=step --set loop.plant_segments=1",
-            "wristctl simulate --gains tuned --tuned latest:tune",
-        ),
-    ),
-    "analyse": Entry(
-        "wristctl.commands.analyse.command:ANALYSE",
-        _REPRODUCE,
-        "Find the margins of one loop, with pictures.",
-        shortcuts=("controller", "gains", "over"),
-        examples=(
-            "wristctl analyse --controller computed-torque --gains default",
-            "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
-            "wristctl analyse --controller smc-tracking --gains hardware --set loop.control_period=5e-3 "
-            "--set 'loop={actuator: {level: tendon}, sensor: {level: camera}}'",
-        ),
-    ),
-    "hysteresis": Entry(
-        "wristctl.commands.hysteresis.command:HYSTERESIS",
-        _REPRODUCE,
-        "Drive the wrist through hysteresis loops; fit a measured one.",
-        shortcuts=("drive", "shape", "measured"),
-        examples=(
-            "wristctl hysteresis experiments/hysteresis.yaml",
-            "wristctl hysteresis --measured loop.csv",
-            "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
-        ),
-    ),
-    "audit": Entry(
-        "wristctl.commands.audit.command:AUDIT",
-        _REPRODUCE,
-        "Judge the paper's claims one by one.",
-        examples=(
-            "wristctl audit experiments/claims.yaml",
-            "wristctl audit experiments/claims.yaml --table1 RUN --selection RUN",
+            "wristctl identify latest:hw-run",
+            "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
+            "wristctl tune experiments/paper.yaml --from-identified latest:identify",
         ),
     ),
     "hw-run": Entry(
         "wristctl.commands.hw_run.command:HW_RUN",
-        _HARDWARE,
-        "Perform the paper's experiment, on hardware or all emulated.",
+        _MAIN,
+        "Run an experiment on the wrist, or on an emulated one.",
         shortcuts=("port", "camera", "repetitions", "real_time", "video", "priority"),
         flags=YES,
+        advanced=("video", "priority", "from_identified", "tuned", "network"),
         examples=(
             "wristctl hw-run",
             "wristctl hw-run --set 'directions=[ulnar]' --set push.force=0",
@@ -143,16 +117,10 @@ COMMANDS = {
             "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
         ),
     ),
-    "identify": Entry(
-        "wristctl.commands.identify.command:IDENTIFY",
-        _HARDWARE,
-        "Find a real wrist's parameters from logged trials.",
-        argument="runs",
-        examples=(
-            "wristctl identify latest:hw-run",
-            "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
-            "wristctl tune experiments/paper.yaml --from-identified latest:identify",
-        ),
+    "runs": Entry("wristctl.cli.runs:app", _MAIN, "Find, show, compare, verify and repeat what commands left."),
+    "new": Entry("wristctl.cli.your_own:new_app", _OWN, "Write a controller, reference or optimiser to begin from."),
+    "check-controller": Entry(
+        "wristctl.cli.your_own:check_controller_app", _OWN, "Check a controller of your own before it is used."
     ),
     "hw": Entry(
         "wristctl.cli.hw:app", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."
@@ -169,14 +137,61 @@ COMMANDS = {
             "wristctl track pictures/ --set frame_rate=60 --set markers.positive=left",
         ),
     ),
-    "export-model": Entry("wristctl.cli.export_model:app", _RESULTS, "Write the wrist of a run for MuJoCo or MATLAB."),
-    "new": Entry(
-        "wristctl.cli.your_own:new_app", _OWN, "Write a controller, reference or optimiser of your own to begin from."
+    "study": Entry(
+        "wristctl.commands.study.command:FAIR_STUDY",
+        _MORE,
+        "Tune and compare all controllers at equal budget.",
+        shortcuts=("budget",),
+        examples=(
+            "wristctl study experiments/fair_study.yaml",
+            "wristctl study experiments/fair_study.yaml --budget full --executor processes",
+            "wristctl study experiments/fair_study.yaml --budget full --resume RUN --executor dask://host:8786",
+        ),
     ),
-    "check-law": Entry(
-        "wristctl.cli.your_own:check_law_app", _OWN, "Check a law of your own, and print its certificate."
+    "analyse": Entry(
+        "wristctl.commands.analyse.command:ANALYSE",
+        _MORE,
+        "Find the stability margins of one loop.",
+        shortcuts=("controller", "gains", "over"),
+        examples=(
+            "wristctl analyse --controller computed-torque --gains default",
+            "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
+            "wristctl analyse --controller smc-tracking --gains hardware --set loop.control_period=5e-3 "
+            "--set 'loop={actuator: {level: tendon}, sensor: {level: camera}}'",
+        ),
     ),
-    "runs": Entry("wristctl.cli.runs:app", _RESULTS, "Find, compare, verify and repeat runs."),
+    "hysteresis": Entry(
+        "wristctl.commands.hysteresis.command:HYSTERESIS",
+        _MORE,
+        "Drive the wrist through hysteresis loops; fit a measured one.",
+        shortcuts=("drive", "shape", "measured"),
+        examples=(
+            "wristctl hysteresis experiments/hysteresis.yaml",
+            "wristctl hysteresis --measured loop.csv",
+            "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
+        ),
+    ),
+    "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
+    "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
+}
+
+# Commands of `wristctl paper`.
+PAPER = {
+    "audit": Entry(
+        "wristctl.commands.audit.command:AUDIT",
+        None,
+        "Judge the paper's claims one by one.",
+        examples=(
+            "wristctl paper audit experiments/claims.yaml",
+            "wristctl paper audit experiments/claims.yaml --table1 RUN --selection RUN",
+        ),
+    ),
+}
+
+# Former names.
+COMMANDS |= {
+    "audit": PAPER["audit"]._replace(hidden=True),
+    "check-law": COMMANDS["check-controller"]._replace(hidden=True),
 }
 
 # Commands of `wristctl hw calibrate`.
@@ -204,6 +219,7 @@ CALIBRATIONS = {
         "Find zero, senses of turning and steps per radian.",
         shortcuts=("port", "camera", "plane", "axis", "max_deg", "real_time", "priority"),
         flags=YES,
+        advanced=("plane", "max_deg", "priority"),
         examples=(
             "wristctl hw calibrate wrist",
             "wristctl hw calibrate wrist --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera",

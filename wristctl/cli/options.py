@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import islice
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from wristctl.config.choices import CONTROLLERS
 from wristctl.study_files.shipped import shipped_names
@@ -53,13 +55,38 @@ def _commands() -> list[str]:
     return list(COMMANDS)
 
 
+# Panel of the options that few need. The help shows it with `--all` only.
+ADVANCED = "Advanced"
+
+
+def everything() -> bool:
+    """Whether the help is to show all options: `--help --all`."""
+    return "--all" in sys.argv
+
+
+class StudyCommand(TyperCommand):
+    """A command whose help shows advanced options with `--all` only."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The help on one screen, or with --all whole."""
+        for parameter in self.params:
+            if isinstance(parameter, TyperOption) and parameter.rich_help_panel == ADVANCED:
+                parameter.hidden = not everything()
+        super().format_help(ctx, formatter)
+
+
 Out = Annotated[Path, typer.Option("--out", help="Folder of run directories.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.", rich_help_panel=ADVANCED)]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Warnings and errors only.", rich_help_panel=ADVANCED)]
 TrustCode = Annotated[
-    bool, typer.Option("--trust-code", help="Let code run that a run carries, and ask nobody: read it first.")
+    bool,
+    typer.Option(
+        "--trust-code",
+        help="Let code run that a run carries, and ask nobody: read it first.",
+        rich_help_panel=ADVANCED,
+    ),
 ]
-Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show tracebacks.", rich_help_panel=ADVANCED)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,34 +100,44 @@ class Options:
     config: Annotated[
         list[Path] | None,
         typer.Option(
-            "--config", "-c", metavar="FILE", help="Study file, after the others.", autocompletion=study_files
+            "--config",
+            "-c",
+            metavar="FILE",
+            help="Study file, after the others.",
+            autocompletion=study_files,
+            rich_help_panel=ADVANCED,
         ),
     ] = None
     override: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override one setting: a.b=value."),
     ] = None
-    seed: Annotated[int | None, typer.Option("--seed", help="Root of every random stream.")] = None
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Root of every random stream.", rich_help_panel=ADVANCED)
+    ] = None
     force: Annotated[
         bool,
         typer.Option(
             "--force",
             help="Go on with lengths hardly meant in metres; tune: beyond what tendons hold; hw-run: with gains that "
             "may swing.",
+            rich_help_panel=ADVANCED,
         ),
     ] = False
     trust_code: TrustCode = False
     out: Out = Path("results")
     label: Annotated[
-        str | None, typer.Option("--label", help="Part of the run's name; by default the study file's.")
+        str | None,
+        typer.Option("--label", help="Part of the run's name; by default the study file's.", rich_help_panel=ADVANCED),
     ] = None
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the resolved study and the plan; write nothing.")
+        bool,
+        typer.Option("--dry-run", help="Print changed settings and the plan; write nothing. With --all every setting."),
     ] = False
     as_json: Json = False
-    all_: Annotated[bool, typer.Option("--all", help="Print every table, where the answer alone would be.")] = False
+    all_: Annotated[bool, typer.Option("--all", help="Print every table, not the answer alone.")] = False
     quiet: Quiet = False
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details too.")] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Details too.", rich_help_panel=ADVANCED)] = False
     debug: Debug = False
 
 
@@ -113,10 +150,11 @@ class Own(NamedTuple):
     """Type of the parameter."""
     completed: Callable[..., list[str]] | None = None
     """Completions of the parameter in a shell."""
+    advanced: bool = False
 
 
 def signature(parameters: Iterable[Own], argument: str | None = None) -> inspect.Signature:
-    """The parameters of a command: the shared ones, then its own.
+    """The parameters of a command: its own, then the shared ones.
 
     One of its own may be the `argument` that stands first, in place of study files.
     """
@@ -134,14 +172,17 @@ def signature(parameters: Iterable[Own], argument: str | None = None) -> inspect
         )
         for parameter in parameters
     ]
-    return inspect.Signature([*shared, *named])
+    return inspect.Signature([*named, *shared])
 
 
 def _parameter(parameter: Own, first: bool) -> Any:
     if first:
         return typer.Argument(metavar=parameter.leaf.upper(), help=parameter.help, autocompletion=parameter.completed)
     return typer.Option(
-        f"--{parameter.leaf.replace('_', '-')}", help=parameter.help, autocompletion=parameter.completed
+        f"--{parameter.leaf.replace('_', '-')}",
+        help=parameter.help,
+        autocompletion=parameter.completed,
+        rich_help_panel=ADVANCED if parameter.advanced else None,
     )
 
 

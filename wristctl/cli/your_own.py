@@ -1,4 +1,4 @@
-"""`wristctl new`, `init` and `check-law`: files of your own to begin from, and a law of your own checked."""
+"""`wristctl new`, `init` and `check-controller`: files of your own to begin from, and a controller checked."""
 
 import json
 import keyword
@@ -29,7 +29,7 @@ new_app = typer.Typer(add_completion=False)
 
 _TABLES = {"controller": CONTROLLERS, "reference": REFERENCES, "optimiser": OPTIMISERS}
 _AFTER_NEW = {
-    "controller": "wristctl check-law {0}\nwristctl simulate --controller {0} --gains default",
+    "controller": "wristctl check-controller {0}\nwristctl simulate --controller {0} --gains default",
     "reference": "wristctl simulate --set reference.kind={0}",
     "optimiser": "wristctl tune --set optimiser={0}",
 }
@@ -104,14 +104,17 @@ def _files() -> list[Path]:
     return sorted(file.relative_to(shipped()) for suffix in ("yaml", "py") for file in shipped().rglob(f"*.{suffix}"))
 
 
-check_law_app = typer.Typer(add_completion=False)
+check_controller_app = typer.Typer(add_completion=False)
 _VERDICTS = {True: "ok", False: "FAILS", None: ""}
 
 
-@check_law_app.command("check-law")
-def check_law(
+@check_controller_app.command("check-controller")
+def check_controller(
     law: Annotated[
-        str, typer.Argument(metavar="FILE:NAME", help="A law's file and name, or a name.", autocompletion=controllers)
+        str,
+        typer.Argument(
+            metavar="FILE:NAME", help="A controller's file and name, or a name.", autocompletion=controllers
+        ),
     ],
     config: Annotated[
         list[Path] | None,
@@ -122,8 +125,8 @@ def check_law(
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Check a law: it compiles, the same bits in every width, finite, nothing changed or allocated, bends the wrist
-    back, and runs on the emulated board (exit code 3 where something fails)."""
+    """Check a controller: it compiles, the same bits in every width, finite, nothing changed or allocated, bends the
+    wrist back, and runs on the emulated board (exit code 3 where something fails)."""
     from wristctl.commands.law_certificate import LawCheck, certificate
 
     checks: list[LawCheck] = []

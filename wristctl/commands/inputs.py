@@ -11,7 +11,7 @@ from wristctl.config.section import Section
 from wristctl.config.study import Study
 from wristctl.errors import Argument, Call, UserError
 from wristctl.records import InputRun, Run, open_run, require
-from wristctl.records.manifest import MANIFEST
+from wristctl.records.manifest import MANIFEST, command_of
 from wristctl.study_files.resolved import sections_read
 
 Given = Run | StudyResult
@@ -70,7 +70,7 @@ class Inputs(Mapping[str, Given]):
         runs = self.runs()
         for role, earlier in self._by_role.items():
             if role not in runs and isinstance(earlier, StudyResult):
-                fix = ("write it too: ", Call(earlier.kind, arguments=(Argument("out", metavar="DIR"),)))
+                fix = ("write it too: ", Call(command_of(earlier.kind), arguments=(Argument("out", metavar="DIR"),)))
                 raise UserError("a run directory names what it was made from, and this is in memory only", role, fix)
         return [InputRun(role, run) for role, run in runs.items()]
 

@@ -27,7 +27,9 @@ EndState = Literal["running", "ok", "failed", "interrupted"]
 
 
 def command_of(kind: str) -> str:
-    """The words that make a run of this kind: `hw calibrate camera` of calibrate-camera, else the kind itself."""
+    """The words that make a run of this kind: `hw calibrate camera`, `paper audit`, else the kind itself."""
+    if kind == "audit":
+        return "paper audit"
     return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
 
 

@@ -1,4 +1,4 @@
-"""The answer of an audit: a first screen of plain sentences on what of the paper holds, and tables of every claim.
+"""The answer of an audit: what of the paper holds in simulation, on which loops, and what cannot be tested.
 
 Every sentence is chosen by the verdicts. A reader of the paper may repeat it, so none says more than they do.
 """
@@ -6,12 +6,12 @@ Every sentence is chosen by the verdicts. A reader of the paper may repeat it, s
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from wristctl.commands.printed_table import COLUMNS, Table, in_lines
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees
 from wristctl.config.loop import LOOPS
 
 if TYPE_CHECKING:
@@ -21,71 +21,103 @@ if TYPE_CHECKING:
     from wristctl.config.audit import Claim
 
 
-# Lines of a terminal that the first screen may take.
-LINES = 24
-# Claims shown with both numbers; one less where a box was drawn.
-_HEAVIEST = 5
-_MORE = "All claims with reasons: `wristctl audit ... --all`, or README.md of the run. Words: docs/index.md."
+# Lines of a terminal that the answer may take.
+LINES = 32
+# Claims shown with both numbers, and so many where a box was drawn.
+_HEAVIEST, _BESIDE_A_BOX = 5, 3
+# Sample rate from which control is as good as continuous [kHz].
+_CONTINUOUS = 100.0
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+_MORE = "Every claim with its reason: add --all, or see report.html of the run. Words: docs/index.md."
 
 
-def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> list[str]:
-    """At most LINES lines; `strips` are the claims over the box, `limit` is of the wrist's tendons [N]."""
+def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> Answer:
+    """What holds, the heaviest claims with both numbers, and what is contradicted, open or not tested.
+
+    At most LINES lines; sentences are left out from the end.
+
+    Parameters
+    ----------
+    judged
+        Every claim with its findings.
+    strips
+        Claims over the box of unknowns.
+    limit
+        Tension limit of the wrist's tendons [N].
+    """
     claims = [j for j in judged if j.verdict is not None]
     loops = list(dict.fromkeys(name for j in claims for name in j.found if name))
-    table = _numbers(claims, loops, _HEAVIEST - bool(strips))
-    loose, box = _by_topic(claims), _over_the_box(strips)
-    first, second = [*_conditions(loops, limit), *_gains(claims), *_ranking(claims, loops)], [*loose, *box]
-    return [*_fitted([first, second, [*_networks(claims), *_untested(claims)]], LINES - 1 - len(table)), *table, _MORE]
+    sentence = " ".join([*_tried(loops, limit), *_controllers(claims)]) or "No claim of this ledger is tried on a loop."
+    table = _numbers(claims, loops, _BESIDE_A_BOX if strips else _HEAVIEST)
+    first, *second = [" ".join(part) for part in (_over_the_box(strips), _ranking(claims, loops)) if part] or [""]
+    networks = " ".join(_networks(claims))
+    decided = [first] if first else []
+    rest = [*_by_topic(claims), *second, *[networks] * bool(networks), *_untested(claims)]
+    apart = Answer(sentence, table, [*decided, *rest], _MORE)
+    return apart if len(apart.lines()) <= LINES else _fitted(sentence, table, decided, rest)
 
 
-def _fitted(paragraphs: Sequence[Sequence[str]], room: int) -> list[str]:
-    """Paragraphs of sentences in at most `room` lines; whole sentences are left out from the end."""
-    lines = [line for paragraph in paragraphs for line in in_lines(" ".join(paragraph))]
-    if len(lines) <= room or not paragraphs:
-        return lines
-    *earlier, last = paragraphs
-    return _fitted([*earlier, last[:-1]] if last else earlier, room)
+def _fitted(sentence: str, table: Table | None, decided: Sequence[str], rest: Sequence[str]) -> Answer:
+    """The answer in at most LINES lines: `rest` is one paragraph, and sentences are left out from its end."""
+    answer = Answer(sentence, table, [*decided, *[" ".join(rest)] * bool(rest)], _MORE)
+    if len(answer.lines()) <= LINES or not rest:
+        return answer
+    return _fitted(sentence, table, decided, rest[:-1])
 
 
-def _conditions(loops: Sequence[str], limit: float) -> list[str]:
-    descriptions = [f"{name} ({_described(name, limit)})" for name in loops]
-    return [f"The paper's claims, tried in simulation on the loops {_and(descriptions)}."] * bool(loops)
+def _tried(loops: Sequence[str], limit: float) -> list[str]:
+    kinds = [f"{_word(name)} ({_described(name, limit)})" if name in LOOPS else name for name in loops]
+    count = _COUNTS[len(loops)] if len(loops) < len(_COUNTS) else len(loops)
+    plural = "s" * (len(loops) > 1)
+    return [f"The paper's controllers on {count} simulated loop{plural}: {_and(kinds)}."] * bool(loops)
 
 
-def _described(loop: str, limit: float) -> str:
-    """Segments, control rate and tension limit of a built-in loop, in words."""
-    builtin = LOOPS.get(loop)
+def _word(name: str) -> str:
+    """A built-in loop by what distinguishes it: ideal, 1 kHz or 4-segment."""
+    builtin = LOOPS.get(name)
     if builtin is None:
-        return "a loop of yours"
-    n, rate = builtin.plant_segments, 1e-3 / builtin.control_period
-    ticks = "nearly continuous" if rate >= 100.0 else f"{rate:g} kHz"
-    tensions = f"{limit:g} N" if builtin.limits and math.isfinite(limit) else "no tension limit"
-    return f"{n} segment{'s' * (n > 1)}, {ticks}, {tensions}"
+        return name
+    if builtin.plant_segments > 1:
+        return f"{builtin.plant_segments}-segment"
+    rate = 1e-3 / builtin.control_period
+    return "ideal" if rate >= _CONTINUOUS else f"{rate:g} kHz"
 
 
-# Rows that the paper prints, and the one of ours: what they are, and in short.
+def _described(name: str, limit: float) -> str:
+    """What the word for a built-in loop leaves unsaid."""
+    n, rate = LOOPS[name].plant_segments, 1e-3 / LOOPS[name].control_period
+    ticks = f"{1e-3 * rate:g} MHz" if rate >= _CONTINUOUS else f"{rate:g} kHz" if n > 1 else ""
+    tensions = f"tensions to {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "no tension limit"
+    return ", ".join(part for part in ("one segment" * (n == 1), ticks, tensions) if part)
+
+
+# What the paper prints, and the one of ours.
 _GAINS = {
-    "smc/printed": ("its sliding mode controller (SMC) with the printed gains", "SMC as printed"),
-    "smc/exchanged": ("SMC with P1 and P2 exchanged (a guess of ours)", "SMC with P1 and P2 exchanged"),
-    "pid/printed": ("its PID with the printed gains", "PID as printed"),
+    "smc/printed": "its sliding mode controller (SMC) with the printed gains",
+    "smc/exchanged": "SMC with P1 and P2 exchanged (a guess of ours)",
+    "pid/printed": "its PID with the printed gains (its feedback made negative)",
 }
 
 
-def _gains(claims: Sequence[Judgement]) -> list[str]:
-    """Loops on which each set of gains reaches 30 deg, and loops on which it gives T2's RMSE."""
-    arrivals, numbers = [], []
-    for label, (who, short) in _GAINS.items():
+def _controllers(claims: Sequence[Judgement]) -> list[str]:
+    """Of each set of gains the loops on which it reaches 30 deg, and those on which it has the printed RMSE."""
+    sentences = []
+    for label, who in _GAINS.items():
         labelled = [j for j in claims if j.claim.label == label]
-        if arrival := _one(j for j in labelled if j.claim.evidence == "arrival"):
-            arrivals.append(f"by {who} {_places(arrival.found)}")
-        if number := _one(j for j in labelled if _is_number(j.claim, "rmse")):
-            numbers.append(f"for {short} {_places(number.found)}{_mark(number.found)}")
-    sentences = [f"30 deg are reached {', '.join(arrivals)}."] if arrivals else []
-    return sentences + [f"The printed RMSE comes out {', '.join(numbers)}."] * bool(numbers)
+        arrival = _one(j for j in labelled if j.claim.evidence == "arrival")
+        number = _one(j for j in labelled if _is_number(j.claim, "rmse"))
+        who = f"{who[0].upper()}{who[1:]}"
+        if arrival and number and not any(_ever(found) for found in (arrival.found, number.found)):
+            sentences.append(f"{who} neither reaches 30 deg nor has the printed RMSE on any loop.")
+            continue
+        facts = [f"reaches 30 deg {_places(arrival.found)}"] if arrival else []
+        facts += [f"has the printed RMSE {_places(number.found)}{_beyond(number.found)}"] if number else []
+        sentences += [f"{who} {' and '.join(facts)}."] if facts else []
+    return sentences
 
 
 def _is_number(claim: Claim, metric: str) -> bool:
-    """Whether it is a printed number of this metric, judged on loops as the paper's wrist is."""
+    """Whether it is a printed number of this metric, tried on loops as the paper's wrist is."""
     return (
         (claim.evidence, claim.metric) == ("comparison", metric)
         and claim.whose == "paper"
@@ -94,11 +126,12 @@ def _is_number(claim: Claim, metric: str) -> bool:
     )
 
 
-def _mark(findings: Mapping[str, Finding]) -> str:
+def _beyond(findings: Mapping[str, Finding]) -> str:
+    """Where the number takes tensions above the limit."""
     reproduced = _where(findings, "reproduced")
     beyond = [name for name in reproduced if findings[name].mark]
-    where = f"on {_and(beyond)} " * (len(reproduced) > len(beyond))
-    return f" ({where}with tensions that no tendon bears)" * bool(beyond)
+    where = f" {_on(beyond)}" * (len(reproduced) > len(beyond))
+    return f", with tensions that no tendon bears{where}" * bool(beyond)
 
 
 def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
@@ -106,10 +139,10 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     from wristctl.comparison.paper import T2
 
     pairs = []
-    for gains, wording in (("printed", "as printed"), ("exchanged", "with P1 and P2 exchanged")):
+    for gains, wording in (("printed", "with the printed gains"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
-        pairs += [f"{wording} {_places(one.found)}"] if one else []
-    sentences = [f"SMC has less RMSE than PID: {'; '.join(pairs)}."] if pairs else []
+        pairs += [f"{wording}, {_places(one.found)}"] if one else []
+    sentences = [f"SMC has a smaller RMSE than PID: {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
     tried = [link for link in links if link is not None]
@@ -125,8 +158,8 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     ]
     return [
         *sentences,
-        f"The ranking {' < '.join(name.upper() for name in order)} in RMSE cannot be judged: the paper gives no "
-        f"equations of {_and(named)}; with designs of ours and P1 and P2 exchanged it holds {_on(holds, loops)}.",
+        f"The ranking {' < '.join(name.upper() for name in order)} cannot be tested: the paper gives no equations of "
+        f"{_and(named)}. With designs of ours, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
 
@@ -139,6 +172,14 @@ def _is_order(claim: Claim, less: str, more: str) -> bool:
     )
 
 
+# Gains in few words, after "with".
+_SHORT = {
+    "smc/printed": "SMC as printed",
+    "smc/exchanged": "SMC with P1 and P2 exchanged",
+    "pid/printed": "PID as printed",
+}
+
+
 def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     """In which share of the settings that the paper may have had gains arrive, and give a whole row of T2."""
     from wristctl.comparison.paper import FACTOR
@@ -148,7 +189,7 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     if not used:
         return []
     shares = {
-        evidence: _and([f"{_short(strip.claim.label)} in {_share(strip)}" for strip in parts])
+        evidence: _and([f"{_SHORT.get(strip.claim.label, strip.claim.label)} in {_share(strip)}" for strip in parts])
         for evidence, parts in in_box.items()
     }
     sentences = []
@@ -158,7 +199,7 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
         sentences.append(f"30 deg are reached with {shares['arrival']}{also}")
     if in_box["together"]:
         sentences.append(
-            f"T2's three numbers come out at once, within a factor of {FACTOR:g}, with {shares['together']}"
+            f"all three numbers of Table 2 come out at once, within a factor of {FACTOR:g}, with {shares['together']}"
         )
     left = sorted({strip.uncounted for strip in used})
     many = f"{left[0]} to {left[-1]}" if len(left) > 1 else f"{left[0]}"
@@ -166,12 +207,8 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     return [f"Of {len(strips[0].verdicts)} settings that the paper may have had{open_} {'; '.join(sentences)}."]
 
 
-# Claims over the box that the first screen tells.
+# Claims over the box that the answer tells.
 _IN_BOX = ("arrival", "together")
-
-
-def _short(label: str) -> str:
-    return _GAINS[label][1].replace("with P1 and P2 exchanged", "exchanged") if label in _GAINS else label
 
 
 def _share(one: Strip) -> str:
@@ -210,8 +247,8 @@ def _by_topic(claims: Sequence[Judgement]) -> list[str]:
     topical = [j for j in claims if j.claim.topic and j.claim.whose == "paper" and not j.claim.weight]
     sentences = []
     for verdict, begin in (
-        ("not specified enough", "Cannot be told, since the paper does not say enough"),
-        ("contradicted", "Contradicted by its own equations or words"),
+        ("contradicted", "The paper's own equations or words contradict"),
+        ("not specified enough", "The paper says too little to test"),
     ):
         topics = [j.claim.topic for j in topical if j.verdict == verdict and not j.claim.part_of]
         if topics:
@@ -220,37 +257,56 @@ def _by_topic(claims: Sequence[Judgement]) -> list[str]:
 
 
 # Subjects of the claims that want an earlier run.
-_RUNS = {"table1": "the table of networks", "selection": "the number of layers", "hardware": "the experiment"}
+_RUNS = {"table1": "networks", "selection": "their depth", "hardware": "the experiment"}
 
 
 def _untested(claims: Sequence[Judgement]) -> list[str]:
-    wanted = dict.fromkeys(j.claim.evidence for j in claims if j.verdict == "open" and j.claim.evidence in _RUNS)
-    missing = [f"{_RUNS[name]} (--{name} RUN)" for name in wanted]
-    return [f"Not tested here: {', '.join(missing)}."] if missing else []
+    wanted = {j.claim.evidence for j in claims if j.verdict == "open"}
+    missing = [f"{subject} (--{name} RUN)" for name, subject in _RUNS.items() if name in wanted]
+    return [f"Not tested: {', '.join(missing)}."] if missing else []
 
 
-def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> list[str]:
-    """The heaviest claims with the paper's number and ours, on each loop."""
+def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Table | None:
+    """The heaviest claims with the paper's number, ours on each loop, and on which loops they agree."""
+    from wristctl.comparison.paper import FACTOR
+
     heavy = sorted((j for j in claims if j.claim.weight and j.claim.value), key=lambda j: -j.claim.weight)[:most]
     if not heavy or not loops:
-        return []
-    rows = [("(*: reproduced)", "the paper", *loops)]
+        return None
+    units, rows = {_unit(j.claim) for j in heavy}, []
     for j in heavy:
-        cells = [_ours(j.found[name]) if name in j.found else "not tried" for name in loops]
-        rows.append((j.claim.topic or j.claim.says, f"{j.claim.value:g} {j.claim.unit}".strip(), *cells))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    widths[0] = min(widths[0], COLUMNS - sum(widths[1:]) - 2 * len(loops) - 2)
-    return [
-        "  ".join(cell[:width].ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]
+        ours = [_ours(j.claim, j.found[name]) if name in j.found else "not tried" for name in loops]
+        unit = f" [{_unit(j.claim)}]" * (len(units) > 1 and bool(_unit(j.claim)))
+        paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
+        rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
+    common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
+    title = f"Errors{common}: ours of a move of 30 deg in 1 s and in 2 s; they agree within a factor of {FACTOR:g}"
+    return Table(title, ("the paper's claim", "paper", *map(_word, loops), "agree on"), rows)
 
 
-def _ours(finding: Finding) -> str:
+def _unit(claim: Claim) -> str:
+    """Unit for people: angles are in degrees."""
+    return "deg" if claim.unit == "rad" else claim.unit
+
+
+def _ours(claim: Claim, finding: Finding) -> str:
+    return "fails" if math.isnan(finding.low) else _range(claim, finding.low, finding.high)
+
+
+def _range(claim: Claim, low: float, high: float) -> str:
     from wristctl.comparison.claims import interval
 
-    if math.isnan(finding.low):
-        return "fails"
-    return interval(finding.low, finding.high) + "*" * (finding.verdict == "reproduced")
+    if claim.unit != "rad":
+        return interval(low, high)
+    return " to ".join(dict.fromkeys((degrees(low), degrees(high))))
+
+
+def _agree(findings: Mapping[str, Finding]) -> str:
+    """The loops on which a number is reproduced, for a cell."""
+    loops, holding = [name for name in findings if name], _where(findings, "reproduced")
+    if len(holding) == len(loops):
+        return "all loops"
+    return ", ".join(map(_word, holding)) if holding else "no loop"
 
 
 def _places(findings: Mapping[str, Finding]) -> str:
@@ -259,15 +315,23 @@ def _places(findings: Mapping[str, Finding]) -> str:
     alike = [name for name in open_ if findings[name].reason.startswith("alike")]
     some = [name for name in open_ if name not in alike]
     places = [_on(_where(findings, "reproduced"), loops)]
-    places += [f"for some motions only on {_and(some)}"] * bool(some)
-    places += [f"as much as it on {_and(alike)}"] * bool(alike)
+    places += [f"undecided {_on(some)}, where the two moves differ"] * bool(some)
+    places += [f"with equal errors {_on(alike)}"] * bool(alike)
     return ", ".join(places)
 
 
-def _on(holding: Sequence[str], loops: Sequence[str]) -> str:
-    if len(holding) == len(loops) > 1:
+def _ever(findings: Mapping[str, Finding]) -> bool:
+    """Whether something is so on some loop, in some motion at least."""
+    return bool(_where(findings, "reproduced") or _where(findings, "not specified enough"))
+
+
+def _on(holding: Sequence[str], loops: Iterable[str] = ()) -> str:
+    """Loops in words: on all `loops`, on no loop, on the ideal loop only, on the ideal and 1 kHz loops."""
+    tried = [name for name in loops if name]
+    if len(holding) == len(tried) > 1:
         return "on all loops"
-    return f"on {_and(holding)}{' alone' * (len(loops) > 1 == len(holding))}" if holding else "on no loop"
+    only = " only" * (len(tried) > 1 == len(holding))
+    return f"on the {_and(list(map(_word, holding)))} loop{'s' * (len(holding) > 1)}{only}" if holding else "on no loop"
 
 
 def _where(findings: Mapping[str, Finding], verdict: str) -> list[str]:
@@ -275,7 +339,7 @@ def _where(findings: Mapping[str, Finding], verdict: str) -> list[str]:
 
 
 def _one(judged: Iterable[Judgement]) -> Judgement | None:
-    """The first that was judged on loops."""
+    """The first that was tried on loops."""
     return next((judgement for judgement in judged if any(name for name in judgement.found)), None)
 
 
@@ -287,94 +351,3 @@ def _percent(share: float) -> str:
 
 def _and(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""
-
-
-def ledger_tables(judged: Sequence[Judgement]) -> list[Table]:
-    """Sections of claims, by loop where loops decide; then why, what is open, and how many of the paper's have which
-    verdict."""
-    from wristctl.comparison.claims import worded
-
-    claims = [j for j in judged if j.verdict is not None]
-    settings = [j for j in judged if j.verdict is None]
-    tables = []
-    for title, other_title, kind in (
-        ("Claims of the paper that rollouts decide", "Other claims of the paper", "paper"),
-        ("Details that rollouts decide", "Other details", "part"),
-        ("Our own checks that rollouts decide", "Our own other checks", "ours"),
-        ("Rollouts on what the paper's authors say elsewhere", "What the paper's authors say elsewhere", "group"),
-    ):
-        tables += _section(title, other_title, [j for j in claims if _kind(j.claim) == kind])
-    if settings:
-        tables.append(Table("Settings taken over as printed", ("setting", "the paper says", "paper", "unit"),
-                            [tuple(_claim(j)) for j in settings]))  # fmt: skip
-    why = [(j.claim.id, worded(j.claim, str(j.verdict)), j.reason) for j in claims if j.verdict != "open" and j.reason]
-    still = [(j.claim.id, j.reason) for j in claims if j.verdict == "open"]
-    counted = Counter(str(j.verdict) for j in claims if _kind(j.claim) == "paper")
-    return [
-        *tables,
-        Table("Why", ("claim", "verdict", "reason"), why),
-        Table("Still open", ("claim", "what would decide it"), still),
-        Table("Verdicts on the claims of the paper", ("verdict", "claims"), sorted(counted.items())),
-    ]
-
-
-def _kind(claim: Claim) -> str:
-    return "part" if claim.part_of else claim.whose
-
-
-def _section(title: str, title_of_others: str, judged: Sequence[Judgement]) -> list[Table]:
-    """Tables of a section: the claims that loops decide, and the remaining claims."""
-    from wristctl.comparison.claims import worded
-
-    by_loop = [j for j in judged if any(name for name in j.found)]
-    remaining = [j for j in judged if j not in by_loop]
-    loops = list(dict.fromkeys(name for j in by_loop for name in j.found if name))
-    heads, tables = ("claim", "says", "paper", "unit"), []
-    if by_loop:
-        pairs = [part for name in loops for part in (f"ours, {name}", f"verdict, {name}")]
-        rows = [
-            (
-                *_claim(j),
-                worded(j.claim, str(j.verdict)),
-                *(part for name in loops for part in _cells(j.claim, j.found.get(name))),
-            )
-            for j in by_loop
-        ]
-        tables.append(Table(title, (*heads, "verdict", *pairs), rows))
-    if remaining:
-        sources = any(j.claim.source for j in remaining)
-        rows = [
-            (*_claim(j), *_cells(j.claim, j.found.get("")), ", ".join(j.shown_by), *(j.claim.source,) * sources)
-            for j in remaining
-        ]
-        tables.append(Table(title_of_others, (*heads, "ours", "verdict", "shown by", *("source",) * sources), rows))
-    return tables
-
-
-def _claim(judgement: Judgement) -> Iterator[str]:
-    claim = judgement.claim
-    yield from (
-        claim.id,
-        claim.says,
-        "" if claim.value is None else _bound(claim.sense) + f"{claim.value:g}",
-        claim.unit,
-    )
-
-
-def _bound(sense: str) -> str:
-    return {"at most": "<= ", "at least": ">= "}.get(sense, "")
-
-
-def _cells(claim: Claim, finding: Finding | None) -> tuple[str, str]:
-    """Our range and the verdict, marked where it must be."""
-    from wristctl.comparison.claims import interval, worded
-
-    if finding is None:
-        return "", ""
-    mark = f" ({finding.mark})" if finding.mark else ""
-    ours = (
-        ""
-        if finding.low != finding.low and not finding.reason.startswith("fails")
-        else interval(finding.low, finding.high)
-    )
-    return ours, worded(claim, finding.verdict) + mark

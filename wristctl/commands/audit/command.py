@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.compare.command import Compared, compare
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.printed_table import Table
@@ -39,8 +40,8 @@ class Audited(StudyResult):
     """Verdicts of each claim over the box of unknowns; empty where the study names no box."""
 
     @property
-    def summary(self) -> list[str]:
-        """Verdicts on the paper's claims, in a few lines."""
+    def answer(self) -> Answer:
+        """What of the paper holds, for one screen."""
         from wristctl.commands.audit.answer import answer_of
 
         return answer_of(self.judgements, self.strips, self.study.wrist.tension_limit)
@@ -59,7 +60,7 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     claims = study.audit.claims
     if not claims:
-        raise UserError("no claims to audit", "audit.claims", Call("audit", "experiments/claims.yaml"))
+        raise UserError("no claims to audit", "audit.claims", Call("paper audit", "experiments/claims.yaml"))
     _check_claims(claims)
     _check_trainings(claims, inputs)
     asked = dict.fromkeys(claim.evidence for claim in claims if claim.evidence in (*TRAININGS, "hardware"))
@@ -90,8 +91,8 @@ def _check_box(study: Study) -> None:
 
 def audit(session: Session) -> Audited:
     """Judge every claim of the paper by rollouts, its own words, or what is still open."""
-    from wristctl.commands.audit.answer import ledger_tables
     from wristctl.commands.audit.figures import ours_over_the_papers
+    from wristctl.commands.audit.ledger import ledger_tables
     from wristctl.comparison.claims import TRAININGS, Grounds, conditions_of, evidence_study, judge_all, ledger_frame
     from wristctl.control.table import CONTROLLERS
 
@@ -176,7 +177,9 @@ def _evidence(session: Session, study: Study, label: str) -> Compared:
 
     if session.findings.run is None:
         return compared(None)
-    with start_run("compare", study, label, session.findings.run.path.parent, ["wristctl", "audit"], []) as run:
+    with start_run(
+        "compare", study, label, session.findings.run.path.parent, ["wristctl", "paper", "audit"], []
+    ) as run:
         return compared(run)
 
 
